@@ -6,6 +6,7 @@ result sheets of VLMEvalKit (.tsv, .csv, .xlsx).
 
 import csv
 import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +16,7 @@ import numpy as np
 
 from iqtt.files.reader import QuestionsFile
 from iqtt.vlm.ask import FORMAT as ASKED
+from iqtt.vlm.ask import read_heading, read_log
 from iqtt.vlm.export import CIRCULAR
 from iqtt.vlm.reading import Outcome, Reading, read_answer
 from metrics.submissions.rules import OUTCOMES
@@ -70,8 +72,8 @@ def is_log(path: str | Path) -> bool:
     if path.suffix == ".jsonl":
         return ASKED.encode() in start or b'"doc_id"' in start
     if path.suffix in (".tsv", ".csv"):
-        heading = start.split(b"\n")[0]
-        return b"prediction" in heading and b"index" in heading
+        columns = set(re.split(rb"[\t,]", start.split(b"\n")[0].strip()))
+        return {b"index", b"prediction", b"A", b"B"} <= columns
     return path.suffix == ".xlsx" or (path.suffix == ".json" and b'"eval"' in start)
 
 
@@ -129,6 +131,9 @@ def write_returned(
         if not 0 <= answer.question < count:
             found = f"an answer to question {answer.question}"
             raise FileFormatError(log.path, found, f"questions 0 to {count - 1}")
+        if not 0 <= answer.rotation < offered:
+            found = f"question {answer.question} in rotation {answer.rotation}"
+            raise FileFormatError(log.path, found, f"rotations 0 to {offered - 1}")
     first = [answer for answer in log.answers if answer.rotation == 0]
     order = {answer.question: i for i, answer in enumerate(first)}
     rotated = np.full((len(first), offered), ABSTAINED)
@@ -175,11 +180,11 @@ def _of_inspect(path: Path) -> Log:
 
 
 def _of_lines(path: Path) -> Log:
-    lines = [json.loads(line) for line in path.read_bytes().splitlines() if line.strip()]
-    if lines and isinstance(lines[0], dict) and lines[0].get("format") == ASKED:
-        return _of_ask(path, lines[0], lines[1:])
+    lines = path.read_bytes().splitlines()
+    if lines and ASKED.encode() in lines[0]:
+        return _of_ask(path)
     answers = []
-    for line in lines:
+    for line in map(json.loads, filter(bytes.strip, lines)):
         doc, text = line["doc"], line["filtered_resps"]
         while isinstance(text, list):
             text = text[0]
@@ -189,7 +194,8 @@ def _of_lines(path: Path) -> Log:
     return Log(path, "", "asked with lmms-eval", tuple(answers))
 
 
-def _of_ask(path: Path, heading: Mapping[str, Any], lines: list[dict[str, Any]]) -> Log:
+def _of_ask(path: Path) -> Log:
+    heading = read_heading(path)
     digest = str(heading["digest"])
     answers = tuple(
         ReturnedAnswer(
@@ -199,7 +205,7 @@ def _of_ask(path: Path, heading: Mapping[str, Any], lines: list[dict[str, Any]])
             line["outcome"],
             digest,
         )
-        for line in lines
+        for line in read_log(path).values()
     )
     names = ("temperature", "max_tokens", "layout", "size", "control")
     kept = json.dumps({name: heading[name] for name in names})

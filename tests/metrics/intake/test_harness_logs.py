@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from chat_server import completion, serving
 
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
+from iqtt.vlm.ask import ask
 from iqtt.vlm.export import CIRCULAR, export_for_models, row_values
 from iqtt.vlm.reading import LETTERS
 from iqtt.vlm.rows import Asked, Row, vlm_rows
@@ -192,3 +194,28 @@ def test_letters_lean(split: Path, rows: list[Row], tmp_path: Path) -> None:
     assert np.isclose(
         scores.metrics["iqtt_accuracy"].value, np.mean([row.answer == "C" for row in constant])
     )
+
+
+def test_a_list_of_answers_is_no_log(tmp_path: Path) -> None:
+    path = tmp_path / "answers.csv"
+    path.write_text("index,prediction\n0,B\n1,C\n")
+    assert not is_log(path)
+
+
+@pytest.mark.parametrize("rotation", [-1, 3, 7])
+def test_an_order_that_was_never_asked_is_refused(
+    split: Path, rows: list[Row], tmp_path: Path, rotation: int
+) -> None:
+    log = lmms_log(tmp_path / "log.jsonl", [replace(rows[0], rotation=rotation), *rows[1:]])
+    with pytest.raises(FileFormatError):
+        returned_score(log, split / "iqtt-val.h5")
+
+
+def test_a_log_of_bench_ask_may_end_in_a_line_that_was_cut(split: Path, tmp_path: Path) -> None:
+    asked, log = Asked(split / "iqtt-val.h5", rotations=3, size=64), tmp_path / "log.jsonl"
+    with serving(lambda *_: completion("C")) as (server, _):
+        ask(asked, server, log)
+    whole = read_returned(log)
+    assert (whole.model, len(whole.answers)) == ("tiny", 24)
+    log.write_bytes(log.read_bytes() + b'{"id": "9-')
+    assert read_returned(log).answers == whole.answers
