@@ -61,7 +61,7 @@ In $(CURDIR)/demo:
 Open first:  $(CURDIR)/demo/report.html
 Then try:    source $(VENV)/bin/activate
              scenegen preview demo/rooms.h5 --random 6
-             bench compare demo/mean-depth.json demo/empty-room.json
+             bench compare demo/mean-depth.json demo/nearest.json
 Learn more:  $(CURDIR)/docs/tutorial.md, to scores of a model of your own in 15 minutes
 endef
 export DEMO_SUMMARY
@@ -72,7 +72,7 @@ demo-summary:
 demo-model: demo $(VENV)/.model
 	$(BIN)/bench baseline pix2shape-rays --data demo/rooms.h5 --out demo/pix2shape.h5 --overwrite
 	$(BIN)/bench score demo/pix2shape.h5 --truth demo/rooms.h5 --json demo/pix2shape.json --html demo/pix2shape.html --overwrite
-	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/empty-room.json demo/pix2shape.json
+	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/nearest.json demo/pix2shape.json
 	$(BIN)/bench baseline pix2shape-views --data demo/iqtt/iqtt-test.h5 --out demo/answers.h5 --overwrite
 	$(BIN)/bench score demo/answers.h5 --truth demo/iqtt/iqtt-test-answers.h5
 	$(BIN)/pix2shape rotate --data demo/objects.h5 --items 0,3,6,9 --out demo/rotation.gif --overwrite
