@@ -117,7 +117,7 @@ def ask(
             for row in _chained(first, rows):
                 if row.id in replies:
                     continue
-                waiting.add(pool.submit(_ask_row, client, server, asked.layout, row, stop))
+                waiting.add(pool.submit(_ask_row, client, server, row, stop))
                 if len(waiting) >= 2 * server.concurrency:
                     waiting = _keep(waiting, file, replies, progress)
             while waiting:
@@ -248,12 +248,10 @@ def _keep(
     return still
 
 
-def _ask_row(
-    client: Any, server: Server, layout: str, row: Row, stop: threading.Event
-) -> dict[str, Any]:
+def _ask_row(client: Any, server: Server, row: Row, stop: threading.Event) -> dict[str, Any]:
     """Return the line of the log for a row. Raises AskError after the last try."""
     started, rng = time.monotonic(), random.Random(row.id)
-    body = _body(server, layout, row)
+    body = _body(server, row)
     url = server.base_url.rstrip("/") + "/chat/completions"
     problem, pause = "", server.pause
     for number in range(1, server.tries + 1):
@@ -304,10 +302,9 @@ def _seconds(text: str) -> float:
         return 0.0
 
 
-def _body(server: Server, layout: str, row: Row) -> dict[str, Any]:
-    pictures = [row.image] if layout == "composed" else list(row.images)
+def _body(server: Server, row: Row) -> dict[str, Any]:
     content: list[dict[str, Any]] = [
-        {"type": "image_url", "image_url": {"url": _data_url(picture)}} for picture in pictures
+        {"type": "image_url", "image_url": {"url": _data_url(picture)}} for picture in row.sent
     ]
     content.append({"type": "text", "text": row.question})
     return {

@@ -8,13 +8,14 @@ data, and the YAML files are tasks of lmms-eval.
 import base64
 import csv
 import json
-from collections.abc import Callable, Iterator
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
 from iqtt.vlm.prompt import CANARY
 from iqtt.vlm.rows import Asked, Row, count_rows, vlm_rows
+from scenegen.common.records import check
 from scenegen.files.new_file import folder_written_beside
 
 COLUMNS = {
@@ -56,28 +57,35 @@ def export_for_models(
     Returns the files. Raises as `vlm_rows`, and OSError as `folder_written_beside`.
     """
     name = Path(asked.path).stem
-    sheets = (f"{name}.tsv", f"{name}_circular.tsv")
+    sheets = [f"{name}.tsv", *([f"{name}_circular.tsv"] if asked.rotations > 1 else [])]
     tasks = sorted(path.name for path in TEMPLATES.iterdir() if path.is_file())
     names = [QUESTIONS, CONTROL, *sheets, CARD, *tasks]
-    count_rows(asked)  # refuses what cannot be asked before anything is written
+    check(count_rows(asked) > 0, str(asked.path), "no questions", "at least one")
     with folder_written_beside(folder, names, overwrite) as made:
-        with (
-            (made / sheets[0]).open("w", encoding="utf-8", newline="") as plain,
-            (made / sheets[1]).open("w", encoding="utf-8", newline="") as circular,
-        ):
-            rows = _in_sheets(vlm_rows(asked), _sheet(plain), _sheet(circular), asked.layout)
-            withheld, answers = _write_parquet(made / QUESTIONS, rows, progress)
-        control = replace(asked, with_reference=False, rotations=1)
-        _write_parquet(made / CONTROL, vlm_rows(control), lambda done: None)
-        if asked.rotations == 1:
-            (made / sheets[1]).unlink()
-            names.remove(sheets[1])
-        (made / CARD).write_text(_card(name, answers, withheld), encoding="utf-8")
+        last = _write_rows(asked, made, sheets, progress)
+        (made / CARD).write_text(_card(name, last), encoding="utf-8")
         for task in tasks:
             text = (TEMPLATES / task).read_text(encoding="utf-8")
             target = str(Path(folder).absolute() / QUESTIONS)
             (made / task).write_text(text.replace("QUESTIONS_PARQUET", target), encoding="utf-8")
     return [Path(folder) / name for name in names]
+
+
+def _write_rows(
+    asked: Asked, made: Path, sheets: Sequence[str], progress: Callable[[int], Any]
+) -> Row:
+    """Write all files that hold rows, each row drawn once; return the last row."""
+    with ExitStack() as stack:
+        questions, control = (stack.enter_context(_parquet(made / n)) for n in (QUESTIONS, CONTROL))
+        lines = [stack.enter_context(_sheet(made / name)) for name in sheets]
+        for block in _batches(vlm_rows(asked), AT_ONCE):
+            first = [row for row in block if row.rotation == 0]
+            questions(block)
+            control([row.control() for row in first])
+            for write, rows in zip(lines, (first, block), strict=False):
+                write(rows)
+            progress(len(block))
+    return block[-1]
 
 
 def row_values(row: Row) -> dict[str, Any]:
@@ -99,10 +107,9 @@ def row_values(row: Row) -> dict[str, Any]:
     return {name: values[name] for name in COLUMNS if name not in hidden}
 
 
-def _write_parquet(
-    path: Path, rows: Iterator[Row], progress: Callable[[int], Any]
-) -> tuple[bool, int]:
-    """Write rows; return whether the answers are withheld, and how many answers there are."""
+@contextmanager
+def _parquet(path: Path) -> Iterator[Callable[[Sequence[Row]], None]]:
+    """Give a function that appends rows to a file as a row group."""
     import pyarrow.parquet as pq
     from datasets import Dataset, Features, Image, List, Value
 
@@ -110,53 +117,63 @@ def _write_parquet(
     types |= dict.fromkeys(("question_index", "rotation", "cubes"), Value("int32"))
     types |= dict.fromkeys(("angle", "floor"), Value("float64"))
     types |= {"image": Image(), "images": List(Image()), "choices": List(Value("string"))}
-    writer, withheld, answers = None, False, 0
-    try:
-        for block in _batches(rows, AT_ONCE):
-            values = [row_values(row) for row in block]
+    with ExitStack() as stack:
+        writer = None
+
+        def write(rows: Sequence[Row]) -> None:
+            nonlocal writer
+            values = [row_values(row) for row in rows]
+            if not values:
+                return
             features = Features({name: types[name] for name in values[0]})
             if writer is None:
-                withheld, answers = block[0].answer is None, len(block[0].letters)
-                writer = pq.ParquetWriter(path, features.arrow_schema, compression="zstd")
+                made = pq.ParquetWriter(path, features.arrow_schema, compression="zstd")
+                writer = stack.enter_context(made)
             columns = {name: [row[name] for row in values] for name in values[0]}
             writer.write_table(Dataset.from_dict(columns, features).data.table)
-            progress(len(block))
-    finally:
-        if writer is not None:
-            writer.close()
-    return withheld, answers
+
+        yield write
 
 
-def _sheet(file: Any) -> Any:
-    return csv.writer(file, delimiter="\t", lineterminator="\n")
+@contextmanager
+def _sheet(path: Path) -> Iterator[Callable[[Sequence[Row]], None]]:
+    """Give a function that appends rows to a sheet of VLMEvalKit; a heading comes first.
+
+    `digest` is ours: VLMEvalKit keeps it, so that its results tell which questions were asked.
+    """
+    with path.open("w", encoding="utf-8", newline="") as file:
+        lines = csv.writer(file, delimiter="\t", lineterminator="\n")
+
+        def write(rows: Sequence[Row]) -> None:
+            for row in rows:
+                values = _sheet_values(row)
+                if file.tell() == 0:
+                    lines.writerow(values)
+                lines.writerow(values.values())
+
+        yield write
 
 
-def _in_sheets(rows: Iterator[Row], plain: Any, circular: Any, layout: str) -> Iterator[Row]:
-    """Yield rows, and write each to the sheets of VLMEvalKit as it passes."""
-    for number, row in enumerate(rows):
-        told = row.answer is not None
-        if number == 0:
-            heading = ["index", "image", "question", *row.letters, *(["answer"] * told)]
-            heading += ["category", "split"] if told else []
-            plain.writerow(heading)
-            circular.writerow([*heading, "g_index"])
-        pictures = [row.image] if layout == "composed" else list(row.images)
-        texts = [base64.b64encode(picture).decode() for picture in pictures]
-        image = texts[0] if layout == "composed" else json.dumps(texts)
-        values: list[Any] = [row.question, *(f"picture {letter}" for letter in row.letters)]
-        values += [row.answer, row.facts["kind"], "test"] if told else []
-        index = row.question_index + row.rotation * CIRCULAR
-        if row.rotation == 0:
-            plain.writerow([index, image, *values])
-        circular.writerow([index, image, *values, row.question_index])
-        yield row
+def _sheet_values(row: Row) -> dict[str, Any]:
+    texts = [base64.b64encode(picture).decode() for picture in row.sent]
+    told = {"answer": row.answer, "category": row.facts["kind"], "split": "test"}
+    return {
+        "index": row.question_index + row.rotation * CIRCULAR,
+        "image": texts[0] if len(texts) == 1 else json.dumps(texts),
+        "question": row.question,
+        **{letter: f"picture {letter}" for letter in row.letters},
+        **({} if row.answer is None else told),
+        "g_index": row.question_index,
+        "digest": row.digest,
+    }
 
 
-def _card(name: str, answers: int, withheld: bool) -> str:
+def _card(name: str, row: Row) -> str:
+    """Return the page of a folder, given one of its rows."""
     columns = "\n".join(
         f"| `{column}` | {text} |"
         for column, text in COLUMNS.items()
-        if not (withheld and column in FACTS)
+        if not (row.answer is None and column in FACTS)
     )
     return f"""---
 license: cc-by-4.0
@@ -171,8 +188,9 @@ configs:
 
 # {name}: mental-rotation questions for models
 
-Each question shows a reference and {answers} answers. One answer shows the same shape, turned.
-A program drew all pictures from cubes, and an audit proves that each question has one right answer.
+Each question shows a reference and {len(row.letters)} answers. One answer shows the same shape,
+turned. A program drew all pictures from cubes. `iqtt audit` of pix2shape-bench checks that each
+question has one right answer.
 
 `{CONTROL}` asks the same questions without the reference. A model scores at the floor there, or
 it has learned something else than mental rotation.

@@ -2,7 +2,8 @@
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -53,7 +54,7 @@ class Asked:
     device: str = "auto"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Row:
     """A question in one order of its answers.
 
@@ -61,9 +62,9 @@ class Row:
         id: of the row, such as "17-0".
         question_index: row of the question in its file.
         rotation: letter k shows the answer (k + rotation) mod K of the file.
-        image: one PNG file in sRGB with all pictures and their letters.
-        images: PNG files in sRGB of the reference and of each answer.
-        question: the text, as the layout wants it.
+        pictures: the reference, then the answers in the order of their letters, (1 + K, H, W, 3)
+            sRGB uint8.
+        layout, with_reference: as in `Asked`.
         letters: those of the answers.
         answer: the right letter; None where it is withheld.
         facts: kind, angle, cubes, shape and floor, as `truth` has them; None where withheld.
@@ -73,13 +74,37 @@ class Row:
     id: str
     question_index: int
     rotation: int
-    image: bytes
-    images: tuple[bytes, ...]
-    question: str
+    pictures: Array
+    layout: Layout
+    with_reference: bool
     letters: str
     answer: str | None
     facts: dict[str, Any]
     digest: str
+
+    @cached_property
+    def image(self) -> bytes:
+        """All pictures and their letters as one PNG file in sRGB."""
+        return png(composed(self.pictures, self.with_reference))
+
+    @cached_property
+    def images(self) -> tuple[bytes, ...]:
+        """The reference, unless it is left out, and each answer as PNG files in sRGB."""
+        return tuple(png(picture) for picture in self.pictures[0 if self.with_reference else 1 :])
+
+    @property
+    def sent(self) -> tuple[bytes, ...]:
+        """The PNG files that a model is sent, as the layout wants it."""
+        return (self.image,) if self.layout == "composed" else self.images
+
+    @property
+    def question(self) -> str:
+        """The text, as the layout wants it."""
+        return question_text(len(self.letters), self.layout, self.with_reference)
+
+    def control(self) -> "Row":
+        """Return the same row without its reference."""
+        return replace(self, with_reference=False)
 
     def original(self, letter: int) -> int:
         """Return the answer of the file that a letter of this row shows, both from 0."""
@@ -172,14 +197,13 @@ def _row(
     count = questions.answers
     facts = _facts(truth, count)
     order = [0, *(1 + (k + rotation) % count for k in range(count))]
-    turned = pictures[order]
     return Row(
         id=f"{index}-{rotation}",
         question_index=index,
         rotation=rotation,
-        image=png(composed(turned, asked.with_reference)),
-        images=tuple(png(picture) for picture in turned[0 if asked.with_reference else 1 :]),
-        question=question_text(count, asked.layout, asked.with_reference),
+        pictures=pictures[order],
+        layout=asked.layout,
+        with_reference=asked.with_reference,
         letters=LETTERS[:count],
         answer=None if answer is None else LETTERS[(answer - rotation) % count],
         facts=dict.fromkeys(facts) if answer is None else facts,
