@@ -147,7 +147,7 @@ def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
     from iqtt.audit import strangers
     from scenegen.files.new_file import write_text
 
-    with progress_bar(0, "question") as bar:
+    with progress_bar(None, "question") as bar:
         found = strangers.audit_strangers(cubes, bar.update)
     if json_path:
         write_text(json_path, strangers.as_json(found), overwrite)
