@@ -27,7 +27,6 @@ POSES = 8  # rotations of a picture that are tried
 QUARTERS = range(16, 50)
 COARSE = 16  # hypotheses of parities, distance and rotation that are filled
 ENOUGH = 0.03  # misfit of a decoded picture
-SETTLED = 0.12  # misfit below which a filling is refined
 
 
 @dataclass(frozen=True, eq=False)

@@ -178,6 +178,26 @@ def test_a_damaged_log_is_one_clear_error(tmp_path: Path, name: str, content: by
         read_returned(path)
 
 
+def test_a_question_is_circularly_right_only_in_every_order(
+    split: Path, rows: list[Row], tmp_path: Path
+) -> None:
+    log = lmms_log(tmp_path / "log.jsonl", rows)
+    right = [text_for(row) for row in rows]
+    lines = [json.loads(line) for line in log.read_text().splitlines()]
+    for row, line, text in zip(rows, lines, right, strict=True):
+        spoilt = row.question_index == 2 and row.rotation == 1  # whose rotation 0 is right
+        line["filtered_resps"] = ["none"] if spoilt else [text]
+    log.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    out = tmp_path / "p.h5"
+    write_returned(out, split / "iqtt-val.h5", read_returned(log), method="m")
+    scores = score([out], split / "iqtt-val.h5")
+    assert scores.metrics["iqtt_accuracy"].value == 0.5
+    assert scores.by_circle["every order"]["iqtt_accuracy"].value == 3 / 8
+    assert {name: group["iqtt_accuracy"].value for name, group in scores.by_outcome.items()} == {
+        "answered": 1.0, "refused": 0.0, "unparsed": 0.0,
+    }  # fmt: skip
+
+
 def test_letters_lean(split: Path, rows: list[Row], tmp_path: Path) -> None:
     constant = [row for row in rows if row.rotation == 0]
     lines = [
