@@ -85,12 +85,13 @@ def test_reading_a_file_loads_no_renderer(rooms_path, tmp_path):
         assert python(code, cwd=tmp_path) == "h5py numpy\n"
 
 
-def test_scoring_loads_no_renderer_and_no_torch(rooms_path, tmp_path):
+def test_scoring_and_auditing_load_no_renderer_and_no_torch(rooms_path, released, tmp_path):
     baseline = f"bench baseline empty-room --data {rooms_path}"
     score = "bench score predictions.h5 --json s.json --html s.html --processes 1"
-    loaded = first_users(baseline, score, cwd=tmp_path)
+    audit = f"iqtt audit {released()}"
+    loaded = first_users(baseline, score, audit, cwd=tmp_path)
     assert set(loaded[baseline]) <= {"h5py", "numpy", "scipy", "tqdm"}
-    assert not {"mitsuba", "drjit", "torch"} & set(loaded[score])
+    assert not {"mitsuba", "drjit", "torch"} & {*loaded[score], *loaded[audit]}
     assert (tmp_path / "s.html").exists()
 
 

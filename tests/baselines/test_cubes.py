@@ -66,7 +66,7 @@ def test_a_picture_gives_its_shape_and_not_the_mirror_image():
 
 
 @pytest.mark.parametrize(
-    "image", ["empty", "one colour", pytest.param("noise", marks=pytest.mark.slow)]
+    "image", ["empty", *(pytest.param(n, marks=pytest.mark.slow) for n in ("one colour", "noise"))]
 )
 def test_a_picture_without_a_shape_has_scores(image):
     images = np.full((4, 64, 64, 3), 255, np.uint8)

@@ -5,13 +5,22 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from fuzz.programs import TARGETS, WITH_TORCH
 
 ROOT = Path(__file__).parents[2]
+SUBMISSIONS = ["score answers", "validate"]
 
 
-def test_no_case_is_a_fault(tmp_path):
-    targets = [name for name in TARGETS if name not in WITH_TORCH]
+@pytest.mark.parametrize(
+    "targets",
+    [
+        pytest.param(SUBMISSIONS, id="submissions"),
+        pytest.param(sorted({*TARGETS} - {*WITH_TORCH, *SUBMISSIONS}), marks=pytest.mark.slow),
+    ],
+)
+def test_no_case_is_a_fault(targets, tmp_path):
     only = [word for name in targets for word in ("--only", name)]
     options = ["--cases", "1", "--jobs", "2", "--corpus", str(tmp_path), *only]
     command = [sys.executable, "-m", "fuzz", *options]

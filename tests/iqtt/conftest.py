@@ -54,7 +54,13 @@ def damaged(split_folder: Path, tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def failing(split_folder: Path, tmp_path: Path) -> Callable[..., set[str]]:
+def few_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lay the wrong answers of two questions on the reference; all take most of an audit's time."""
+    monkeypatch.setattr("iqtt.audit.audit.EXPLAINED", 2)
+
+
+@pytest.fixture
+def failing(split_folder: Path, tmp_path: Path, few_explained: None) -> Callable[..., set[str]]:
     """Let `edit` at a file in a copy of the split; return the audit's proofs that then fail.
 
     That the content has changed is asserted here, and left out.

@@ -1,20 +1,28 @@
 """Code blocks of pages, run as a reader runs them, and what pages say they print."""
 
+import contextlib
+import gc
+import io
 import os
 import re
+import runpy
 import subprocess
 import sys
+import traceback
+import warnings
 from pathlib import Path
+from unittest import mock
+
+from click.testing import CliRunner
 
 ROOT = Path(__file__).parents[2]
 BLOCK = re.compile(r'^```(\w+)(?: title="([\w.]+)")?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"[-+]?(?<![\w.])\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
-ENVIRONMENT = {
-    **os.environ,
-    "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}",
-    "PYTHONPATH": str(ROOT),
-    "OMP_NUM_THREADS": "1",
-}
+PROGRAMS = ("scenegen", "iqtt", "bench", "pix2shape", "python")
+# Starting Python takes longer than most commands: bash asks this process to run the programs.
+ASKING = """set -euo pipefail
+ask() {{ printf '%s\\0' "$#" "$@" >&{asked}; read -r code <&{told}; cat {out}; return "$code"; }}
+""" + "".join(f'{name}() {{{{ ask {name} "$@"; }}}}\n' for name in PROGRAMS)
 
 
 def blocks(page):
@@ -30,15 +38,68 @@ def run_block(language, title, code, folder):
     if language == "python" and title:
         (folder / title).write_text(code)
         return ""
-    command = {
-        "bash": ["bash", "-euo", "pipefail", "-c", code],
-        "python": [sys.executable, "-c", code],
-    }
-    done = subprocess.run(
-        command[language], cwd=folder, env=ENVIRONMENT, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, f"{code}\n{done.stdout[-2000:]}\n{done.stderr[-4000:]}"
-    return done.stdout
+    with contextlib.chdir(folder), warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # as for a reader
+        if language == "bash":
+            return _run_bash(code, folder.with_name(f"{folder.name}-printed"))
+        main = {"__name__": "__main__"}
+        status, printed = _run_python(lambda: exec(compile(code, "block", "exec"), main))
+        if "inspect_ai" in code:
+            main.clear()
+            gc.collect()  # while warnings about what is left open are ignored
+    assert status == 0, f"{code}\n{printed[-4000:]}"
+    return printed
+
+
+def _run_bash(code, out):
+    """Run a script; run the programs that it asks for, and leave in `out` what each prints."""
+    (asked, asks), (hears, told) = os.pipe(), os.pipe()
+    script = ASKING.format(asked=asks, told=hears, out=out) + code
+    with subprocess.Popen(
+        ["bash", "-c", script],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        pass_fds=(asks, hears),
+        text=True,
+        env={**os.environ, "PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}"},
+    ) as bash:
+        os.close(asks)
+        os.close(hears)
+        with open(asked) as requests, open(told, "w") as replies:
+            while count := _word(requests):
+                status, printed = _run_program(*(_word(requests) for _ in range(int(count))))
+                out.write_text(printed)
+                print(status, file=replies, flush=True)
+        printed = bash.communicate()[0]
+    assert bash.returncode == 0, f"{code}\n{printed[-4000:]}"
+    return printed
+
+
+def _word(file):
+    """Read up to the next NUL, or to the end."""
+    return "".join(iter(lambda: file.read(1).strip("\0"), ""))
+
+
+def _run_program(program, *words):
+    """Run a program of PROGRAMS in this process; return its exit code and what it prints."""
+    if program == "python":
+        return _run_python(lambda: runpy.run_path(words[0], run_name="__main__"))
+    import cli
+
+    with mock.patch("metrics.scoring.rows.processors", return_value=1):  # processes take seconds
+        result = CliRunner().invoke(getattr(cli, program), words)
+    if result.exception and not isinstance(result.exception, SystemExit):
+        return 1, "".join(traceback.format_exception(result.exception))
+    return result.exit_code, result.stdout if result.exit_code == 0 else result.output
+
+
+def _run_python(program):
+    with contextlib.redirect_stdout(io.StringIO()) as out:
+        try:
+            program()
+        except Exception:
+            return 1, out.getvalue() + traceback.format_exc()
+    return 0, out.getvalue()
 
 
 def missing_lines(expected, printed, within=0.02):

@@ -225,7 +225,6 @@ def test_a_fair_split_passes_and_all_is_told(split_folder: Path) -> None:
         for proof in found.proofs:
             assert proof.detail in text
         assert all(probe.statistic in text for probe in found.probes)
-    assert to_json([audit([split_folder])]) == to_json([found])
 
 
 def test_files_that_cannot_be_audited(tmp_path: Path) -> None:
@@ -239,6 +238,7 @@ def test_files_that_cannot_be_audited(tmp_path: Path) -> None:
         audit([tmp_path])
 
 
+@pytest.mark.usefixtures("few_explained")
 def test_a_file_of_answers_stands_for_its_questions(split_folder: Path) -> None:
     test, answers = (split_folder / f"iqtt-test{kind}.h5" for kind in ("", "-answers"))
     found = audit([test])
@@ -246,6 +246,7 @@ def test_a_file_of_answers_stands_for_its_questions(split_folder: Path) -> None:
     assert {p.name for p in found.proofs if p.status == "skipped"} == {"splits apart"}
 
 
+@pytest.mark.usefixtures("few_explained")
 def test_questions_without_answers(split_folder: Path, tmp_path: Path) -> None:
     shutil.copy(split_folder / "iqtt-test.h5", tmp_path)
     found = audit([tmp_path])

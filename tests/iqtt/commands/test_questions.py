@@ -1,9 +1,7 @@
 """The iqtt commands as a user types them, and the mistakes that a user makes."""
 
 import json
-import os
 import shutil
-import subprocess
 import sys
 
 import h5py
@@ -87,6 +85,7 @@ def test_files_that_are_read_beside_another_are_no_outputs(run, tmp_path, line, 
     assert (tmp_path / "x/iqtt-test-answers.h5").read_text() == "iqtt-test-answers.h5"
 
 
+@pytest.mark.usefixtures("few_explained")
 def test_a_secret_seed(run, tmp_path):
     """The same content gives the same questions, blanks aside; tools that read cope without a seed;
     only a split whose seed is known gets a note.
@@ -172,6 +171,7 @@ def test_show_needs_answers_to_show_them(run, split, tmp_path, check_refusal):
     check_refusal(result.exit_code, result.stdout, result.stderr, ("no answers",))
 
 
+@pytest.mark.usefixtures("few_explained")
 def test_audit_passes_and_writes_json(run, split, tmp_path, check_refusal):
     result = run("audit", split, "--json", "audit.json")
     assert result.exit_code == 0, result.output
@@ -185,6 +185,7 @@ def test_audit_passes_and_writes_json(run, split, tmp_path, check_refusal):
     assert "| --- |" in told.stdout
 
 
+@pytest.mark.usefixtures("few_explained")
 def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path):
     shutil.copytree(split, "x")
     with h5py.File("x/iqtt-val.h5", "r+") as file:
@@ -193,16 +194,3 @@ def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path):
     assert result.exit_code == 1
     assert "FAIL" in result.stdout
     assert "one right answer" in result.stdout
-
-
-def test_reading_and_auditing_need_no_renderer(split, tmp_path):
-    """Only the audit's own ray caster is used; Mitsuba is not even imported."""
-    code = (
-        "import sys, cli; from click.testing import CliRunner;"
-        f"r = CliRunner().invoke(cli.iqtt, ['audit', {str(split)!r}]);"
-        "print(r.exit_code, 'mitsuba' in sys.modules, 'torch' in sys.modules)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=os.environ
-    )
-    assert done.stdout.split() == ["0", "False", "False"]

@@ -3,8 +3,6 @@
 import json
 import os
 import shutil
-import subprocess
-import sys
 
 import pytest
 from click.testing import CliRunner
@@ -147,27 +145,6 @@ def test_outputs_are_not_replaced_unless_told(truths, folder, check_refusal):
 
 def test_the_format_is_described(folder):
     assert bench("describe-format").stdout == f"{describe_format()}\n"
-
-
-SCORING = """
-import sys, cli
-from click.testing import CliRunner
-result = CliRunner().invoke(cli.bench, sys.argv[1:])
-print(result.exit_code, *sorted({"mitsuba", "drjit", "torch", "trimesh"} & set(sys.modules)))
-"""
-
-
-def loaded(*arguments, code=SCORING):
-    command = [sys.executable, "-c", code, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
-
-
-def test_scoring_loads_neither_renderer_nor_torch(truths, folder):
-    bench("baseline", "empty-room", "--data", truths.rooms, "--out", "x.h5")
-    bench("baseline", "chance", "--data", truths.iqtt, "--out", "y.h5")
-    for path in ("x.h5", "y.h5"):
-        assert loaded("score", path, "--processes", "1", "--html", f"{path}.html") == ["0"]
-    assert loaded("--help", code="import trimesh" + SCORING) == ["0", "trimesh"]
 
 
 def test_outputs_of_one_name_are_refused_before_anything_is_written(truths, folder, check_refusal):

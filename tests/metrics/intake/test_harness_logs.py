@@ -119,7 +119,10 @@ def inspect_log(path: Path, rows: list[Row], split: Path) -> Path:
     return next(path.glob("*.eval"))
 
 
-@pytest.mark.parametrize("kind", ["samples.jsonl", "out.tsv", "out.csv", "out.xlsx", "inspect"])
+@pytest.mark.parametrize(
+    "kind",
+    ["samples.jsonl", "out.tsv", "out.xlsx", pytest.param("inspect", marks=pytest.mark.slow)],
+)
 def test_answers_come_back_from_every_harness(
     split: Path, rows: list[Row], tmp_path: Path, kind: str
 ) -> None:
