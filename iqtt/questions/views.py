@@ -22,7 +22,7 @@ Array = NDArray[Any]
 SHRINK = 2  # how many times smaller than images the grids are on which visibility is judged
 MARGIN = 1.5  # on them a cube needs so many times the pixels, so that full images seldom fall short
 VIEWS = 100  # rotations proposed for one image before the question gets other shapes
-PROPOSALS_AT_ONCE = 512  # views of all images that are judged at once, roughly
+PROPOSALS_AT_ONCE = 128  # views of all images that are judged at once, roughly
 QUESTION_ATTEMPTS = 50  # choices of shapes for one question
 CROWDED = 10  # from so many cubes on, a shape may well have no view that shows them all
 
