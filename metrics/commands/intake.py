@@ -71,6 +71,9 @@ MISSING = click.option(
 @click.option("--match", type=click.Choice(["number", "name"]), default="number",
               show_default=True, help="How files belong to rows: by the number in their names, or"
               " in the order of their names.")
+@click.option("--shown", type=click.Choice(["scored_view", "first_view", "no_view"]),
+              default="scored_view", show_default=True, help="Image of the scene that the method"
+              " was shown to predict a view.")
 @click.option("--answers", type=InputPath(), metavar="ANSWERS",
               help="Answers to questions instead: .csv, .json or .jsonl; or a harness's log: bench"
               " ask (.jsonl), Inspect (.eval), lmms-eval (.jsonl), VLMEvalKit (.tsv, .xlsx).")
@@ -83,8 +86,8 @@ MISSING = click.option(
 def import_(
     pattern: str | None, kind: Any, unit: str | None, scale: float | None,
     alignment: Any, invalid: tuple[float, ...], missing: Any, normals: str | None, frame: Any,
-    array: str | None, match: Any, answers: str | None, truth: str, out: str, method: str | None,
-    run_name: str, notes: str, overwrite: bool,
+    array: str | None, match: Any, shown: Any, answers: str | None, truth: str, out: str,
+    method: str | None, run_name: str, notes: str, overwrite: bool,
 ) -> None:
     """Make a submission of predictions that lie in files.
 
@@ -120,7 +123,7 @@ def import_(
     with progress_bar(count_rows(truth), "image") as bar:
         how = import_rooms(
             pattern, truth, out, method=method or _name_of(pattern), reading=reading,
-            normals=normals, progress=bar.update, **texts,
+            normals=normals, shown=shown, progress=bar.update, **texts,
         )
     print_line(f"{out}: {how}")
     _print_hints(out, truth)
@@ -172,7 +175,7 @@ def _print_hints(out: str, truth: str) -> None:
 @FRAME
 @MISSING
 @click.option("--resume", "keep", flag_value="resume",
-              help="Keep rows that another model file or other options made.")
+              help="Keep rows that another model, other weights or other options made.")
 @click.option("--restart", "keep", flag_value="restart", help="Begin anew.")
 @click.option("--traceback", is_flag=True, help="Show all of an error that the model raises.")
 @OVERWRITE

@@ -3,6 +3,7 @@
 Sizes are taken from headers before anything is unpacked. Values come as stored: no curve, no scale.
 """
 
+import re
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -91,9 +92,13 @@ def _npz(path: Path, name: str | None, vectors: bool) -> Array:
 
 
 def _picture(path: Path, _name: str | None, vectors: bool) -> Array:
-    from PIL import Image
+    from PIL import Image, UnidentifiedImageError
 
-    with Image.open(path) as picture:
+    try:
+        opened = Image.open(path)
+    except UnidentifiedImageError as error:  # such as a TIFF file of three floats a pixel
+        raise ArrayFileError(path, "a picture of an unknown kind", "", _AS_NUMBERS) from error
+    with opened as picture:
         _check_size(path, (picture.height, picture.width), MAX_PIXELS)
         pictures = getattr(picture, "n_frames", 1)
         if pictures > 1:
@@ -114,6 +119,19 @@ def _colour_png(path: Path, vectors: bool) -> Array:
         kind = np.uint16 if about["bitdepth"] > 8 else np.uint8
         values = np.array([np.asarray(row, kind) for row in rows])
     return _channels(path, values.reshape(height, width, about["planes"]), vectors)
+
+
+def _pfm(path: Path, _name: str | None, vectors: bool) -> Array:
+    """Read a PFM file of one or three channels; Pillow reads those of one."""
+    data = path.read_bytes()
+    head = re.match(rb"P([Ff])\s+(\d{1,6})\s+(\d{1,6})\s+([-+.\deE]{1,20})\s", data)
+    if head is None:
+        raise ArrayFileError(path, "no header of a PFM file", "Pf or PF, width, height and scale")
+    shape = (int(head[3]), int(head[2]), *((3,) if head[1] == b"F" else ()))
+    values = np.frombuffer(data[head.end() :], "<f4" if float(head[4]) < 0 else ">f4")
+    if values.size != np.prod(shape):
+        raise ArrayFileError(path, f"{values.size:,} numbers", f"{np.prod(shape):,}, as it says")
+    return _channels(path, values.reshape(shape)[::-1], vectors)
 
 
 _AS_NUMBERS = "save the numbers themselves, as .npy or as a 16-bit PNG of one channel"
@@ -162,5 +180,5 @@ def _exr(path: Path, name: str | None, vectors: bool) -> Array:
 Reader = Callable[[Path, str | None, bool], Array]
 READERS: dict[str, Reader] = {
     ".npy": _npy, ".npz": _npz, ".png": _picture, ".tif": _picture, ".tiff": _picture,
-    ".exr": _exr, ".pfm": _picture,
+    ".exr": _exr, ".pfm": _pfm,
 }  # fmt: skip

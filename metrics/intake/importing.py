@@ -21,7 +21,7 @@ from metrics.intake.outputs import (
     planar_from_distance,
 )
 from metrics.measures.alignment import Alignment
-from metrics.submissions.layout import KINDS
+from metrics.submissions.layout import KINDS, Shown
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.writer import RoomPredictionWriter
 from scenegen.common.errors import SceneGenError, SpecError
@@ -96,6 +96,7 @@ def import_rooms(
     method: str,
     reading: Reading,
     normals: str | None = None,
+    shown: Shown = "scored_view",
     run: str = "",
     notes: str = "",
     overwrite: bool = False,
@@ -106,6 +107,7 @@ def import_rooms(
     Args:
         pattern, normals: a pattern such as `out/*.png`, a folder, or a single NPY or NPZ file with
             an image for each row.
+        shown: which image of a scene the method was shown, as `layout.Shown`.
         progress: called with 1 after every row.
 
     Raises MatchError, ArrayFileError, OutputError and PredictionError, naming file and row; OSError
@@ -119,7 +121,7 @@ def import_rooms(
         height, width = rooms.spec.height, rooms.spec.width
         alignment = _alignment(reading)
         with RoomPredictionWriter(
-            out, truth, method=method, run=run, alignment=alignment, notes=notes,
+            out, truth, method=method, run=run, alignment=alignment, shown=shown, notes=notes,
             overwrite=overwrite,
         ) as writer:  # fmt: skip
             for row in range(len(rooms)):

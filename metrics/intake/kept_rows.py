@@ -71,7 +71,8 @@ def kept_rows(out: str | Path, settings: Mapping[str, Any], keep: str | None) ->
             shutil.rmtree(folder)
         stored = folder / SETTINGS
         if stored.exists() and stored.read_text(encoding="utf-8") != text and keep != "resume":
-            found = f"{len(list(folder.glob('*.npz')))} rows of another model file or other options"
+            count = len(list(folder.glob("*.npz")))
+            found = f"{count} rows of another model, other weights or other options"
             hint = "say --resume to keep them, or --restart to begin anew"
             raise SpecError(folder, found, "rows of this model", hint)
         folder.mkdir(exist_ok=True)

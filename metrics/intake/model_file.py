@@ -20,6 +20,7 @@ from typing import Any
 from scenegen.common.errors import SceneGenError
 
 EXPECTED = "infer(image, intrinsics=None), or load() or one class that gives an object with it"
+WEIGHTS = (".pt", ".pth", ".ckpt", ".safetensors", ".onnx", ".bin")
 EXAMPLE = "see docs/your-model.md"
 
 
@@ -35,7 +36,7 @@ class Model:
         path: its file.
         infer: for one image, or one question.
         infer_batch: for several images at once; None where the model has none.
-        sha256: of the file.
+        sha256: of the file, and of names, sizes and dates of the weights beside it.
     """
 
     path: Path
@@ -60,7 +61,7 @@ def load_model(path: str | Path, settings: Mapping[str, Any]) -> Model:
     ("batch" only where there is no `infer_batch` either); OSError for the path.
     """
     path = Path(path)
-    digest = hashlib.sha256(path.read_bytes()).hexdigest()
+    digest = _digest(path)
     module = _imported(path)
     make = getattr(module, "load", None)
     if not callable(make):
@@ -91,6 +92,15 @@ def accepts(function: Callable[..., Any], name: str) -> bool:
         return False
     kinds = (p.kind for p in parameters.values())
     return name in parameters or inspect.Parameter.VAR_KEYWORD in kinds
+
+
+def _digest(path: Path) -> str:
+    digest = hashlib.sha256(path.read_bytes())
+    for file in sorted(path.resolve().parent.iterdir()):
+        if file.suffix in WEIGHTS:
+            state = file.stat()
+            digest.update(f"{file.name} {state.st_size} {state.st_mtime_ns}".encode())
+    return digest.hexdigest()
 
 
 def _imported(path: Path) -> ModuleType:

@@ -96,8 +96,9 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
 @click.option("--shadows/--no-shadows", default=None, help="Whether objects cast shadows [no].")
 @click.option("--spp", type=int,
               help="Colour samples per pixel; with --shading path, 64 by default [1].")
-@click.option("--fov", "fov_degrees", type=float,
-              help="Field of view of a square image, degrees [28].")
+@click.option("--fov", type=Range(float),
+              help="Field of view of a square image, degrees; each scene draws its own from a range"
+              " such as 20-60 [28].")
 @click.option("--camera-radius", type=float,
               help="Distance of cameras from the target, scene units [1.5].")
 @click.option("--with", "truth", type=Names(),
@@ -150,6 +151,8 @@ def render(
     if chosen.get("reflectance") == "own":
         del chosen["reflectance"]
         chosen["own_reflectance"] = True
+    if fov := chosen.pop("fov", None):
+        chosen["fov_degrees"], chosen["fov_spread_degrees"] = fov[0], fov[1] - fov[0]
     if size is not None:
         chosen["height"], chosen["width"] = size
     source = object_source(preset, **objects)

@@ -29,14 +29,15 @@ LIMITS: dict[str, tuple[float, float]] = {  # of settings that are a number or a
     "object_radius": (0.005, 0.5),
     "specular": (0.0, 10.0),
     "shininess": (1.0, 10_000.0),
-    "fov_degrees": (1.0, 120.0),
     "lights": (0, MAX_LIGHTS),
     "light_level": (0.0, 100.0),
     "light_saturation": (0.0, 1.0),
 }
+FOV = (1.0, 120.0)  # degrees
 LATER: dict[str, object] = {
     "truth": (),
     "own_reflectance": False,
+    "fov_spread_degrees": 0.0,
 }  # fields that came after 1.0, with their defaults
 CHOICES = {
     "image_dtype": IMAGE_DTYPES,
@@ -87,6 +88,8 @@ class DatasetSpec:
         truth: further truth of each row, some of TRUTHS (`rooms.truth`).
         own_reflectance: multiply the reflectance of objects by the colours of their files; the
             truth then has "albedo", as no other column tells it.
+        fov_spread_degrees: how much wider than `fov_degrees` a scene's field of view can be; each
+            scene draws its own, uniformly.
     """
 
     seed: int = 0
@@ -122,6 +125,7 @@ class DatasetSpec:
     shininess: tuple[float, float] = (1.0, 1.0)
     truth: tuple[str, ...] = ()
     own_reflectance: bool = False
+    fov_spread_degrees: float = 0.0
 
     def __post_init__(self) -> None:
         normalise(self)
@@ -147,7 +151,13 @@ class DatasetSpec:
 
     @property
     def fov_y_degrees(self) -> float:
-        """Vertical field of view; the diagonal is that of a square image with `fov_degrees`."""
+        """Vertical field of view; the diagonal is that of a square image with `fov_degrees`.
+
+        Raises SpecError where scenes have different ones.
+        """
+        widest = self.fov_degrees + self.fov_spread_degrees
+        found = f"scenes of {self.fov_degrees:g} to {widest:g} degrees"
+        check(widest == self.fov_degrees, "fov", found, "one field of view for all scenes")
         return Camera.fov_y_from_square(self.fov_degrees, self.height, self.width)
 
     def to_json(self) -> str:
@@ -182,6 +192,7 @@ def _check_limits(spec: DatasetSpec) -> None:
 
 
 def _check_image(spec: DatasetSpec) -> None:
+    check_range("fov", (spec.fov_degrees, spec.fov_degrees + spec.fov_spread_degrees), *FOV)
     sides, pixels = f"{spec.height}x{spec.width}", spec.height * spec.width
     check(min(spec.height, spec.width) >= 8, "size", sides, "at least 8 pixels a side")
     check(pixels <= MAX_PIXELS, "size", sides, f"at most {MAX_PIXELS:,} pixels")

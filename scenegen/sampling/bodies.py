@@ -56,24 +56,31 @@ class Bodies:
         Args:
             kind: which shape each is, (N,).
             rotation: matrices, (N, 3, 3).
-            directions: about unit, multiples of DIRECTION_STEP, (D, 3).
+            directions: about unit, multiples of DIRECTION_STEP, (D, 3) or each body's (N, D, 3).
             coarse: whether bodies with very many corners may be larger than they are, by a few
                 thousandths.
         """
-        reaches = np.empty((len(kind), len(directions)))
+        shared = directions.ndim == 2
+        reaches = np.empty((len(kind), directions.shape[-2]))
         for rows, corners in _members(self._coarse if coarse else self._hulls, kind):
             turned = _turned(rotation[rows, None], corners[..., :3])
             radius = np.broadcast_to(corners[..., 3:], (*turned.shape[:2], 1))
             flat = rounded(rotation[rows], POINT_STEP)
-            ahead, across = along(flat[:, :, 0], directions), along(flat[:, :, 2], directions)
+            own = directions if shared else directions[rows].swapaxes(1, 2)
+            if shared:
+                ahead, across = along(flat[:, :, 0], own), along(flat[:, :, 2], own)
+            else:
+                ahead, across = ((flat[:, None, :, k] @ own)[:, 0] for k in (0, 2))
             sine = np.sqrt(ahead * ahead + across * across)[:, None]
-            farthest = np.empty((len(rows), len(directions)))
+            farthest = np.empty((len(rows), directions.shape[-2]))
             count = turned.shape[1]
             step = max(1, BLOCK // count)  # bodies, so few that all stays in the cache
             for first in range(0, len(rows), step):
                 block = slice(first, first + step)
-                reach = along(turned[block].reshape(-1, 3), directions)
-                reach = reach.reshape(-1, count, len(directions))
+                if shared:
+                    reach = along(turned[block].reshape(-1, 3), own).reshape(-1, count, len(own))
+                else:
+                    reach = turned[block] @ own[block]
                 reach += radius[block] * sine[block]
                 reach.max(axis=1, out=farthest[block])
             reaches[rows] = farthest

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.camera import Camera
 from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.description.specs import DatasetSpec
 from scenegen.sampling.octant import octant_points
@@ -27,3 +28,10 @@ def sample_cameras(spec: DatasetSpec, index: Array) -> Array:
     mirrored = (side < 0.5) & (widest > 0)
     azimuth = np.where(mirrored[:, None], 0.25 - azimuth, azimuth)
     return octant_points(spec.camera_target, spec.camera_radius, height[:, None], azimuth)
+
+
+def sample_fov_y(spec: DatasetSpec, index: Array) -> Array:
+    """Draw the vertical fields of view of the cameras of items `index`, (N,), in degrees: (N,)."""
+    wider = item_numbers(spec.seed, index, Purpose.CAMERA, start=4, count=1)[:, 0]
+    fov = spec.fov_degrees + spec.fov_spread_degrees * wider
+    return np.array([Camera.fov_y_from_square(f, spec.height, spec.width) for f in fov.tolist()])

@@ -16,7 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.camera import look_at
 from scenegen.common.rotations import cos_sin
+from scenegen.description.specs import DatasetSpec
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
 from scenegen.sampling.bodies import DIRECTION_STEP, Bodies, along
 
@@ -49,7 +51,8 @@ class Frustums:
     Attributes:
         position: of the cameras, world, (N, V, 3).
         camera_from_world: rotations, (N, V, 3, 3).
-        normals: outward normals of an image's four borders in the camera frame, about unit, (4, 3).
+        normals: outward normals of an image's four borders in the camera frame, about unit,
+            (N, 4, 3).
     """
 
     position: Array
@@ -63,8 +66,9 @@ class Frustums:
         """
         turn = self.camera_from_world[rows]
         seen: Any = sum(turn[..., i, None] * rotation[:, None, i, None, :] for i in range(3))
-        each = np.repeat(kind, seen.shape[1])
-        reach = bodies.reach(each, seen.reshape(-1, 3, 3), self.normals)
+        views = seen.shape[1]
+        normals = np.repeat(self.normals[rows], views, axis=0)
+        reach = bodies.reach(np.repeat(kind, views), seen.reshape(-1, 3, 3), normals)
         return reach.reshape(*seen.shape[:2], 4)
 
     def hold(self, rows: Array, places: Array, border: Array) -> Array:
@@ -82,10 +86,19 @@ class Frustums:
         seen = [turn[..., i, 0] * away[..., 0] + turn[..., i, 1] * away[..., 1]
                 + turn[..., i, 2] * away[..., 2] for i in range(3)]  # fmt: skip
         inside = np.ones(places.shape[:2], bool)
-        for k, (x, y, z) in enumerate(self.normals.tolist()):
-            across = x * seen[0] if x else y * seen[1]
+        for k in range(4):
+            x, y, z = self.normals[rows, k, :, None, None].swapaxes(0, 1)
+            across = x * seen[0] if k < 2 else y * seen[1]
             inside &= (across + z * seen[2] + border[..., k, None] <= 0.0).all(axis=1)
         return inside
+
+
+def make_frustums(spec: DatasetSpec, cameras: Array, fov_y_degrees: Array) -> Frustums:
+    """Return the frustums of cameras (N, V, 3) with vertical fields of view (N,)."""
+    world_from_camera = look_at(cameras, np.array(spec.camera_target))[..., :3, :3]
+    values, which = np.unique(fov_y_degrees, return_inverse=True)
+    normals = np.array([border_normals(f, spec.height, spec.width) for f in values.tolist()])
+    return Frustums(cameras, world_from_camera.swapaxes(-1, -2), normals[which])
 
 
 def border_normals(fov_y_degrees: float, height: int, width: int) -> Array:

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import look_at
 from scenegen.common.errors import PlacementError
 from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.common.rotations import rotation_matrix
@@ -20,15 +19,15 @@ from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.sampling.bodies import MARGIN, bodies_of
-from scenegen.sampling.cameras import sample_cameras
+from scenegen.sampling.cameras import sample_cameras, sample_fov_y
 from scenegen.sampling.lights import sample_lights
 from scenegen.sampling.objects import Unplaced, sample_counts, sample_objects
 from scenegen.sampling.placement import (
     CANDIDATES,
     SEPARATORS,
     Frustums,
-    border_normals,
     find_places,
+    make_frustums,
 )
 from scenegen.sampling.poses import random_rotations
 
@@ -64,8 +63,9 @@ def sample_scenes(
     """
     index, attempt = np.asarray(index, np.int64), np.asarray(attempt, np.int64)
     unplaced = sample_objects(spec, index, objects or objects_of(spec))
-    cameras = sample_cameras(spec, index)
-    placed, position, rotation, scale = _place_objects(spec, index, attempt, cameras, unplaced)
+    cameras, fov_y_degrees = sample_cameras(spec, index), sample_fov_y(spec, index)
+    frustums = make_frustums(spec, cameras, fov_y_degrees)
+    placed, position, rotation, scale = _place_objects(spec, index, attempt, frustums, unplaced)
     light_count, light_position, light_color = sample_lights(spec, index)
 
     def same(values: Any, *shape: int) -> Array:
@@ -77,7 +77,7 @@ def sample_scenes(
         index=index,
         camera_position=cameras,
         camera_target=same(spec.camera_target, views, 3),
-        fov_y_degrees=same(spec.fov_y_degrees, views),
+        fov_y_degrees=same(fov_y_degrees[:, None], views),
         object_count=unplaced.count,
         shape=unplaced.model,
         mesh=unplaced.mesh,
@@ -132,7 +132,7 @@ def refusal(
 
 
 def _place_objects(
-    spec: DatasetSpec, index: Array, attempt: Array, cameras: Array, unplaced: Unplaced
+    spec: DatasetSpec, index: Array, attempt: Array, frustums: Frustums, unplaced: Unplaced
 ) -> tuple[Array, Array, Array, Array]:
     """Place the objects of N items one after another; items without room for one get no more.
 
@@ -143,12 +143,6 @@ def _place_objects(
     position, rotation = np.zeros((len(index), slots, 3)), np.zeros((len(index), slots, 4))
     scale = np.zeros((len(index), slots))
     placed = np.zeros((len(index), slots, len(SEPARATORS)))
-    world_from_camera = look_at(cameras, np.array(spec.camera_target))[..., :3, :3]
-    frustums = Frustums(
-        cameras,
-        world_from_camera.swapaxes(-1, -2),
-        border_normals(spec.fov_y_degrees, spec.height, spec.width),
-    )
     bodies = bodies_of(unplaced.outlines)
     going = np.ones(len(index), bool)
     for slot in range(slots):

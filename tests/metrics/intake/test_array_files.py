@@ -24,7 +24,8 @@ def exr(path, channels):
 
 
 def pfm(path, values, order="<"):
-    head = f"Pf\n{values.shape[1]} {values.shape[0]}\n{-1.0 if order == '<' else 1.0}\n"
+    kind = "Pf" if values.ndim == 2 else "PF"
+    head = f"{kind}\n{values.shape[1]} {values.shape[0]}\n{-1.0 if order == '<' else 1.0}\n"
     path.write_bytes(head.encode() + values[::-1].astype(f"{order}f4").tobytes())
 
 
@@ -66,6 +67,7 @@ def test_an_image_of_numbers(name, tmp_path):
         ("x.png", lambda p: Image.fromarray(BYTES).save(p), BYTES),
         ("w.png", lambda p: words_png(p, WORDS), WORDS),
         ("x.exr", lambda p: exr(p, dict(zip("XYZ", np.moveaxis(VECTORS, -1, 0)))), VECTORS),
+        ("x.pfm", lambda p: pfm(p, VECTORS), VECTORS),
         ("n.exr", lambda p: exr(p, {"RGB": VECTORS}), VECTORS),
     ],
 )

@@ -27,7 +27,7 @@ def imported(tmp_path, rooms, save, ending, *, normals=None, **reading):
         save(folder / f"d{room.index:02d}{ending}", room)
     how = import_rooms(
         f"{folder}/d*{ending}", rooms.path, tmp_path / "p.h5", method="m",
-        reading=Reading(**reading), normals=normals,
+        reading=Reading(**reading), normals=normals, shown="first_view",
     )  # fmt: skip
     assert "d00" in how
     assert [p for p in validate(tmp_path / "p.h5", rooms.path) if not p.is_hint] == []
@@ -68,6 +68,7 @@ def test_the_numbers_of_files_mean_the_truth(name, rooms, tmp_path):
     save, ending, reading, expected, within = CASES[name]
     with imported(tmp_path, rooms, save, ending, **reading) as found:
         assert (found.kind, found.alignment) == KINDS.get(name, ("depth", "none"))
+        assert found.shown == "first_view"
         for room in rooms:
             assert np.abs(found.geometry(room.index) - expected(room)).max() < within
 

@@ -177,10 +177,14 @@ def test_rows_of_another_model_are_not_mixed_in_silence(run, tmp_path):
     with pytest.raises(ModelError):
         run(text)
     other = text.replace("1.5", "2.5")
-    for changed in ({"text": other}, {"text": text, "missing": "nearest"}):
+    weights = tmp_path / "weights.pt"
+    for changed in ({"text": other}, {"text": text, "missing": "nearest"}, {"text": text}):
+        if changed == {"text": text}:
+            weights.write_bytes(b"other weights")
         with pytest.raises(SceneGenError) as caught:
             run(**changed)
         assert caught.value.where == str(tmp_path / "p.h5.rows")
+    weights.unlink()
     run(other, keep="resume")
     with open_predictions(run.out) as found:
         assert [found.depth(i)[0, 0] for i in (4, 5)] == [1.5, 2.5]

@@ -97,6 +97,7 @@ OUT_OF_RANGE: dict[str, list[Any]] = {
     "image_dtype": ["uint16"],
     "min_visible_pixels": [-1, 128 * 128 + 1],
     "fov_degrees": [0.9, 121.0, NAN],
+    "fov_spread_degrees": [-1.0, 92.5, NAN],
     "camera_radius": [1.0, 10.1, NAN],
     "camera_target": [(0.3, 0.0, 0.3), (0.3, 0.3, 1.0), (NAN, 0.3, 0.3)],
     "light_radius": [1.0, 101.0, INF],
@@ -113,7 +114,8 @@ OUT_OF_RANGE: dict[str, list[Any]] = {
     "shininess": [(0.9, 2.0), (3.0, 2.0), (1.0, 10_001.0), (NAN, 2.0)],
     "reflectance": [(0.1, 0.1, 1.1), (-0.1, 0.1, 0.1), (NAN, 0.1, 0.1)],
 }
-SHOWN = {"height": "size", "width": "size", "fov_degrees": "fov"}  # where not the field's name
+# Where an error names another thing than the field.
+SHOWN = {"height": "size", "width": "size", "fov_degrees": "fov", "fov_spread_degrees": "fov"}
 
 
 @settings(deadline=None)

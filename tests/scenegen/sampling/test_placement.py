@@ -42,7 +42,8 @@ def frustums(cameras, height=9, width=9):
     poses = np.array([camera.world_from_camera for camera in cameras]).reshape(1, -1, 4, 4)
     fov = cameras[0].fov_y_degrees if cameras else 30.0
     turns = poses[..., :3, :3].swapaxes(-1, -2)
-    return Frustums(poses[..., :3, 3], turns, border_normals(fov, height, width))
+    normals = np.tile(border_normals(fov, height, width), (len(poses), 1, 1))
+    return Frustums(poses[..., :3, 3], turns, normals)
 
 
 def places_of_boxes(count, scale, cameras, placed, seed=0):

@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from scipy.ndimage import maximum_filter, minimum_filter
 from scipy.stats import binomtest, kstest
 
+from scenegen import open_rooms
 from scenegen.camera import look_at
+from scenegen.common.errors import SpecError
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import pack
@@ -19,6 +21,7 @@ from scenegen.rendering.renderer import render
 from scenegen.rooms import render as dataset
 from scenegen.rooms.render import render_items
 from scenegen.sampling.cameras import sample_cameras
+from scenegen.sampling.scenes import sample_scene, sample_scenes
 
 ANGLES = (0.0, 5.0, 35.0, 55.0, 80.0)
 MANY = DatasetSpec(views=ANGLES, seed=4)
@@ -38,6 +41,25 @@ def views_path(make_rooms, tmp_path_factory):
     """Return a file of four scenes from five sides; settings as in TINY."""
     path = tmp_path_factory.mktemp("views") / "views.h5"
     return make_rooms(path, 4, **TINY)
+
+
+def test_each_scene_draws_its_field_of_view_from_a_range(make_rooms, tmp_path):
+    """All else is as in a set where this is the only field of view."""
+    ranged = {**TINY, "height": 32, "width": 32, "fov_degrees": 20.0, "fov_spread_degrees": 40.0}
+    path = make_rooms(tmp_path / "x.h5", 12, **ranged)
+    with open_rooms(path) as rooms:
+        fov = rooms.read("camera/fov_y_degrees", slice(None)).reshape(12, 5)
+        assert (fov == fov[:, :1]).all()
+        assert len(np.unique(fov)) == 12
+        assert (fov.min() > 20) & (fov.max() < 60) & (np.ptp(fov) > 20)
+        with pytest.raises(SpecError):
+            _ = rooms.spec.fov_y_degrees
+    spec = DatasetSpec(**ranged)
+    proposed, scenes = sample_scenes(spec, np.arange(12), np.zeros(12, int))
+    assert proposed.sum() > 6
+    for item in np.flatnonzero(proposed).tolist():
+        alone = replace(spec, fov_degrees=fov[item, 0], fov_spread_degrees=0.0)
+        assert sample_scene(alone, item) == scenes.scene(proposed[:item].sum())
 
 
 @settings(deadline=None, max_examples=60)
