@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.views.table import Table, make_table
-from scenegen.common.text_table import number
+from scenegen.common.text_table import number, with_interval
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -169,10 +169,8 @@ def _apart(degrees: Sequence[float]) -> list[float]:
 
 
 def _in_words(point: Point) -> str:
-    if point.low is None or point.high is None:
-        return number(point.value)
-    ends = f"[{number(point.low, point.value)}, {number(point.high, point.value)}]"
-    return f"{number(point.value)} {ends}"
+    value, interval = with_interval(point.value, point.low, point.high)
+    return value if interval == "-" else f"{value} {interval}"
 
 
 def bars(counts: Sequence[int], title: str, unit: str, counted: str) -> Chart:

@@ -23,7 +23,7 @@ from metrics.scoring.metric_names import (
 )
 from metrics.scoring.records import GROUPINGS, Meta, Score, ScoreFile, Skill
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
-from scenegen.common.text_table import by_number, distinct, number, plain
+from scenegen.common.text_table import by_number, distinct, number, plain, with_interval
 from scenegen.files.new_file import written_beside
 
 INTERVAL = f"{CONFIDENCE:.0%} interval"
@@ -103,8 +103,8 @@ def floor_cell(scores: ScoreFile, name: str) -> Cell:
 
 def _beside(reference: float, score: Score) -> str:
     """Return a number as its score is shown, but never a rounded 0."""
-    text = number(reference, as_shown(score))
-    return number(reference, reference) if reference and float(text) == 0 else text
+    text = number(reference, (score.low, score.high))
+    return number(reference) if reference and float(text) == 0 else text
 
 
 def references(scores: ScoreFile) -> dict[str, tuple[str, float]]:
@@ -140,7 +140,7 @@ def all_scores(scores: ScoreFile) -> Table:
     for name in in_order(scores.metrics):
         score = scores.metrics[name]
         better = "higher" if metric(name).higher_is_better else "lower"
-        std = "-" if score.std is None else number(score.std, score.value)
+        std = "-" if score.std is None else number(score.std, (score.low, score.high))
         skill = scores.skills.get(name)
         floor = "-" if skill is None else _beside(skill.floor, score)
         rows.append((name, *interval_cells(score), std, floor, score.unit, better))
@@ -188,10 +188,7 @@ def kind_skill(scores: ScoreFile, kind: str) -> Skill:
 
 def interval_cells(score: Score | Skill) -> tuple[str, str]:
     """Return a value and its interval as text; "-" stands for no interval."""
-    like = as_shown(score)
-    if score.low is None or score.high is None:
-        return number(score.value, like), "-"
-    return number(score.value, like), f"[{number(score.low, like)}, {number(score.high, like)}]"
+    return with_interval(score.value, score.low, score.high)
 
 
 def score_cell(score: Score | Skill | None, best: str = "", floor: float | None = None) -> Cell:
@@ -203,17 +200,11 @@ def score_cell(score: Score | Skill | None, best: str = "", floor: float | None 
     if score is None:
         return Cell()
     value, interval = interval_cells(score)
-    std = getattr(score, "std", None)
-    rest = [] if std is None else [f"± {number(std, score.value)}"]
+    std, ends = getattr(score, "std", None), (score.low, score.high)
+    rest = [] if std is None else [f"± {number(std, ends)}"]
     rest += [] if interval == "-" else [interval]
-    rest += [] if floor is None else [f"floor {number(floor, as_shown(score))}"]
+    rest += [] if floor is None else [f"floor {number(floor, ends)}"]
     return Cell(value, " ".join(rest), value == best)
-
-
-def as_shown(score: Score | Skill) -> float:
-    """Return a number with as many decimals as a score is shown with: four where 0 is a middle."""
-    signed = isinstance(score, Skill) or score.unit == "correlation"
-    return 0.1 if signed else score.value
 
 
 def labels_of(files: Sequence[ScoreFile]) -> list[str]:

@@ -12,6 +12,7 @@ DIGITS = 4  # significant digits of a score
 LONGEST = 60  # characters of a name
 UNNAMED = "(unnamed)"
 Rows = Sequence[Sequence[str]]
+Interval = tuple[float | None, float | None]
 _HIDDEN_CATEGORIES = ("Cc", "Cs", "Cn", "Co", "Zl", "Zp")
 _TEXT_DIRECTIONS = frozenset(
     "\u061c\u200e\u200f\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069"
@@ -74,19 +75,32 @@ def by_number(keys: Iterable[str]) -> list[str]:
     return sorted(keys, key=place)
 
 
-def number(value: float, like: float | None = None) -> str:
-    """Return a number with 4 significant digits, without an exponent where 8 decimals hold it.
+def number(value: float, interval: Interval = (None, None)) -> str:
+    """Return a number with as many decimals as an interval supports, its own or a neighbour's.
 
-    With `like`, it has as many decimals as that number would be shown with.
+    Half of the interval is 2 to 20 units of the last decimal: 0.60 [0.54, 0.64]. Without an
+    interval, or with one of no width, there are 4 significant digits. There is no exponent where 8
+    decimals hold the number.
     """
-    scale = abs(value if like is None or like == 0.0 else like)
-    if value == 0.0 and scale == 0.0:
+    low, high = interval
+    half = 0.0 if low is None or high is None else (high - low) / 2
+    largest = max(abs(value), half)
+    if largest == 0.0:
         return "0"
-    if not 1e-5 <= scale < 1e6 or abs(value) >= 1e6:
+    if not 1e-5 <= largest < 1e6:
         return f"{value:.{DIGITS}g}"
-    decimals = min(max(DIGITS - 1 - math.floor(math.log10(scale)), 0), 8)
+    is_wide = half > 1e-6 * largest
+    last = half / 2 if is_wide else largest / 10 ** (DIGITS - 1)
+    decimals = min(max(-math.floor(math.log10(last)), 0), 8)
     text = f"{value:.{decimals}f}"
     return text.removeprefix("-") if float(text) == 0.0 else text
+
+
+def with_interval(value: float, low: float | None, high: float | None) -> tuple[str, str]:
+    """Return a number and its interval as text; "-" stands for no interval."""
+    if low is None or high is None:
+        return number(value), "-"
+    return number(value, (low, high)), f"[{number(low, (low, high))}, {number(high, (low, high))}]"
 
 
 def aligned(rows: Rows) -> list[str]:

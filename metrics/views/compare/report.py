@@ -35,7 +35,7 @@ from metrics.views.report import ROOMS_REMARK, curves_section
 from metrics.views.score_tables import too_few
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
 from scenegen.common.errors import SceneGenError
-from scenegen.common.text_table import number
+from scenegen.common.text_table import Interval, number
 
 FORMAT_NAME = "pix2shape-bench/comparison"
 FORMAT_VERSION = "1.0"
@@ -98,20 +98,20 @@ def _text_table(reference: str, differences: Sequence[Difference]) -> Table:
     name = differences[0].metric
     head = ("method", "score", "difference", *TESTS_HEAD)
     rows: list[Sequence[Cell | str]] = [
-        (reference, number(differences[0].reference_value), *("" for _ in head[2:]))
+        (reference, _beside(differences[0].reference_value, differences[0]), *[""] * len(head[2:]))
     ]
-    rows += [(d.method, number(d.value), difference_cell(d), *paired_cells(d)) for d in differences]
+    rows += [
+        (d.method, _beside(d.value, d), difference_cell(d), *paired_cells(d)) for d in differences
+    ]
     title = f"{name} ({metric(name).unit}, {metric(name).direction})"
     return make_table(title, head, rows)
 
 
 def difference_cell(d: Difference) -> Cell:
     """Return a difference and its interval."""
-    value = _signed(d.difference, d.difference)
-    if d.low is None or d.high is None:
-        return Cell(value)
-    like = d.difference or max(abs(d.low), abs(d.high))
-    return Cell(value, f"[{_signed(d.low, like)}, {_signed(d.high, like)}]")
+    ends = (d.low, d.high)
+    shown = [_signed(end, ends) for end in ends if end is not None]
+    return Cell(_signed(d.difference, ends), f"[{', '.join(shown)}]" if shown else "")
 
 
 def paired_cells(d: Difference) -> tuple[str, ...]:
@@ -121,8 +121,13 @@ def paired_cells(d: Difference) -> tuple[str, ...]:
     return counts, _probability(d.p_value), _probability(d.p_holm), smallest, d.verdict
 
 
-def _signed(value: float, like: float) -> str:
-    return ("+" if value > 0.0 else "") + number(value, like)
+def _beside(value: float, d: Difference) -> str:
+    """Return a score as its difference is shown, whose interval is the narrower one."""
+    return number(value, (d.low, d.high))
+
+
+def _signed(value: float, interval: Interval) -> str:
+    return ("+" if value > 0.0 else "") + number(value, interval)
 
 
 def _probability(p: float) -> str:
@@ -231,8 +236,7 @@ def _page_table(differences: Sequence[Difference]) -> Table:
     ends = [end for point in points for end in (point.value, point.low, point.high)]
     rows: list[Sequence[Cell | str]] = []
     for d, point in zip(differences, points, strict=True):
-        like = 0.1 if definition.unit == "correlation" else d.reference_value
-        method = Cell(d.method, f"{number(d.value)} instead of {number(d.reference_value, like)}")
+        method = Cell(d.method, f"{_beside(d.value, d)} instead of {_beside(d.reference_value, d)}")
         drawing, scale = strip(point, [("zero", 0.0)], ends)
         rows.append(
             (method, difference_cell(d), Cell("", scale, drawing=drawing), *paired_cells(d))

@@ -13,7 +13,7 @@ from metrics.views.leaderboard.rows import Cells, unranked_rows
 from metrics.views.score_tables import FLOORS_OF_ROOMS, floor_text
 from metrics.views.table import Cell, Table
 from scenegen.common.errors import SceneGenError
-from scenegen.common.text_table import number
+from scenegen.common.text_table import number, with_interval
 
 SKILL_OF = "skill of "  # begins the keys of columns of skills
 FLOOR, NOISE, CHANCE = "floor: ", "noise floor", "floor: chance"
@@ -106,8 +106,8 @@ def floors_table(files: Sequence[ScoreFile]) -> Table | None:
         return None
     cells: dict[str, dict[str, Cell]] = {}
     for floor in measured:
-        ends = f"[{number(floor.low, floor.accuracy)}, {number(floor.high, floor.accuracy)}]"
-        cells.setdefault(floor.name, {})[floor.kind] = Cell(number(floor.accuracy), ends)
+        cell = Cell(*with_interval(floor.accuracy, floor.low, floor.high))
+        cells.setdefault(floor.name, {})[floor.kind] = cell
     rows = unranked_rows("floor", cells, kinds)
     note = (
         "Fraction of right answers of methods that know nothing of 3D, with 95% intervals, by kind"

@@ -38,7 +38,7 @@ def test_curves_tell_their_numbers_again_and_draw_no_names():
     assert "scene unit" in text
     assert list(chart.legend) == [("s0", "<mine>"), (LINE, "floor")]
     assert cells_of(chart.table) == {
-        "5": ["0.006770 [0.006000, 0.007000]", "0.01000"],
+        "5": ["0.0068 [0.0060, 0.0070]", "0.01000"],
         "80": ["0.004000", "-"],
     }
     assert curves([Series("none", [], "s0")], "t", "u") is None

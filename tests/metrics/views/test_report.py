@@ -27,7 +27,7 @@ from metrics.views.score_tables import (
     title_of,
     write_csv,
 )
-from scenegen.common.text_table import number
+from scenegen.common.text_table import with_interval
 from scenegen.rooms.reader import RoomsFile
 
 CONTROLS = "\x1b[2J\x9b\u202e\u2066\x07"
@@ -40,13 +40,12 @@ def test_every_score_stands_beside_its_reference():
     table = all_scores(scores)
     cells = cells_of(table)
     for name, value in scores.metrics.items():
-        ends = f"[{number(value.low, value.value)}, {number(value.high, value.value)}]"
-        assert cells[name][:2] == [number(value.value), ends]
-    assert cells["  noise floor"][0] == "0.0123"
+        assert cells[name][:2] == [*with_interval(value.value, value.low, value.high)]
+    assert cells["  noise floor"][0] == "0.01230"
     assert cells["chamfer"][3] == "0.1600"
     head = cells_of(headline_rows(scores))
-    assert head["skill of chamfer"] == ["-0.2500", "[-0.5000, -0.1000]", "0: empty room"]
-    assert head["chamfer"][-1] == "0.1600: empty room; noise floor 0.0123"
+    assert head["skill of chamfer"] == ["-0.2", "[-0.5, -0.1]", "0: empty room"]
+    assert head["chamfer"][-1] == "0.1600: empty room; noise floor 0.01230"
 
 
 def test_questions_have_the_floor_of_their_kind(monkeypatch):
@@ -57,8 +56,8 @@ def test_questions_have_the_floor_of_their_kind(monkeypatch):
     scores = iqtt_scores("a", [1, 0], skills=accuracy, by_distractor=group)
     head = cells_of(headline_rows(scores))
     assert head["skill of iqtt_accuracy"][-1] == "0: outline"
-    assert head["iqtt_accuracy"][-1] == "0.5000: outline; chance 0.3333"
-    assert cells_of(all_scores(scores))["  chance"][0] == "0.3333"
+    assert head["iqtt_accuracy"][-1] == "0.5: outline; chance 0.3"
+    assert cells_of(all_scores(scores))["  chance"][0] == "0.3"
     (kinds,) = group_tables(scores)
     assert cells_of(kinds) == {"mirror": ["0.3333", "2", "-0.3333", "0.5000: outline"]}
 
@@ -132,7 +131,7 @@ def test_the_headline_stands_beside_floor_paper_and_other_methods(tmp_path):
     row = next(row for row in table.rows if row.cells[0].value == "Chamfer")
     cells = {name: cell.value for name, cell in zip(table.head, row.cells, strict=True)}
     assert cells.pop("on its scale") == ""
-    assert cells == {"score": "Chamfer", "skill": "-0.2500", "mine": "0.2000", "floor": "0.1600",
+    assert cells == {"score": "Chamfer", "skill": "-0.2", "mine": "0.2000", "floor": "0.1600",
                      "paper †": "0.103", "other": "0.2000"}  # fmt: skip
     elsewhere = simple_rooms("other", digest="0" * 64)
     with refused(BesideError, "other"):

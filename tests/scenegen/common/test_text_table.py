@@ -15,6 +15,7 @@ from scenegen.common.text_table import (
     number,
     plain,
     printable,
+    with_interval,
 )
 
 ANY_TEXT = st.text(st.characters(exclude_categories=()), max_size=30)
@@ -47,7 +48,7 @@ def test_any_name_is_one_cell_in_every_format(name):
 
 
 @pytest.mark.parametrize(
-    ("value", "like", "shown"),
+    ("value", "ends", "shown"),
     [
         (0.0, None, "0"),
         (-0.0, None, "0"),
@@ -59,15 +60,21 @@ def test_any_name_is_one_cell_in_every_format(name):
         (1.5e-5, None, "0.00001500"),
         (1.5e-9, None, "1.5e-09"),
         (1e99, None, "1e+99"),
-        (0.04, 0.1234, "0.0400"),
-        (-1e-9, 0.1234, "0.0000"),
-        (0.25, 0.0, "0.2500"),
-        (123.456, 0.1, "123.4560"),
-        (1e99, 0.1, "1e+99"),
+        (0.5969, (0.54, 0.64), "0.60"),
+        (0.9696, (0.9690, 0.9701), "0.9696"),
+        (-1e-9, (-0.01, 0.01), "0.000"),
+        (0.25, (0.25, 0.25), "0.2500"),
+        (1234.56, (1200.0, 1260.0), "1235"),
+        (1e99, (0.1, 0.2), "1e+99"),
     ],
 )
-def test_numbers(value, like, shown):
-    assert number(value, like) == shown
+def test_numbers(value, ends, shown):
+    assert number(value, ends or (None, None)) == shown
+
+
+def test_a_value_has_the_decimals_of_its_interval():
+    assert with_interval(0.5969, 0.5377, 0.6413) == ("0.60", "[0.54, 0.64]")
+    assert with_interval(0.5969, None, 0.6413) == ("0.5969", "-")
 
 
 @given(st.floats(1e-5, 1e6, exclude_max=True))

@@ -130,7 +130,7 @@ def test_labels_tell_runs_and_claims():
     several = rooms("a", np.array(runs), runs=3, alignment="scale_shift")
     table = leaderboard([several, rooms("b")], paper="none")[0]
     rest = rests(table)["a (3 runs; claims depth when scaled and shifted)"][0]
-    assert rest.startswith("± 0.0020 [")
+    assert rest.startswith("± 0.002000 [")
 
 
 def skilled(name, chamfer=0.2, **other):
@@ -150,10 +150,10 @@ def test_skill_stands_before_the_score_and_floors_below_the_methods():
     # The first column is tied, the second decides.
     assert ranks(table)[:2] == [("1", "better"), ("1", "worse")]
     cells = values(table)
-    assert cells["better"][2] == "0.5000"
+    assert cells["better"][2] == "0.5"
     assert cells["floor: empty room"] == ["-", "0.4000", "0"]
     assert cells["noise floor"] == ["-", "0.01230", "-"]
-    assert rests(table)["better"][2] == "[-0.5000, 0.9000]"
+    assert rests(table)["better"][2] == "[-0.5, 0.9]"
     assert best(table)[2:] == [[False] * 3] * 2
     right = Skill(0.25, 0.1, 0.4, 0.5, "outline")
     table = leaderboard([iqtt_scores("q", [1, 0], skills={"iqtt_accuracy": right})])[0]
@@ -243,9 +243,9 @@ def test_questions_by_kind_with_the_floors_of_each_kind(monkeypatch):
         "floor: chance": ["0.3333", "0.3333"],
     }
     assert floors.head[2:] == ("near", "matched")
-    assert values(floors) == {"outline-trees, 1,000 labels": ["0.6000", "0.3500"]}
+    assert values(floors) == {"outline-trees, 1,000 labels": ["0.60", "0.35"]}
     (ends,) = rests(floors).values()
-    assert ends == ["[0.5000, 0.7000]", "[0.3000, 0.4000]"]
+    assert ends == ["[0.50, 0.70]", "[0.30, 0.40]"]
 
 
 def angles(shift):

@@ -53,13 +53,13 @@ NEAR, FAR = rooms("near", 0.0), rooms("far", 0.3)
 @pytest.mark.parametrize(
     ("files", "metrics", "words"),
     [
-        ([FAR, NEAR], None, f"leads: {BASE.mean():.4g}"),
+        ([FAR, NEAR], None, f"leads: {BASE.mean():.2f}"),
         ([NEAR], None, "alone: "),
         ([stated(NEAR, comparable=False)], None, "is not ranked: "),
         (
             [FAR, NEAR],
             ["hausdorff", "chamfer"],
-            f"is one of 2 in the first place: {BASE.mean():.4g}",
+            f"is one of 2 in the first place: {BASE.mean():.2f}",
         ),
     ],
 )
