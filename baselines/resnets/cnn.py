@@ -36,9 +36,18 @@ class AnswerClassifier(nn.Module):
         self.head = nn.Sequential(*layers, nn.Linear(HIDDEN[-1], card.answers))
 
     def forward(self, images: Tensor) -> Tensor:
-        """Return logarithms of probabilities, (Q, K), of images, (Q, 1 + K, 3, S, S)."""
-        features = self.resnet(images.flatten(0, 1)).view(len(images), -1)
-        return torch.log_softmax(self.head(features), dim=1)
+        """Return logarithms of probabilities, (Q, K), of images, (Q, 1 + K, 3, S, S).
+
+        In evaluation they are means over K orders of the answers, one in each place once, so that
+        no place is preferred.
+        """
+        features = self.resnet(images.flatten(0, 1)).unflatten(0, images.shape[:2])
+        orders = 1 if self.training else images.shape[1] - 1
+        scores = []
+        for k in range(orders):
+            moved = torch.cat([features[:, :1], features[:, 1:].roll(k, dims=1)], dim=1)
+            scores.append(torch.log_softmax(self.head(moved.flatten(1)), dim=1).roll(-k, dims=1))
+        return torch.stack(scores).mean(dim=0)
 
 
 KIND = Answerer(Method("cnn", Card, AnswerClassifier), functional.nll_loss, any_number=False)

@@ -68,6 +68,14 @@ def question_key(split: str, index: int) -> int:
     return (SPLITS.index(split) << 40) | index
 
 
+def question_rng(
+    spec: SplitSpec, split: str, index: int, purpose: Purpose, attempt: int
+) -> np.random.Generator:
+    """Return a random generator of one question; kinds that share a seed share no stream."""
+    kind = int.from_bytes(f"{spec.distractors} {spec.answers}".encode())
+    return item_rng((spec.seed or 0, kind), question_key(split, index), purpose, attempt)
+
+
 @dataclass(frozen=True, eq=False)
 class Pools:
     """The shapes that questions are drawn from.
@@ -161,8 +169,7 @@ def draw_shapes(
     Raises PlacementError where no reference is found that has the distractors asked for.
     """
     rngs = [
-        item_rng(spec.seed or 0, question_key(split, index), Purpose.QUESTION, attempt)
-        for index, attempt in requests
+        question_rng(spec, split, index, Purpose.QUESTION, attempt) for index, attempt in requests
     ]
     kinds = tuple(pools.sizes)
     groups: dict[tuple[str, int], list[int]] = {}

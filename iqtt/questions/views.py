@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.questions.distractors import Pools, Shapes, arrange, draw_shapes, question_key
-from iqtt.questions.lights import draw_lights
+from iqtt.questions.distractors import Pools, Shapes, arrange, draw_shapes, question_rng
+from iqtt.questions.lights import FACE_STEPS, draw_lights
 from iqtt.questions.packing import Question, cube_centres
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.visibility import cube_pixels
 from iqtt.shapes.polycube import MAX_CUBES, ROTATIONS, bounding_radius, mirror, symmetries
 from scenegen.common.errors import PlacementError
-from scenegen.common.random.seeding import Purpose, item_rng
+from scenegen.common.random.seeding import Purpose
 from scenegen.common.rotations import rotation_matrix
 
 Array = NDArray[Any]
@@ -63,30 +63,33 @@ def sample_questions(
             if attempt >= QUESTION_ATTEMPTS:
                 raise PlacementError(
                     f"{split} question {index}",
-                    f"no views of {QUESTION_ATTEMPTS} choices of shapes",
-                    f"{spec.min_cube_pixels} pixels of every cube in every image",
-                    "try a smaller --min-cube-pixels, or fewer --cubes",
+                    f"no views or no lights of {QUESTION_ATTEMPTS} choices of shapes",
+                    f"{spec.min_cube_pixels} pixels of every cube in every image, and faces whose"
+                    f" colours differ by {FACE_STEPS} of 255",
+                    "try a smaller --min-cube-pixels, fewer --cubes or more --lights",
                 )
         drawn = draw_shapes(spec, pools, split, [(i, attempt) for i, _, attempt in waiting])
         shapes = []
         for (index, place, attempt), unplaced in zip(waiting, drawn, strict=True):
-            rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.ANSWERS, attempt)
+            rng = question_rng(spec, split, index, Purpose.ANSWERS, attempt)
             shapes.append(arrange(unplaced, place, rng))
         symmetric, distances = shape_symmetries(shapes), camera_distances(spec, shapes)
         turns = find_views(spec, split, waiting, shapes, distances, symmetric, tally)
         again = []
         for i, (index, place, attempt) in enumerate(waiting):
+            lights = None
             if np.isfinite(turns[i]).all():
-                angle = rotation_angle_degrees(turns[i, 0], turns[i, 1 + place], symmetric[i, 0])
-                rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.POSES, attempt)
-                framed = random_frames(shapes[i], turns[i], rng)
-                rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.LIGHTS, attempt)
-                lights = draw_lights(spec, rng, 1 + spec.answers, distances[i])
-                done[index] = Question(
-                    index, attempt, framed[0], float(distances[i]), framed[1], *lights, angle
-                )
-            else:
+                rng = question_rng(spec, split, index, Purpose.LIGHTS, attempt)
+                lights = draw_lights(spec, rng, shapes[i].cubes, turns[i], distances[i])
+            if lights is None:
                 again.append((index, place, attempt + 1))
+                continue
+            angle = rotation_angle_degrees(turns[i, 0], turns[i, 1 + place], symmetric[i, 0])
+            rng = question_rng(spec, split, index, Purpose.POSES, attempt)
+            framed = random_frames(shapes[i], turns[i], rng)
+            done[index] = Question(
+                index, attempt, framed[0], float(distances[i]), framed[1], *lights, angle
+            )
         waiting = again
     return [done[index] for index, _, _ in requests]
 
@@ -155,7 +158,7 @@ def find_views(
     # The answers as references, then as answers.
     turns = np.empty((questions, 2 * answers, VIEWS, 3, 3))
     for i, (index, _, attempt) in enumerate(requests):
-        rng = item_rng(spec.seed or 0, question_key(split, index), Purpose.VIEW, attempt)
+        rng = question_rng(spec, split, index, Purpose.VIEW, attempt)
         turns[i] = draw_rotations(rng, (2 * answers, VIEWS))
     centres = cube_centres([cubes for drawn in shapes for cubes in drawn.cubes[1:]], slots)
     centres = np.tile(centres.reshape(questions, answers, slots, 3), (1, 2, 1, 1))

@@ -3,6 +3,7 @@
 No code is shared with the generator: rotations are found by a search, and rays are cast in NumPy.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -25,6 +26,7 @@ ORTHONORMAL = 1e-6  # tolerance of a rotation times its transpose
 STORED_DEGREES = 1e-3  # tolerance of a stored angle
 LEAST_DEGREES = 1e-6  # how far rounding may take an angle below the smallest allowed one
 GRAZING = 1e-3  # cube edges; rays that pass an edge at this distance may see either side
+FACE_STEPS = 8  # of 255: least difference of the colours of two directions of faces
 RADIANCE = {"uint8": 0.51 / 255, "float16": 1e-3, "float32": 1e-4}  # tolerance of a pixel
 
 
@@ -117,6 +119,9 @@ def cast_again(
 ) -> Proof:
     """Prove that images are what rays cast at the stored cubes under the stored lights see.
 
+    And that faces of different directions are told apart in each of them, by FACE_STEPS of 255 in
+    one channel at least.
+
     Args:
         sample: for each table the rows to look at, in rising order.
     """
@@ -130,7 +135,8 @@ def cast_again(
                     problems[-1][row] = problem
     return judge(
         "cast again",
-        "images and visible pixels are what the stored cubes and lights give",
+        "images and visible pixels are what the stored cubes and lights give, and directions of"
+        f" faces differ by {FACE_STEPS} of 255 or more",
         tables,
         [np.isin(np.arange(len(t)), list(p)) for t, p in zip(tables, problems, strict=True)],
         lambda t, row: problems[t][row],
@@ -150,7 +156,7 @@ def _difference(questions: QuestionsFile, row: int, count: int) -> str:
     for k in range(len(images)):
         used = slice(0, int(lights[k]))
         lamps_used = light_position[k, used], light_color[k, used]
-        hit, radiance, sure = _cast(spec, distance, cubes[k, :count], views[k], *lamps_used)
+        hit, face, radiance, sure = _cast(spec, distance, cubes[k, :count], views[k], *lamps_used)
         shown = np.bincount(hit[hit >= 0], minlength=count)
         unsure = np.count_nonzero(~sure)
         if np.abs(shown - visible[k, :count]).max() > unsure:
@@ -160,7 +166,20 @@ def _difference(questions: QuestionsFile, row: int, count: int) -> str:
         wrong = np.count_nonzero(sure & ~(off <= RADIANCE[questions.image_dtype]))
         if wrong:
             return f"image {k} has {wrong} pixels of other colours"
+        apart = 255 * _least_difference(expected[hit >= 0], face[hit >= 0])
+        if apart < FACE_STEPS - 1e-3:
+            return f"image {k} has directions of faces whose colours differ by {apart:.1f} of 255"
     return ""
+
+
+def _least_difference(color: Array, label: Array) -> float:
+    """Return how far the colours (N, 3) of any two labels (N,) lie apart, in the best channel."""
+    groups = [color[label == value] for value in np.unique(label)]
+    gaps = [
+        np.maximum(a.min(axis=0) - b.max(axis=0), b.min(axis=0) - a.max(axis=0)).max()
+        for a, b in itertools.combinations(groups, 2)
+    ]
+    return float(min(gaps, default=np.inf))
 
 
 def _cast(
@@ -170,7 +189,7 @@ def _cast(
     view: Array,
     light_position: Array,
     light_color: Array,
-) -> tuple[Array, Array, Array]:
+) -> tuple[Array, Array, Array, Array]:
     """Cast a ray through the middle of each pixel.
 
     Args:
@@ -179,8 +198,9 @@ def _cast(
         view: rotation world_from_shape, (3, 3).
         light_position, light_color: (L, 3) each.
 
-    Returns which cube each ray sees, -1 for none, (H, W); the radiance, (H, W, 3); and whether no
-    edge is so near that rounding may decide, (H, W).
+    Returns which cube each ray sees, -1 for none, (H, W); which way the face that it meets points,
+    0 to 5, (H, W); the radiance, (H, W, 3); and whether no edge is so near that rounding may
+    decide, (H, W).
     """
     height, width = spec.height, spec.width
     world_from_camera = spec.camera(distance).world_from_camera
@@ -220,6 +240,7 @@ def _cast(
     radiance[~hit] = spec.background
     return (
         np.where(hit, cube, -1).reshape(height, width),
+        (2 * axis + (rays[every, axis] > 0)).reshape(height, width),
         radiance.reshape(height, width, 3),
         sure.reshape(height, width),
     )

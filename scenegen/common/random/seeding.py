@@ -38,10 +38,13 @@ class Purpose(IntEnum):
     ENVIRONMENT = 18
 
 
-def item_rng(seed: int, index: int, purpose: Purpose, attempt: int = 0) -> np.random.Generator:
+def item_rng(
+    seed: int | tuple[int, ...], index: int, purpose: Purpose, attempt: int = 0
+) -> np.random.Generator:
     """Return the generator of one item, purpose and attempt; no number may be negative.
 
-    A retry (`attempt`) never continues the stream of the one before.
+    Further numbers beside the seed keep data sets apart that have it in common. A retry (`attempt`)
+    never continues the stream of the one before.
     """
     key = np.random.SeedSequence(seed, spawn_key=(index, int(purpose), attempt))
     return np.random.Generator(np.random.PCG64(key))

@@ -181,6 +181,13 @@ def test_an_image_twice_in_two_files(failing: Callable[..., set[str]], split_fol
     assert failed >= {"distinct images", "cast again"}
 
 
+def test_faces_are_told_apart(
+    failing: Callable[..., set[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("iqtt.audit.proofs.views.FACE_STEPS", 60)
+    assert failing(lambda file: file.attrs.__setitem__("command", "")) == {"cast again"}
+
+
 def test_a_mirror_image_in_another_split(
     failing: Callable[..., set[str]], split_folder: Path
 ) -> None:

@@ -11,7 +11,7 @@ from refusals import refused
 from scipy.spatial.transform import Rotation
 
 from iqtt.questions import views as module
-from iqtt.questions.distractors import Shapes, arrange, draw_shapes, make_pools, question_key
+from iqtt.questions.distractors import Shapes, arrange, draw_shapes, make_pools, question_rng
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import (
     Tally,
@@ -24,7 +24,7 @@ from iqtt.questions.views import (
 )
 from iqtt.shapes.polycube import mirror
 from scenegen.common.errors import PlacementError
-from scenegen.common.random.seeding import Purpose, item_rng
+from scenegen.common.random.seeding import Purpose
 
 SPEC = SplitSpec(seed=4, cubes=(5, 8), height=64, width=64, min_cube_pixels=3, lights=(1, 3))
 RNG = np.random.default_rng
@@ -142,10 +142,21 @@ def test_neither_company_nor_order_nor_chunks_change_a_question(
     assert sample_questions(SPEC, pools, "val", [], tally) == []
 
 
+def test_kinds_with_one_seed_share_no_stream():
+    kinds = [("mirror-pair", 3), ("mirror-pair", 2), ("mirror", 3), ("mixed", 3)]
+    specs = [replace(SPEC, distractors=kind, answers=answers) for kind, answers in kinds]
+    for purpose in (Purpose.QUESTION, Purpose.VIEW, Purpose.LIGHTS):
+        draws = [question_rng(spec, "val", 3, purpose, 0).integers(2**62) for spec in specs]
+        assert len(set(draws)) == len(specs)
+    again = replace(SPEC, height=32, width=32, test=SPEC.test + 5)
+    same = [question_rng(spec, "val", 3, Purpose.VIEW, 0).random() for spec in (SPEC, again)]
+    assert same[0] == same[1], "the same questions in images of another size"
+
+
 def is_proposed(question):
     """Which of the rotations that were drawn for each image are its own, up to the frame of its
     shape, (4, VIEWS)."""
-    rng = item_rng(SPEC.seed, question_key("val", question.index), Purpose.VIEW, 0)
+    rng = question_rng(SPEC, "val", question.index, Purpose.VIEW, 0)
     turns = draw_rotations(rng, (6, module.VIEWS))[[question.shapes.answer, 3, 4, 5]]
     frames = np.swapaxes(question.world_from_shape, 1, 2)[:, None] @ turns
     return abs(frames - np.rint(frames)).max(axis=(2, 3)) < 1e-9
