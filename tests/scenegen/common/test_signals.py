@@ -30,6 +30,7 @@ with ended_by_signals():
 BLOCK = """
 import signal, sys, time
 from scenegen.common.signals import ended_by_signals
+signal.signal(signal.SIGHUP, signal.SIG_DFL)  # even where the tests run under nohup
 {before}
 with ended_by_signals():
     try:
@@ -63,7 +64,7 @@ def test_a_block_ends_as_told(before, cleaning, signals, code, out):
     assert process.stdout.readline() == "begun\n"
     for number in signals:
         process.send_signal(number)
-        time.sleep(0.3)
+        time.sleep(0.1)
     assert process.communicate(timeout=15)[0] == out
     assert process.returncode == code
 

@@ -27,13 +27,16 @@ TASKS = {
 BOTH = pytest.mark.parametrize("task", [TASKS["views"], TASKS["questions"]], ids=["rooms", "iqtt"])
 
 
+ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1"}
+
+
 class StopError(Exception):
     """What a test's progress bar raises."""
 
 
 @pytest.fixture(
     scope="module",
-    params=[pytest.param("rooms", marks=pytest.mark.slow), "views", "questions", "none labelled"],
+    params=["views", "questions", pytest.param("none labelled", marks=pytest.mark.slow)],
 )
 def made(request, tmp_path_factory):
     """Return a task, and its set in shards and whole."""
@@ -259,12 +262,13 @@ def test_what_takes_a_name_meanwhile_or_fails_leaves_all_as_it_was(task, tmp_pat
     assert hidden(folder) == []
 
 
+@pytest.mark.parametrize("workers", [1, pytest.param(2, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("made", ["questions"], indirect=True)
-def test_workers_and_batches_never_change_a_byte(made, tmp_path, monkeypatch):
-    """The fixture has one process and batches of two; rooms are in `rooms/test_make`."""
+def test_workers_and_batches_never_change_a_byte(made, tmp_path, monkeypatch, workers):
+    """The fixture has batches of two; workers of one file are in the `test_make` of each task."""
     monkeypatch.setattr("iqtt.files.work.BLOCK", 2)
-    made[0].shards(tmp_path / "shards", workers=2, batch=1)
-    made[0].make(tmp_path / "whole", workers=2, batch=64)
+    made[0].shards(tmp_path / "shards", workers=workers, batch=1)
+    made[0].make(tmp_path / "whole", workers=workers, batch=64)
     assert contents(tmp_path / "shards") == contents(made[1])
     assert contents(tmp_path / "whole") == contents(made[2])
 
@@ -281,19 +285,16 @@ def test_no_file_but_the_answers_tells_the_seed(tmp_path):
         task.shards(tmp_path / "secret", secret=False)
 
 
+@pytest.mark.parametrize("made", ["views"], indirect=True)
 @pytest.mark.parametrize("name", ["../rooms.h5", "", "a/b", ".."])
-@pytest.mark.parametrize("which", ["files", "shards"])
-def test_a_manifest_names_only_files_beside_it(tmp_path, name, which):
-    task = TASKS["rooms"]
-    task.shards(tmp_path)
-    told = json.loads((tmp_path / task.manifest).read_text())
-    if which == "files":
-        told["files"] = [name]
-    else:
-        told["shards"][1]["file"] = name
-    (tmp_path / task.manifest).write_text(json.dumps(told))
-    with pytest.raises(FileFormatError):
-        task.read_manifest(tmp_path)
+def test_a_manifest_names_only_files_beside_it(copied, name):
+    task, folder = copied
+    stored = json.loads((folder / task.manifest).read_text())
+    first, second, *others = stored["shards"]
+    for wrong in ({"files": [name]}, {"shards": [first, second | {"file": name}, *others]}):
+        (folder / task.manifest).write_text(json.dumps(stored | wrong))
+        with pytest.raises(FileFormatError):
+            task.read_manifest(folder)
 
 
 @pytest.mark.parametrize(
@@ -315,40 +316,49 @@ def test_no_manifest_is_believed(copied, wrong):
     assert not all(check.ok for check in checks)
 
 
-RENDER = "render --n 400 --size 32 --min-visible-pixels 3 --shard-size 50 --seed 3 --out rooms.h5"
-COMMAND = [sys.executable, "-c", "import cli; cli.scenegen()", *RENDER.split(), "--workers"]
-ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1"}
-
-
-@pytest.fixture(scope="module")
-def unbroken(tmp_path_factory):
-    """Return what a run makes that nothing stops, in one process."""
-    folder = tmp_path_factory.mktemp("unbroken")
-    subprocess.run([*COMMAND, "1"], cwd=folder, env=ENVIRONMENT, check=True)
-    return contents(folder)
+RENDER = "render --n 60 --size 32 --min-visible-pixels 3 --shard-size 5 --seed 3 --out rooms.h5"
+SLOWLY = """
+import time, cli
+from scenegen.files import making
+write = making.write_piece
+def slowly(*arguments):
+    time.sleep(0.2)  # so that signals come before the end
+    return write(*arguments)
+making.write_piece = slowly
+cli.scenegen()
+"""
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_the_same_command_goes_on(tmp_path, number, unbroken):
-    """After a kill at some moment; SIGTERM is answered with how to go on."""
-    process = subprocess.Popen(
-        [*COMMAND, "2"], cwd=tmp_path, env=ENVIRONMENT, stderr=subprocess.PIPE, text=True
-    )
-    deadline = time.monotonic() + 60
-    while not list(tmp_path.glob("rooms-*.h5")) and time.monotonic() < deadline:
-        time.sleep(0.01)
-    process.send_signal(number)
-    _, said = process.communicate(timeout=30)
-    if number == signal.SIGTERM:
-        assert process.returncode == 128 + number
-        assert "8 shards are complete" in said
-        assert hidden(tmp_path) == []
-    assert not (tmp_path / "rooms.h5").exists()
-    known = read_manifest(tmp_path / "rooms.manifest.json").shards
-    done = {p: p.stat().st_mtime_ns for p in (tmp_path / record.file for record in known)}
-    assert len(done) >= len(list(tmp_path.glob("rooms-*.h5"))) - 1  # of that moment
-    subprocess.run([*COMMAND, "1"], cwd=tmp_path, env=ENVIRONMENT, check=True)
-    assert {p: p.stat().st_mtime_ns for p in done} == done, "complete shards are kept"
+@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
+def test_the_same_command_goes_on(run, tmp_path, monkeypatch, workers):
+    """After SIGKILL, and then after SIGTERM, which is answered with how to go on."""
+    command = [*RENDER.split(), "--workers", workers]
+    monkeypatch.setattr(sys, "argv", ["scenegen", *command])  # is recorded
+    done = {}
+    for number in (signal.SIGKILL, signal.SIGTERM):
+        process = subprocess.Popen(
+            [sys.executable, "-c", SLOWLY, *command], cwd=tmp_path, env=ENVIRONMENT,
+            stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        deadline = time.monotonic() + 60
+        while len(list(tmp_path.glob("rooms-*.h5"))) <= len(done) and time.monotonic() < deadline:
+            time.sleep(0.01)
+        process.send_signal(number)
+        _, message = process.communicate(timeout=30)
+        assert process.returncode == (143 if number == signal.SIGTERM else -number), message
+        assert not (tmp_path / "rooms.h5").exists()
+        assert {path: path.stat().st_mtime_ns for path in done} == done, "complete shards are kept"
+        records = read_manifest(tmp_path / "rooms.manifest.json").shards
+        done = {p: p.stat().st_mtime_ns for p in (tmp_path / record.file for record in records)}
+        assert len(done) >= len(list(tmp_path.glob("rooms-*.h5"))) - 1
+    assert f"{len(done)} of 12 shards are complete" in message
     assert hidden(tmp_path) == []
-    assert contents(tmp_path) == unbroken
+    assert run(*command).exit_code == 0
+    assert {path: path.stat().st_mtime_ns for path in done} == done
+    assert hidden(tmp_path) == []
+    unbroken = tmp_path / "unbroken"
+    unbroken.mkdir()
+    monkeypatch.chdir(unbroken)
+    run(*command)
+    assert contents(tmp_path) == contents(unbroken)

@@ -19,14 +19,20 @@ from scenegen.rooms.export.single import PICTURES, export_paths, export_room
 
 
 @pytest.fixture(scope="module")
-def room(float_path):
+def simple(make_rooms, tmp_path_factory):
+    """A room with a box and a prism of other materials, whose meshes are small."""
+    path = tmp_path_factory.mktemp("simple") / "x.h5"
+    make_rooms(path, 8, shapes=("box", "prism"), objects=(2, 2), random_reflectance=True,
+               specular=(0.2, 0.4), shininess=(5, 20))  # fmt: skip
+    with open_rooms(path) as file:
+        return next(r for r in file if {i.shape for i in r.scene.objects} == {"box", "prism"})
+
+
+@pytest.fixture(scope="module")
+def holey(float_path):
+    """A room with a corner where nothing was hit."""
     with open_rooms(float_path) as file:
-        return max(file, key=lambda room: len(room.scene.objects))
-
-
-@pytest.fixture
-def holey(room):
-    """The room with a corner where nothing was hit."""
+        room = max(file, key=lambda room: len(room.scene.objects))
     hole = np.zeros(room.depth.shape, bool)
     hole[:5, :7] = True
     return replace(
@@ -120,9 +126,9 @@ def test_what_does_not_fit_is_refused_before_a_file_is_written(tmp_path, holey):
             path.unlink()
 
 
-def test_names_inside_files_have_no_blanks(tmp_path, holey):
+def test_names_inside_files_have_no_blanks(tmp_path, simple):
     paths = export_paths(7, tmp_path, "my rooms (2)", "obj")
-    export_room(holey, paths, "obj")
+    export_room(simple, paths, "obj")
     (name,) = words(paths[0], "mtllib")
     assert (tmp_path / name[0]).is_file()
     assert {path.name for path in paths} == {path.name for path in tmp_path.iterdir()}
@@ -186,63 +192,61 @@ def test_obj_cast_by_another_engine_gives_the_depth(tmp_path, make_rooms):
         obj, _ = export(room, tmp_path, "obj", overwrite=True)
         return trimesh.load(obj, force="mesh", process=False)
 
-    path = make_rooms(tmp_path / "x.h5", 6, height=64, width=64, seed=11)
+    flat = ("box", "prism", "octahedron", "dodecahedron", "icosahedron")
+    path = make_rooms(tmp_path / "x.h5", 6, height=64, width=64, seed=11, shapes=flat)
     assert len(check_depth_by_embree(path, mesh_of)) >= 4
-
-
-@pytest.fixture(scope="module")
-def glossy(make_rooms, tmp_path_factory):
-    """A room with a sphere and a box of other materials."""
-    path = tmp_path_factory.mktemp("glossy") / "x.h5"
-    make_rooms(path, 8, shapes=("sphere", "box"), objects=(2, 2), random_reflectance=True,
-               specular=(0.2, 0.4), shininess=(5, 20))  # fmt: skip
-    with open_rooms(path) as file:
-        rooms = [r for r in file if {item.shape for item in r.scene.objects} == {"sphere", "box"}]
-    return rooms[0]
-
-
-def test_obj_has_names_materials_and_smooth_normals(tmp_path, glossy):
-    """Read by trimesh, and by hand."""
-    obj, mtl = export(glossy, tmp_path, "obj")
-    meshes = trimesh.load(obj, process=False).geometry  # by material
-    names = [f"object_{k}_{item.shape}" for k, item in enumerate(glossy.scene.objects, start=1)]
-    assert [name for [name] in words(obj, "o")] == ["floor", "wall_x", "wall_z", *names]
-    materials = [words(mtl, "newmtl"), words(mtl, "Kd"), words(mtl, "Ks"), words(mtl, "Ns")]
-    assert materials[0] == [["room"], ["object_1"], ["object_2"]]
-    assert set(meshes) == {"room", "object_1", "object_2"}
-    assert words(obj, "usemtl") == [["room"]] * 3 + materials[0][1:]
-    assert words(obj, "mtllib") == [[mtl.name]]
-    for k, item in enumerate(glossy.scene.objects, start=1):
-        mesh = meshes[f"object_{k}"]
-        assert [float(x) for x in materials[1][k]] == list(item.reflectance)
-        assert [float(x) for x in materials[2][k]] == [item.specular] * 3
-        assert [float(x) for x in materials[3][k]] == [item.shininess]
-        color = np.clip(np.array(item.reflectance) * 255, 0, 255)
-        np.testing.assert_allclose(mesh.visual.material.diffuse[:3], color, atol=1)
-        if item.shape == "sphere":
-            expected = (mesh.vertices - np.array(item.position)) / item.scale
-        else:
-            expected = mesh.vertex_normals  # made by trimesh if the file had none
-            assert len(np.unique(expected.round(4), axis=0)) == 6, "flat sides stay flat"
-        np.testing.assert_allclose(mesh.vertex_normals, expected, atol=1e-3)
-
-
-def test_normals_of_obj_are_those_of_the_corners(tmp_path, glossy):
-    """Of both ends of each face's line `f v//n v//n v//n`, against the surfaces they lie on."""
-    obj, _ = export(glossy, tmp_path, "obj")
-    v, vn = (np.array(words(obj, key), float) for key in ("v", "vn"))
-    corners = np.array([[w.split("//") for w in face] for face in words(obj, "f")], int) - 1
-    assert (corners.reshape(-1, 2).max(axis=0) == [len(v) - 1, len(vn) - 1]).all()
-    np.testing.assert_allclose(np.linalg.norm(vn, axis=1), 1, atol=1e-6)
-    points, normals = v[corners[..., 0]], vn[corners[..., 1]]
-    face = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    assert (np.einsum("fi,fki->fk", face, normals) > 0).all(), "wound and facing alike"
 
 
 def words(path, key):
     """The words after a keyword, line by line."""
-    lines = [line.split() for line in path.read_text().splitlines()]
-    return [line[1:] for line in lines if line[:1] == [key]]
+    lines = [line.split() for line in path.read_text().splitlines() if line.startswith(f"{key} ")]
+    return [line[1:] for line in lines]
+
+
+def test_obj_has_names_and_materials(tmp_path, simple):
+    """Read by trimesh, and by hand."""
+    obj, mtl = export(simple, tmp_path, "obj")
+    meshes = trimesh.load(obj, process=False).geometry  # by material
+    names = [f"object_{k}_{item.shape}" for k, item in enumerate(simple.scene.objects, start=1)]
+    assert [name for [name] in words(obj, "o")] == ["floor", "wall_x", "wall_z", *names]
+    materials = [words(mtl, key) for key in ("newmtl", "Kd", "Ks", "Ns")]
+    assert materials[0] == [["room"], ["object_1"], ["object_2"]]
+    assert set(meshes) == {"room", "object_1", "object_2"}
+    assert words(obj, "usemtl") == [["room"]] * 3 + materials[0][1:]
+    assert words(obj, "mtllib") == [[mtl.name]]
+    for k, item in enumerate(simple.scene.objects, start=1):
+        assert [float(x) for x in materials[1][k]] == list(item.reflectance)
+        assert [float(x) for x in materials[2][k]] == [item.specular] * 3
+        assert [float(x) for x in materials[3][k]] == [item.shininess]
+        mesh = meshes[f"object_{k}"]
+        color = np.clip(np.array(item.reflectance) * 255, 0, 255)
+        np.testing.assert_allclose(mesh.visual.material.diffuse[:3], color, atol=1)
+        if item.shape == "box":
+            sides = np.unique(mesh.vertex_normals.round(4), axis=0)
+            assert len(sides) == 6, "flat sides stay flat"
+
+
+def test_normals_of_obj_are_those_of_the_corners(tmp_path, simple):
+    """Of both ends of each face's line `f v//n v//n v//n`, against the surface they lie on."""
+    upright = (1.0, 0.0, 0.0, 0.0)
+    item = replace(simple.scene.objects[0], shape="cylinder", rotation=upright)
+    scene = replace(simple.scene, objects=(item,))
+    obj, _ = export(replace(simple, scene=scene), tmp_path, "obj")
+    v, vn = (np.array(words(obj, key), float) for key in ("v", "vn"))
+    corners = " ".join(" ".join(face) for face in words(obj, "f")).replace("//", " ")
+    corners = np.array(corners.split(), int).reshape(-1, 3, 2) - 1
+    assert (corners.reshape(-1, 2).max(axis=0) == [len(v) - 1, len(vn) - 1]).all()
+    points, normals = v[corners[..., 0]], vn[corners[..., 1]]
+    face = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    assert (np.einsum("fi,fki->fk", face, normals) > 0).all(), "wound and facing alike"
+    side = np.abs(normals[..., 1]) < 1e-6
+    side[:6] = False  # two triangles of each plane of the room
+    radial = (points - np.array(item.position))[side] * (1, 0, 1)
+    radial /= np.linalg.norm(radial, axis=1, keepdims=True)
+    assert side.mean() > 0.3
+    np.testing.assert_allclose(normals[side], radial, atol=1e-4)
+    flat = np.abs(normals[6:][~side[6:]])
+    np.testing.assert_allclose(flat, np.broadcast_to((0, 1, 0), flat.shape), atol=1e-6)
 
 
 @pytest.mark.slow
@@ -256,15 +260,15 @@ def test_meshes_of_100_rooms_give_the_depth(tmp_path, make_rooms):
 
 
 @pytest.mark.parametrize("form", ["exr", "png", "ply", "obj"])
-def test_existing_files_are_kept_without_overwrite(tmp_path, room, form):
-    paths = export(room, tmp_path, form)
+def test_existing_files_are_kept_without_overwrite(tmp_path, simple, form):
+    paths = export(simple, tmp_path, form)
     for path in paths:
         path.write_text("mine")
         others = [other.unlink() or other for other in paths if other != path]
         with pytest.raises(FileExistsError):
-            export(room, tmp_path, form)
+            export(simple, tmp_path, form)
         assert path.read_text() == "mine"
-        export(room, tmp_path, form, overwrite=True)
+        export(simple, tmp_path, form, overwrite=True)
         assert path.read_bytes()[:4] != b"mine"
         assert all(other.exists() for other in others)
     assert sorted(tmp_path.iterdir()) == sorted(paths), "no temporary files"
