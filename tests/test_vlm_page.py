@@ -4,8 +4,11 @@ from page_blocks import blocks, run_block
 
 
 def test_the_page_runs(tmp_path):
+    def smaller(code):
+        return code.replace("--size 256", "--size 64").replace("--train 10", "--train 10 --size 64")
+
     printed = [
-        run_block(language, title, code.replace("--size 256", "--size 64"), tmp_path)
+        run_block(language, title, smaller(code), tmp_path)
         for language, title, code in blocks("vlm.md")
         if language != "json"
     ]

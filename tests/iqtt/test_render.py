@@ -90,7 +90,7 @@ ODD_SPECS = {
     "one to four lights": replace(FLOAT, lights=(1, 4), background=(0.2, 0.5, 0.0)),
     "higher than wide": replace(FLOAT, height=90, width=50, reflectance=(0.9, 0.1, 0.5)),
     "large trees": replace(
-        FLOAT, cubes=(12, 12), shapes="tree", distractors="near", min_cube_pixels=0
+        FLOAT, cubes=(8, 8), shapes="tree", distractors="near", min_cube_pixels=0
     ),
     "in a small sphere": replace(FLOAT, cubes=(5, 6), max_radius=2.2, distractors="other"),
     "in a large sphere": replace(FLOAT, max_radius=10.0, height=96, width=96),

@@ -2,8 +2,6 @@
 
 import os
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from iqtt.files.make import make_split, make_suite
 from iqtt.files.reader import QuestionsFile
 from iqtt.files.split import ALL_FILES, MANIFEST
 from iqtt.questions.specs import SUITE, SplitSpec, preset_spec, question_kind
+from iqtt.questions.views import Tally
 from iqtt.shapes.splits import TooFewShapesError
 from scenegen.common.errors import PlacementError, SpecError
 from scenegen.rendering.backend import versions
@@ -30,20 +29,17 @@ SPEC = SplitSpec(
 )  # fmt: skip
 SUITE_SPEC = replace(TINY, cubes=(9, 9), train=2, labeled=1, val=2, test=1)
 COMMAND = f"iqtt make-split --seed {SECRET}"
-AGAIN = """
-import sys
-from iqtt.questions.specs import SplitSpec
-from iqtt.files.make import make_split
-make_split(sys.argv[1], SplitSpec.from_json(sys.argv[2]), batch=3, command=sys.argv[3])
-"""
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Tally]:
     folder = tmp_path_factory.mktemp("made") / "split"
-    tally = make_split(folder, SPEC, command=COMMAND)
-    assert tally.proposed - tally.refused >= 4 * 16
-    return folder
+    return folder, make_split(folder, SPEC, command=COMMAND)
+
+
+@pytest.fixture
+def folder(made: tuple[Path, Tally]) -> Path:
+    return made[0]
 
 
 def contents(folder: Path) -> dict[str, bytes]:
@@ -91,19 +87,15 @@ def test_a_secret_seed_is_in_no_file(folder, tmp_path):
         assert file.attrs["fingerprint"] == told.attrs["fingerprint"]
 
 
-def test_the_same_request_gives_the_same_bytes(folder, tmp_path):
-    """In another process, in batches of another size."""
-    command = [sys.executable, "-c", AGAIN, str(tmp_path / "again"), SPEC.to_json(), COMMAND]
-    subprocess.run(command, check=True, capture_output=True)
+def test_the_same_request_gives_the_same_bytes(made, tmp_path, monkeypatch):
+    """In other processes, in batches of another size; and they count the views they proposed."""
+    monkeypatch.setattr(work, "BLOCK", 2)
+    folder, expected = made
+    tally = make_split(tmp_path / "again", SPEC, workers=2, batch=3, command=COMMAND)
     assert contents(tmp_path / "again") == contents(folder)
     assert os.listdir(tmp_path) == ["again"]
-
-
-def test_all_views_that_are_proposed_are_counted(folder, tmp_path, monkeypatch):
-    monkeypatch.setattr(work, "BLOCK", 2)
-    tally = make_split(tmp_path / "again", SPEC, workers=2, command=COMMAND)
-    assert contents(tmp_path / "again") == contents(folder)
-    assert tally == make_split(tmp_path / "alone", SPEC, command=COMMAND)
+    assert tally == expected
+    assert tally.proposed - tally.refused >= 4 * 16
 
 
 def test_a_table_does_not_depend_on_the_size_of_the_others(folder, tmp_path):
@@ -127,7 +119,9 @@ def test_a_table_does_not_depend_on_the_size_of_the_others(folder, tmp_path):
         pytest.param(
             {"cubes": (16, 16), "shapes": "tree", "train": 1, "labeled": 0}, marks=pytest.mark.slow
         ),
-        {"cubes": (12, 12), "distractors": "mirror", "test": 0},
+        pytest.param(
+            {"cubes": (12, 12), "distractors": "mirror", "test": 0}, marks=pytest.mark.slow
+        ),
         {"height": 24, "width": 40, "min_angle_degrees": 90},
         {"height": 40, "width": 24, "lights": (1, 4)},
         {"max_radius": 10},
@@ -161,16 +155,22 @@ def test_odd_requests_are_answered_in_full(changed, tmp_path):
                     assert np.ptp(counts) <= 1
 
 
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("made") / "plain"
+    make_split(folder, TINY)
+    return folder
+
+
 @pytest.mark.parametrize(
     ("compression", "dtype"), [("none", "float16"), ("lzf", "float32"), ("gzip", "uint8")]
 )
-def test_plain_h5py_reads_every_type_and_compression(compression, dtype, tmp_path):
-    make_split(tmp_path / "plain", TINY)
+def test_plain_h5py_reads_every_type_and_compression(compression, dtype, plain, tmp_path):
     spec = replace(TINY, image_dtype=dtype, with_depth=True)
     make_split(tmp_path / "split", spec, compression=compression)
     for name, path in (("iqtt-train.h5", "unlabeled/questions"), ("iqtt-val.h5", "questions")):
         with (
-            h5py.File(tmp_path / "plain" / name) as plain,
+            h5py.File(plain / name) as whole,
             h5py.File(tmp_path / "split" / name) as file,
         ):
             images = file[path]
@@ -180,7 +180,7 @@ def test_plain_h5py_reads_every_type_and_compression(compression, dtype, tmp_pat
             radiance = images[:] * images.attrs["scale"]
             assert radiance.min() >= 0
             assert radiance.max() == 1
-            assert abs(radiance - plain[path][:] / 255).max() < 0.6 / 255
+            assert abs(radiance - whole[path][:] / 255).max() < 0.6 / 255
             truth = file["truth" if name == "iqtt-val.h5" else "truth/unlabeled"]
             assert truth["depth"].attrs["unit"] == "cube edge"
             surface = np.isfinite(truth["depth"][:])
