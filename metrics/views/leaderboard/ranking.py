@@ -27,7 +27,6 @@ from metrics.views.leaderboard.floors import (
     require_same_floors,
 )
 from metrics.views.leaderboard.rows import (
-    ALIKE,
     INCOMPARABLE_MARK,
     Column,
     Entry,
@@ -56,9 +55,9 @@ KINDS = 'Kinds of wrong answers; "-2" ends those of questions with two answers.'
 AS_RANKED = "Rows as in the ranking."
 # Ranks methods that see a scene's first view alone. Others look at what it asks for.
 BEHIND = "behind_depth_error"
-ALIKE_NOTE = (
-    f"{ALIKE} not told apart from the first method in this score: paired test over the same items,"
-    " corrected for all scores and methods of the table, at 5%. Skills have no test of their own."
+SHARED = (
+    "Methods share a rank where the 95% interval of their paired difference from the first method"
+    " of that rank holds 0."
 )
 
 
@@ -119,8 +118,7 @@ def rankings(
         paper: which of the paper's figures to show: "none"; or those of the shown scores in each
             ranking, and the paper's tables of which some figure found no place, "all" of them or
             those of the files' tasks.
-        tested: whether to compare the methods with the first one, and to mark scores that are not
-            told apart from its.
+        tested: whether to compare the methods with the first one.
         links: addresses of the methods' own pages, by the id of the score file.
 
     Raises LeaderboardError where a file is given twice or files that claim to score all of one test
@@ -219,35 +217,39 @@ def _ranking(
     labels = labels_of(members)
     order = _order(members, columns)
     ranked = [members[i] for i in order]
-    comparison, alike = compared_with_first(ranked) if tested else (None, {})
+    comparison = compared_with_first(ranked) if tested else None
+    key = next(iter(columns))
     entries = tuple(
         Entry(
             _label(members[i], labels[i]),
             members[i],
             _by_key(members[i]),
             own_floors(members[i]),
-            alike.get(id(members[i]), frozenset()),
+            rank,
             links.get(id(members[i]), ""),
         )
-        for i in order
+        for i, rank in zip(order, _ranks(ranked, key), strict=True)
     )
     title, first = _title(ranked[0]), ranked[0]  # comparable, if any is
     names = [key for key in columns if not key.startswith(SKILL_OF)]
     notes = [*_notes(ranked), *_same_request_notes(members, files)]
     placed = [f for f in figures if f.view_angle is None and f.metric in columns]
-    tables, floors = [], floor_cells(first, names)
-    for i, part in enumerate(_parts(columns)):
-        marked = any(entry.alike & part.keys() for entry in entries)
-        table = build_table(
+    floors = floor_cells(first, names)
+    skill = SKILL_OF + key.removeprefix(SKILL_OF)
+    line = next((label for label, row in floors.items() if skill in row), "")
+    tables = [
+        build_table(
             f"{title}: scores" if i else title,
             part,
             entries,
             {k: row for k, row in floors.items() if row.keys() & part.keys()},
             figure_cells([f for f in placed if f.metric in part], lambda f: f.metric),
             [AS_RANKED] if i else notes,
+            line,
             ranked=not i,
         )
-        tables.append(replace(table, notes=(*table.notes, ALIKE_NOTE)) if marked else table)
+        for i, part in enumerate(_parts(columns))
+    ]
     groups = []
     for name in names:
         for table, used in _group_tables(title, entries, name, figures):
@@ -259,17 +261,58 @@ def _ranking(
 def _order(files: Sequence[ScoreFile], columns: Mapping[str, Column]) -> list[int]:
     """Indices of the files: comparable ones from best to worst, those without a score, others.
 
-    The first column decides; where it is equal, the second one does, and so on.
+    The first column decides; where it is equal, the second one does, and so on. Among files that
+    are not better than the floor, the second one begins: how much worse they are tells nothing.
     """
+    first = next(iter(columns))
 
-    def place(i: int) -> tuple[bool, list[tuple[bool, float]]]:
+    def place(i: int) -> tuple[bool, bool, bool, list[tuple[bool, float]]]:
         scores, values = _by_key(files[i]), []
         for key, column in columns.items():
             sign = -1.0 if column.higher_is_better else 1.0
             values.append((key not in scores, sign * scores[key].value if key in scores else 0.0))
-        return not files[i].comparable, values
+        above = _beats_the_floor(files[i], first)
+        return not files[i].comparable, first not in scores, not above, values[not above :]
 
     return sorted(range(len(files)), key=place)
+
+
+def _beats_the_floor(file: ScoreFile, key: str) -> bool:
+    """Return whether the interval of a score's skill lies above 0, or there is no floor to beat."""
+    skill = file.skills.get(key.removeprefix(SKILL_OF))
+    return skill is None or (skill.value if skill.low is None else skill.low) > 0.0
+
+
+def _ranks(files: Sequence[ScoreFile], key: str) -> list[str]:
+    """Return the ranks of files, best first, by a column; empty for those that have none."""
+    ranks, place, first = list[str](), "", None
+    for count, file in enumerate(files, 1):
+        is_ranked = file.comparable and key in _by_key(file) and _beats_the_floor(file, key)
+        if is_ranked and (first is None or _told_apart(file, first, key)):
+            first, place = file, str(count)
+        ranks.append(place if is_ranked else "")
+    return ranks
+
+
+def _told_apart(file: ScoreFile, first: ScoreFile, key: str) -> bool:
+    """Return whether two files differ in a column, by the interval of their paired difference.
+
+    Skills over a floor that the files do not share, and files that cannot be paired, are told apart
+    where their own intervals do not meet.
+    """
+    name = key.removeprefix(SKILL_OF)
+    if name == key or is_shared(name):
+        try:
+            (apart,) = compare([first, file], [name]).differences
+        except ComparisonError:
+            pass
+        else:
+            low, high = apart.low, apart.high
+            return apart.difference != 0 if low is None or high is None else not low <= 0 <= high
+    a, b = (_by_key(f)[key] for f in (first, file))
+    if a.low is None or a.high is None or b.low is None or b.high is None:
+        return a.value != b.value
+    return a.low > b.high or b.low > a.high
 
 
 def _by_key(file: ScoreFile) -> dict[str, Score | Skill]:
@@ -277,32 +320,19 @@ def _by_key(file: ScoreFile) -> dict[str, Score | Skill]:
     return {**file.metrics, **{SKILL_OF + name: skill for name, skill in file.skills.items()}}
 
 
-def compared_with_first(
-    files: Sequence[ScoreFile],
-) -> tuple[Comparison | None, dict[int, frozenset[str]]]:
-    """Return the comparison of ranked files with the first one, and which scores are alike.
+def compared_with_first(files: Sequence[ScoreFile]) -> Comparison | None:
+    """Return the comparison of ranked files with the first one.
 
-    These are the names of the scores by the id of the file. Files that lack a score that the first
-    one has, or cannot be paired with it, are left out; without any other there is no comparison.
+    Files that lack a score that the first one has, or cannot be paired with it, are left out;
+    without any other there is no comparison.
     """
     ranked = [file for file in files if file.comparable]
     if not ranked:
-        return None, {}
+        return None
     first = ranked[0]
     names = [name for name in HEADLINE[first.task] if name in first.metrics and name in first.items]
     paired = [file for file in ranked[1:] if _pairs(first, file, names)]
-    if not paired or not names:
-        return None, {}
-    comparison = compare([first, *paired], names)
-    alike = {
-        id(file): frozenset(
-            d.metric
-            for d in comparison.differences
-            if d.method == method and d.verdict == "not shown"
-        )
-        for method, file in zip(comparison.methods, paired, strict=True)
-    }
-    return comparison, alike
+    return compare([first, *paired], names) if paired and names else None
 
 
 def _pairs(first: ScoreFile, file: ScoreFile, names: Sequence[str]) -> bool:
@@ -333,7 +363,7 @@ def _group_tables(
         groups = entry.file.by_view_angle if by_angle else entry.file.by_distractor
         scores = {key: group[name] for key, group in groups.items() if name in group}
         floors = {} if is_shared(name) else angle_floors(entry.file, name)
-        rows.append(replace(entry, scores=scores, floors=floors, alike=frozenset()))
+        rows.append(replace(entry, scores=scores, floors=floors))
     keys = by_number({key for row in rows for key in row.scores})
     if len(keys) < (1 if by_angle else 2):  # a single kind stands in the title
         return
@@ -385,9 +415,9 @@ def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
     over = "shapes" if "shape" in first.items else "questions"
     yield (
         f"[low, high]: {INTERVAL} over {'scenes' if first.task == 'rooms' else over}."
-        " ±: standard deviation over training runs. Best in bold, which is no test of a difference:"
-        " see bench compare."
+        " ±: standard deviation over training runs. Best in bold, which is no test of a difference."
     )
+    yield SHARED
     yield from (f"Warning: {text}." for text in few_clusters(first))
     if first.meta.noise_floors:
         yield (

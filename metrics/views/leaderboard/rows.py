@@ -1,7 +1,7 @@
 """Rows of a leaderboard: methods with their ranks, then floors, then the paper's figures."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Score, ScoreFile, Skill
@@ -10,11 +10,14 @@ from metrics.views.score_tables import interval_cells, score_cell
 from metrics.views.table import Cell, Row, Table, make_row
 
 REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"
-ALIKE = "≈"  # stands behind scores that are not told apart from those of the first method
 NOT_COMPARABLE = (
     f"{INCOMPARABLE_MARK} not comparable, so not ranked: not all of the test set was scored, or"
     " values that are not finite were given the worst score, or only the submission named the truth"
     " (score it again with --truth)."
+)
+BELOW = (
+    "Methods below the line of the floor are not better than it, by their interval, so they have no"
+    " rank; the next column orders them."
 )
 Cells = Mapping[str, Mapping[str, Cell]]  # by the label of the row, then by the key of the column
 
@@ -35,7 +38,7 @@ class Entry:
         label: the method's name and what has to be known about it.
         scores: by the keys of the columns.
         floors: those that other methods do not share, by the keys of the columns.
-        alike: keys of the columns in which it is not told apart from the first method.
+        rank: its place, which methods that are not told apart share; empty for those without one.
         link: address of its own page; or empty.
     """
 
@@ -43,7 +46,7 @@ class Entry:
     file: ScoreFile
     scores: Mapping[str, Score | Skill]
     floors: Mapping[str, float]
-    alike: frozenset[str] = frozenset()
+    rank: str = ""
     link: str = ""
 
 
@@ -54,6 +57,7 @@ def build_table(
     floors: Cells,
     figures: Cells,
     notes: Sequence[str],
+    line: str = "",
     ranked: bool = False,
 ) -> Table:
     """Return a table of the scored methods, then of floors, then of the paper's figures.
@@ -62,21 +66,36 @@ def build_table(
         columns: the columns by their keys.
         entries: the methods, best first.
         notes: stand below the table, before those on marks of its rows.
-        ranked: whether the first column ranks the methods.
+        line: label of the floor that stands right below the methods with a rank.
+        ranked: whether the first column shows the ranks.
     """
-    places = _ranks(entries, next(iter(columns))) if ranked else [""] * len(entries)
     best = {key: _best(entries, key, column) for key, column in columns.items()}
     rows = [
         make_row(
-            [rank, entry.label, *(_cell(entry, key, best[key]) for key in columns)],
+            [
+                entry.rank if ranked else "",
+                entry.label,
+                *(
+                    score_cell(
+                        entry.scores.get(key),
+                        best[key] if entry.file.comparable else "",
+                        entry.floors.get(key),
+                    )
+                    for key in columns
+                ),
+            ],
             "" if entry.file.comparable else "incomparable",
             entry.link,
         )
-        for rank, entry in zip(places, entries, strict=True)
+        for entry in entries
     ]
-    for kind, cells in (("floor", floors), ("reported", figures)):
-        rows += unranked_rows(kind, cells, tuple(columns))
-    notes = list(notes)
+    above = sum(bool(entry.rank) for entry in entries)
+    keys, notes = tuple(columns), list(notes)
+    rows[above:above] = unranked_rows("floor", {k: v for k, v in floors.items() if k == line}, keys)
+    rows += unranked_rows("floor", {k: v for k, v in floors.items() if k != line}, keys)
+    rows += unranked_rows("reported", figures, keys)
+    if ranked and line in floors and any(e.file.comparable for e in entries[above:]):
+        notes.append(BELOW)
     if not all(entry.file.comparable for entry in entries):
         notes.append(NOT_COMPARABLE)
     if figures:
@@ -94,30 +113,15 @@ def unranked_rows(kind: str, cells: Cells, keys: Sequence[str]) -> list[Row]:
     ]
 
 
-def _ranks(entries: Sequence[Entry], key: str) -> list[str]:
-    """Return the places of entries by a score; those that look equal share one."""
-    ranks, place, last = list[str](), 0, ""
-    for count, entry in enumerate(entries, 1):
-        if entry.file.comparable and key in entry.scores:
-            shown = interval_cells(entry.scores[key])[0]
-            place, last = place if shown == last else count, shown
-            ranks.append(str(place))
-        else:
-            ranks.append("")
-    return ranks
-
-
 def _best(entries: Sequence[Entry], key: str, column: Column) -> str:
-    """Return the best of the comparable scores of a column as it is shown; empty without any."""
+    """Return the best of the comparable scores of a column as it is shown; empty without any.
+
+    A skill of 0 or less is the best of nothing.
+    """
     scores = [e.scores[key] for e in entries if e.file.comparable and key in e.scores]
+    scores = [score for score in scores if isinstance(score, Score) or score.value > 0.0]
     better = max if column.higher_is_better else min
     return interval_cells(better(scores, key=lambda score: score.value))[0] if scores else ""
-
-
-def _cell(entry: Entry, key: str, best: str) -> Cell:
-    best = best if entry.file.comparable else ""
-    cell = score_cell(entry.scores.get(key), best, entry.floors.get(key))
-    return replace(cell, value=f"{cell.value} {ALIKE}") if key in entry.alike else cell
 
 
 def score_column(name: str) -> Column:

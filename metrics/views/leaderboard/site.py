@@ -114,17 +114,19 @@ def _sections(ranking: Ranking) -> Iterator[Section]:
 
 def lead_of(ranking: Ranking) -> Lead:
     """Return what the first row of a ranking is, and its first score."""
-    row, entry = ranking.tables[0].rows[0], ranking.entries[0]
-    first = row.cells[2]
-    firsts = sum(other.cells[0].value == "1" for other in ranking.tables[0].rows)
-    if not row.cells[0].value:
+    entry = ranking.entries[0]
+    rows, head = ranking.tables[0].rows, ranking.tables[0].head[2]
+    row = next(row for row in rows if row.kind != "floor")
+    firsts = sum(other.rank == "1" for other in ranking.entries)
+    if not entry.file.comparable:
         words = "is not ranked"
+    elif not entry.rank:
+        return Lead("No method", f"is better than the floor in {head}")
     elif firsts > 1:
         words = f"is one of {firsts} in the first place"
     else:
         words = "leads" if len(ranking.entries) > 1 else "alone"
-    head = ranking.tables[0].head[2]
-    return Lead(entry.label, f"{words}: {first} {head}", entry.link)
+    return Lead(entry.label, f"{words}: {row.cells[2]} {head}", entry.link)
 
 
 def _gallery_section(ranking: Ranking, links: Mapping[int, str]) -> Section:

@@ -16,7 +16,7 @@ class Estimate:
     """A number and its 95% interval.
 
     Attributes:
-        low, high: None where there are too few participants to tell, or none differ.
+        low, high: None for fewer than three participants, or where none differ.
         n: how many of the sample it is from, participants unless it is said otherwise.
     """
 
@@ -27,7 +27,7 @@ class Estimate:
 
 
 def _around(value: float, error: float | None, degrees: int, n: int) -> Estimate:
-    if error is None or degrees < 1 or not math.isfinite(error):
+    if error is None or degrees < 2 or not math.isfinite(error):
         return Estimate(value, None, None, n)
     half = float(stats.t.ppf((1 + CONFIDENCE) / 2, degrees)) * error
     return Estimate(value, value - half, value + half, n)

@@ -14,6 +14,7 @@ from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
 from metrics.views.leaderboard.floors import FloorError
 from metrics.views.leaderboard.ranking import LeaderboardError, leaderboard, rankings
+from metrics.views.leaderboard.site import lead_of
 from metrics.views.paper import TABLES
 
 
@@ -59,10 +60,11 @@ def test_ranks_and_best_cells():
 
 
 def test_higher_is_better_where_it_is():
-    files = [iqtt_scores("low", [1, 0, 0, 0]), iqtt_scores("high", [1, 1, 0, 1])]
+    files = [iqtt_scores("low", [1, 0, 0] * 5), iqtt_scores("high", [1, 1, 1] * 5)]
     (table,) = leaderboard(files, paper="none")
     assert best(table) == [[True, True], [False, False], [False, False]]
-    assert list(values(table)) == ["high", "low", "floor: chance, as no probe was measured"]
+    floor = "floor: chance, as no probe was measured"
+    assert ranks(table) == [("1", "high"), ("", floor), ("", "low")]
     assert table.head[2:] == ("IQTT accuracy: skill ↑", "IQTT accuracy ↑ (fraction)")
     assert table.title == f"3D-IQTT, mirror questions, truth {DIGEST[:12]}"
 
@@ -170,6 +172,25 @@ def test_the_floor_by_view_angle_is_the_empty_rooms_at_that_angle():
     _, table = leaderboard([file], paper="none")
     assert table.head[2:] == ("0°", "5°", "35°")
     assert values(table)["floor: empty room"] == ["0.2000", "-", "0.6000"]
+
+
+def test_methods_that_are_not_above_the_floor_have_no_rank_and_the_next_column_orders_them():
+    columns = {"shape_error": [0.1] * 4, "relief_iou": [0.1] * 4}
+    shapes = {"flat": (0.0, 0.0, 0.0), "tries": (-0.1, -0.2, 0.0), "knows": (0.3, 0.1, 0.5)}
+    where = {"flat": 0.1, "tries": 0.6, "knows": 0.2}
+    files = [
+        rooms_scores(n, columns, SCENES, skills={
+            "shape_error": Skill(*ends, 0.1, "cut_out_shape_error"),
+            "relief_iou": Skill(where[n], None, None, 0.0, "other_scene_relief_iou"),
+        })
+        for n, ends in shapes.items()
+    ]  # fmt: skip
+    table = leaderboard(files, paper="none")[0]
+    floor = "floor: flat cut-out"
+    assert ranks(table)[:4] == [("1", "knows"), ("", floor), ("", "tries"), ("", "flat")]
+    (ranking,), _ = rankings(files[:2], paper="none")
+    assert ranks(ranking.tables[0])[:3] == [("", floor), ("", "tries"), ("", "flat")]
+    assert lead_of(ranking).strong == "No method"
 
 
 def relief(name, iou, floor):

@@ -15,7 +15,6 @@ from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
 from metrics.views.leaderboard.gallery import spread_entries
 from metrics.views.leaderboard.ranking import compared_with_first, rankings
-from metrics.views.leaderboard.rows import ALIKE
 from metrics.views.leaderboard.site import lead_of, preset_of, report_names, write_site
 from scenegen.rooms.reader import RoomsFile
 
@@ -94,17 +93,15 @@ def test_a_path_that_cannot_be_looked_at_only_leaves_pictures_out(tmp_path):
         assert "m alone" in Page((tmp_path / "s" / "index.html").read_text()).text
 
 
-def test_scores_like_the_first_ones_are_marked(files, tmp_path):
-    write_site(files, tmp_path / "site")
-    rows = {row[1]: row for row in Page((tmp_path / "site" / "index.html").read_text()).rows[:4]}
-    assert [cell.count(ALIKE) for cell in rows["near"][2:]] == [1, 1, 1]
-    assert [cell.count(ALIKE) for cell in rows["far"][2:]] == [0, 1, 1]
-    assert ALIKE not in "".join(rows[HOSTILE])
+def test_methods_that_are_not_told_apart_share_a_rank(files):
+    (ranking, _), _ = rankings(files)
+    assert {entry.label: entry.rank for entry in ranking.entries} == {
+        **dict.fromkeys((HOSTILE, "near"), "1"), "far": "3",
+    }  # fmt: skip
     fewer = {name: c for name, c in files[2].columns.items() if name in ("row", "scene_index")}
-    comparison, alike = compared_with_first([files[1], files[0], replace(files[2], columns=fewer)])
+    comparison = compared_with_first([files[1], files[0], replace(files[2], columns=fewer)])
     assert comparison.methods == ("far",)
-    assert alike == {id(files[0]): {"hausdorff", "mse_depth"}}
-    assert compared_with_first([stated(files[0], comparable=False)]) == (None, {})
+    assert compared_with_first([stated(files[0], comparable=False)]) is None
 
 
 def test_a_site_replaces_an_older_one_and_nothing_else(files, tmp_path):

@@ -20,7 +20,8 @@ def test_student_s_interval_is_scipy_s():
     expected = stats.ttest_1samp(values, 0).confidence_interval()
     assert (estimate.low, estimate.high) == pytest.approx(tuple(expected))
     assert mean_estimate([0.5]).low is None
-    assert within(mean_estimate([0.0, 1.0])).low == 0.0
+    assert mean_estimate([0.5, 0.6]).low is None
+    assert within(mean_estimate([0.0, 1.0, 0.0])).low == 0.0
 
 
 def test_crossed_variance_by_plain_loops():
