@@ -337,12 +337,13 @@ def test_the_same_command_goes_on(run, tmp_path, monkeypatch, workers):
     monkeypatch.setattr(sys, "argv", ["scenegen", *command])  # is recorded
     done = {}
     for number in (signal.SIGKILL, signal.SIGTERM):
+        before = len(list(tmp_path.glob("rooms-*.h5")))
         process = subprocess.Popen(
             [sys.executable, "-c", SLOWLY, *command], cwd=tmp_path, env=ENVIRONMENT,
             stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         deadline = time.monotonic() + 60
-        while len(list(tmp_path.glob("rooms-*.h5"))) <= len(done) and time.monotonic() < deadline:
+        while len(list(tmp_path.glob("rooms-*.h5"))) <= before and time.monotonic() < deadline:
             time.sleep(0.01)
         process.send_signal(number)
         _, message = process.communicate(timeout=30)
