@@ -167,7 +167,7 @@ def made(make_rooms, tmp_path_factory):
 HOW = sorted({"gone", "a group", *ATTRIBUTES, *DATASETS, *VALUES})
 
 
-@settings(max_examples=30, derandomize=True, deadline=None)
+@settings(max_examples=10, derandomize=True, deadline=None)
 @given(data=st.data())
 def test_only_errors_of_ours_come_out(data, made, tmp_path_factory):
     folder = tmp_path_factory.mktemp("hostile")

@@ -24,9 +24,8 @@ TASKS = {
     "questions": questions(),
     "none labelled": questions(labeled=0, with_depth=False),
 }
-BOTH = pytest.mark.parametrize("task", [TASKS["views"], TASKS["questions"]], ids=["rooms", "iqtt"])
-
-
+TASK_IDS = ["rooms", "iqtt"]
+BOTH = pytest.mark.parametrize("task", [TASKS["views"], TASKS["questions"]], ids=TASK_IDS)
 ENVIRONMENT = {**os.environ, "OMP_NUM_THREADS": "1"}
 
 
@@ -132,7 +131,9 @@ def test_a_damaged_or_lost_shard_is_named_and_made_again(copied, made):
     assert contents(folder) == contents(made[1])
 
 
-@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize(
+    ("made", "share"), [("views", 0.0), ("questions", 0.5), ("views", 1.0)], indirect=["made"]
+)
 def test_a_run_goes_on_where_it_stopped(made, tmp_path, share):
     """The manifest lacks a file that is complete, as after a kill at that moment."""
     task, folder = made[0], tmp_path / "set"
@@ -160,7 +161,9 @@ def test_a_run_goes_on_where_it_stopped(made, tmp_path, share):
         task.shards(folder)
 
 
-@BOTH
+@pytest.mark.parametrize(
+    "task", [TASKS["views"], pytest.param(TASKS["questions"], marks=pytest.mark.slow)], ids=TASK_IDS
+)
 def test_other_requests_are_refused_by_name_and_replace_only_when_told(task, tmp_path):
     folder = tmp_path / "set"
     task.shards(folder)
@@ -268,19 +271,17 @@ def test_workers_and_batches_never_change_a_byte(made, tmp_path, monkeypatch, wo
     """The fixture has batches of two; workers of one file are in the `test_make` of each task."""
     monkeypatch.setattr("iqtt.files.work.BLOCK", 2)
     made[0].shards(tmp_path / "shards", workers=workers, batch=1)
-    made[0].make(tmp_path / "whole", workers=workers, batch=64)
     assert contents(tmp_path / "shards") == contents(made[1])
-    assert contents(tmp_path / "whole") == contents(made[2])
 
 
-def test_no_file_but_the_answers_tells_the_seed(tmp_path):
-    task = TASKS["questions"]
+@pytest.mark.parametrize("made", ["questions"], indirect=True)
+def test_no_file_but_the_answers_tells_the_seed(made, tmp_path):
+    task, known, _ = made
     task.shards(tmp_path / "secret", secret=True, command="")
-    task.shards(tmp_path / "known")
-    for folder in (tmp_path / "secret", tmp_path / "known"):
+    for folder in (tmp_path / "secret", known):
         for path in folder.iterdir():
             tells = str(SEED).encode() in path.read_bytes()
-            assert tells == (path.match("known/iqtt-test-answers*")), path.name
+            assert tells == (folder == known and path.match("iqtt-test-answers*")), path.name
     with pytest.raises(SpecError):
         task.shards(tmp_path / "secret", secret=False)
 
@@ -297,23 +298,20 @@ def test_a_manifest_names_only_files_beside_it(copied, name):
             task.read_manifest(folder)
 
 
-@pytest.mark.parametrize(
-    "wrong",
-    [
+@pytest.mark.parametrize("made", ["views"], indirect=True)
+def test_no_manifest_is_believed(copied):
+    task, folder = copied
+    stored = json.loads((folder / task.manifest).read_text())
+    for wrong in (
         {"files": []}, {"spec": "[]"}, {"spec": "{"}, {"count": 0}, {"count": 10**30},
         {"count": 4 * 10**9}, {"shards": []}, {"shard_size": -1}, {"format": "2"},
-    ],
-    ids=str,
-)  # fmt: skip
-def test_no_manifest_is_believed(copied, wrong):
-    task, folder = copied
-    told = json.loads((folder / task.manifest).read_text())
-    (folder / task.manifest).write_text(json.dumps(told | wrong))
-    try:
-        checks = task.verify(folder)
-    except FileFormatError:
-        return
-    assert not all(check.ok for check in checks)
+    ):  # fmt: skip
+        (folder / task.manifest).write_text(json.dumps(stored | wrong))
+        try:
+            checks = task.verify(folder)
+        except FileFormatError:
+            continue
+        assert not all(check.ok for check in checks), wrong
 
 
 RENDER = "render --n 60 --size 32 --min-visible-pixels 3 --shard-size 5 --seed 3 --out rooms.h5"

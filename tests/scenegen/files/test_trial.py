@@ -30,7 +30,7 @@ def broken(tmp_path):
 
 
 def test_a_file_on_which_hdf5_hangs(broken, monkeypatch):
-    monkeypatch.setattr(trial, "SECONDS", 1.9)
+    monkeypatch.setattr(trial, "SECONDS", 0.9)
     with pytest.raises(FileFormatError) as error:
         try_file(broken("hangs"))
     assert error.value.where.endswith("hangs.h5")
@@ -72,9 +72,9 @@ def test_files_that_another_process_can_read(rooms_path, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     "command",
     [
-        "bench validate hangs.h5",
-        "bench score hangs.h5 --truth rooms.h5",
-        "bench view hangs.h5 --truth rooms.h5",
+        "bench validate crashes.h5",
+        "bench score crashes.h5 --truth rooms.h5",
+        "bench view crashes.h5 --truth rooms.h5",
         "bench score answers.h5",
     ],
 )
@@ -82,15 +82,15 @@ def test_submissions_and_the_truths_that_they_name_are_tried_first(
     command, broken, tmp_path, monkeypatch, rooms_path
 ):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(trial, "SECONDS", 1.9)
-    broken("hangs")
+    broken("crashes")
     shutil.copy(rooms_path, "rooms.h5")
     with h5py.File("answers.h5", "w") as file:
         texts = {"format": "pix2shape-bench/predictions", "format_version": "1.0"}
-        texts |= {"task": "iqtt", "method": "m", "truth_fingerprint": "", "truth_path": "hangs.h5"}
+        texts |= {"task": "iqtt", "method": "m", "truth_fingerprint": ""}
+        texts["truth_path"] = "crashes.h5"
         file.attrs.update(texts)
         file["question"], file["answer"] = np.arange(3), np.zeros(3, "i1")
     program, *arguments = command.split()
     done = CliRunner().invoke(getattr(cli, program), arguments)
     assert done.exit_code in (1, 2)
-    assert "HDF5 had not read" in done.output
+    assert "HDF5 crashes" in done.output
