@@ -6,8 +6,8 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 import pytest
 import shared_training
@@ -55,29 +55,29 @@ def folder(
     These are "1" or "2", or "1 then 2", where two made the last two iterations, or "2 then 1".
     """
     top = tmp_path_factory.mktemp("shared")
-    data = {kind: rooms_path if kind == "rooms" else train_questions for kind in CONFIGS}
 
-    def run(kind: str, name: str) -> dict[str, Any]:
-        resumed = "then" in name
+    @cache
+    def trained(kind: str, name: str) -> Path:
+        resumed, to = "then" in name, top / f"{kind} {name}"
         if resumed:
-            shutil.copytree(top / f"{kind} {name[0]}-half", top / f"{kind} {name}")
-        return {
-            "folder": str(top / f"{kind} {name}"),
-            "data": str(data[kind]),
+            shutil.copytree(f"{trained(kind, name[0])}-half", to)
+        run = {
+            "folder": str(to),
+            "data": str(rooms_path if kind == "rooms" else train_questions),
             "config": None if resumed else CONFIGS[kind].to_json(),
             "labels": int(kind != "rooms" and not resumed),  # of 8 places, in one process
             "processes": int(name[-1]),
         }
+        if name[-1] == "1":
+            shared_training.train_all([run])
+            return to
+        (top / "runs").write_text(json.dumps([run]))
+        command = [sys.executable, "-W", "ignore", shared_training.__file__, top / "runs"]
+        more = {"PYTHONPATH": str(Path(__file__).parents[3]), "OMP_NUM_THREADS": "1"}
+        subprocess.run(command, timeout=300, check=True, env={**os.environ, **more})
+        return to
 
-    shared_training.train_all([run(kind, "1") for kind in CONFIGS])
-    (top / "runs").write_text(
-        json.dumps([*(run(kind, "2") for kind in CONFIGS), run("rooms", "1 then 2")])
-    )
-    command = [sys.executable, "-W", "ignore", shared_training.__file__, top / "runs"]
-    more = {"PYTHONPATH": str(Path(__file__).parents[3]), "OMP_NUM_THREADS": "1"}
-    subprocess.run(command, timeout=300, check=True, env={**os.environ, **more})
-    shared_training.train_all([run("rooms", "2 then 1")])
-    return lambda kind, name: top / f"{kind} {name}"
+    return trained
 
 
 @pytest.mark.parametrize(("here", "world"), [("-1", "2"), ("two", "2"), ("0", "2"), ("2", "")])
@@ -91,7 +91,12 @@ def test_an_environment_that_torchrun_does_not_make_is_refused(here, world, monk
 
 @pytest.mark.parametrize(
     ("kind", "name"),
-    [*((kind, "2") for kind in CONFIGS), ("rooms", "1 then 2"), ("rooms", "2 then 1")],
+    [
+        ("rooms", "2"),
+        ("rooms", "2 then 1"),
+        *(pytest.param(kind, "2", marks=pytest.mark.slow) for kind in CONFIGS if kind != "rooms"),
+        pytest.param("rooms", "1 then 2", marks=pytest.mark.slow),
+    ],
 )
 def test_several_processes_learn_what_one_learns(kind, name, folder):
     """The losses of every iteration, the weights, batch statistics and moments at the end."""

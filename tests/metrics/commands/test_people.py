@@ -14,10 +14,11 @@ from contextlib import closing, contextmanager
 import h5py
 import pytest
 from click.testing import CliRunner
-from quizzes import Site, made_answers
+from quizzes import Site, made_answers, served
 
 import cli
 from iqtt.quiz.answers import read_answers
+from iqtt.quiz.study import Study
 from metrics.score_file import read_scores
 
 # Whoever starts the tests in the background has Ctrl-C ignored.
@@ -40,6 +41,16 @@ def started(split, db, *options):
     finally:
         process.kill()
         process.communicate()
+
+
+@contextmanager
+def running(split, db, questions):
+    """Serve that many questions from a thread, none of them for practice."""
+    with (
+        Study(split / "iqtt-test.h5", questions=questions, calibrations=0) as study,
+        served(study, db) as site,
+    ):
+        yield site
 
 
 @pytest.fixture
@@ -69,12 +80,12 @@ def right_answers(split, db):
 
 
 def test_a_participant_in_a_browser(visit, quiz_split, tmp_path, iqtt):
-    """With the keyboard alone, on a phone's width: 2 for practice, 20 that count, 13 of them right.
+    """With the keyboard alone, on a phone's width: 2 for practice, 5 that count, 3 of them right.
 
     Every page is checked by axe-core once; a reload in the middle goes on.
     """
     db = tmp_path / "answers.db"
-    with started(quiz_split, db) as (_, site):
+    with started(quiz_split, db, "--questions", "5") as (_, site):
         seen = visit(f"http://localhost:{site.port}/", width=360, height=740)
         page, wrong = seen.page, []
 
@@ -94,15 +105,15 @@ def test_a_participant_in_a_browser(visit, quiz_split, tmp_path, iqtt):
         page.keyboard.press("Enter")
         ready("Practice question 1 of 2")
         right = right_answers(quiz_split, db)
-        given = [right[0], (right[1] + 1) % 3, *right[2:15], *((k + 1) % 3 for k in right[15:])]
+        given = [right[0], (right[1] + 1) % 3, *right[2:5], *((k + 1) % 3 for k in right[5:])]
         for i, choice in enumerate(given):
-            ready(f"Practice question {i + 1} of 2" if i < 2 else f"Question {i - 1} of 20")
+            ready(f"Practice question {i + 1} of 2" if i < 2 else f"Question {i - 1} of 5")
             assert int(page.locator("progress").get_attribute("value")) == i
             if i in (0, 2):
                 check()
             if i == 5:
                 page.reload()
-                ready("Question 4 of 20")
+                ready("Question 4 of 5")
             if i == 6:  # by the Tab key
                 for _ in range(choice + 1):
                     page.keyboard.press("Tab")
@@ -113,26 +124,23 @@ def test_a_participant_in_a_browser(visit, quiz_split, tmp_path, iqtt):
                 ready("Right" if i == 0 else "Not right")
                 check()
                 page.keyboard.press("Enter")
-        ready("Your score: 13 of 20")
+        ready("Your score: 3 of 5")
         check()
         page.go_back()
-        ready("Your score: 13 of 20")
+        ready("Your score: 3 of 5")
         assert wrong == []
         page.close()  # before the server stops, so that it asks for nothing more
     found = read_answers(db).answers
     assert [one.answer for one in found] == given
-    assert [one.times_shown for one in found] == [1] * 5 + [2] + [1] * 16
+    assert [one.times_shown for one in found] == [1] * 5 + [2, 1]
     assert all(0 <= one.response_seconds <= one.server_seconds + 1 for one in found)
     result = iqtt("quiz-report", db, "--json", "r.json", "--html", "r.html")
     assert result.exit_code == 0, result.output
-    assert json.loads((tmp_path / "r.json").read_text())["accuracy"]["value"] == 13 / 20
+    assert json.loads((tmp_path / "r.json").read_text())["accuracy"]["value"] == 3 / 5
 
 
 def test_without_scripts_the_quiz_works(visit, quiz_split, tmp_path):
-    with started(quiz_split, tmp_path / "a.db", "--calibration", "0", "--questions", "2") as (
-        _,
-        site,
-    ):
+    with running(quiz_split, tmp_path / "a.db", 2) as site:
         page = visit(f"http://localhost:{site.port}/", java_script_enabled=False).page
         page.check("#consent")
         for name in ("Start", "Answer 2", "Answer 2"):
@@ -147,10 +155,10 @@ def test_a_kill_loses_no_answer_that_was_acknowledged(quiz_split, tmp_path):
     db = tmp_path / "answers.db"
     options = ("--calibration", "0", "--questions", "24")
     told, cookie = 0, None
-    for _ in range(3):
+    for _ in range(2):
         with started(quiz_split, db, *options) as (process, site):
             cookie = cookie or site.begin()
-            for _ in range(8):
+            for _ in range(12):
                 assert site.answer(cookie) == 303
                 told += 1
             process.kill()
@@ -159,9 +167,19 @@ def test_a_kill_loses_no_answer_that_was_acknowledged(quiz_split, tmp_path):
     assert {one.finished for one in found} == {True}
 
 
-def test_signals_end_it_well(quiz_split, tmp_path):
-    for number in (signal.SIGINT, signal.SIGTERM):
-        with started(quiz_split, tmp_path / "answers.db") as (process, site):
+def test_public_means_all_addresses_of_this_machine_and_signals_end_it_well(quiz_split, tmp_path):
+    """127.0.0.2 is one of them, at which a server at localhost does not listen."""
+    for options, reached, number in (
+        ([], False, signal.SIGINT),
+        (["--public"], True, signal.SIGTERM),
+    ):
+        with started(quiz_split, tmp_path / "answers.db", *options) as (process, site):
+            try:
+                socket.create_connection(("127.0.0.2", site.port), timeout=5).close()
+                found = True
+            except ConnectionRefusedError:
+                found = False
+            assert found == reached
             site.begin()
             process.send_signal(number)
             out, err = process.communicate(timeout=20)
@@ -170,23 +188,8 @@ def test_signals_end_it_well(quiz_split, tmp_path):
     assert not (tmp_path / "answers.db-wal").exists()
 
 
-def test_public_means_all_addresses_of_this_machine(quiz_split, tmp_path):
-    """127.0.0.2 is one of them, at which a server at localhost does not listen."""
-    for options, reached in (([], False), (["--public"], True)):
-        with started(quiz_split, tmp_path / "answers.db", *options) as (_, site):
-            try:
-                socket.create_connection(("127.0.0.2", site.port), timeout=5).close()
-                found = True
-            except ConnectionRefusedError:
-                found = False
-        assert found == reached
-
-
 def test_export_and_submission(quiz_split, tmp_path, iqtt, refused):
-    with started(quiz_split, tmp_path / "a.db", "--calibration", "0", "--questions", "24") as (
-        _,
-        site,
-    ):
+    with running(quiz_split, tmp_path / "a.db", 24) as site:
         cookie = site.begin()
         assert {site.answer(cookie) for _ in range(24)} == {303}
         # While the server runs.
@@ -225,8 +228,9 @@ def test_what_is_refused_before_anything_is_served(quiz_split, tmp_path, refused
     (tmp_path / "text.db").write_text("text")
     refused("quiz", split, "--db", "text.db", words=("text.db",))
     refused("quiz-report", "text.db", words=("text.db",))
-    with started(quiz_split, tmp_path / "a.db") as (_, site):
-        refused("quiz", split, "--port", site.port, words=(str(site.port), "in use"))
+    with socket.create_server(("127.0.0.1", 0)) as other:
+        port = other.getsockname()[1]
+        refused("quiz", split, "--port", port, words=(str(port), "in use"))
 
 
 def test_the_report_refuses_to_write_over_its_input(tmp_path, refused):

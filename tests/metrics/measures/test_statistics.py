@@ -43,13 +43,16 @@ def bootstrap_coverage(name, scenes, trials, resamples, seed):
     return hits / trials
 
 
-@pytest.mark.parametrize("name", SKEWED)
+QUICK = pytest.mark.parametrize("name", ["lognormal", "nearly always right"])
+
+
+@QUICK
 def test_bootstrap_covers(name):
     # 3 standard errors of 400 trials; the slow test below is the sharp one.
     assert bootstrap_coverage(name, 200, 400, 500, 1) == pytest.approx(0.95, abs=0.033)
 
 
-@pytest.mark.parametrize("name", SKEWED)
+@QUICK
 def test_few_scenes_are_enough_from_the_stated_number_on(name):
     """BCa percentiles cover 88 to 92% here."""
     assert bootstrap_coverage(name, statistics.FEW_CLUSTERS, 400, 500, 4) >= 0.91
@@ -203,7 +206,7 @@ print(*(end.hex() for ends in bootstrap_interval(values, 5) for end in ends.toli
 
 def test_the_same_to_the_last_digit_on_any_number_of_threads():
     outputs = set()
-    for threads in ("1", "2", "2"):
+    for threads in ("1", "2"):
         names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
         environment = os.environ | dict.fromkeys(names, threads)
         environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))

@@ -243,8 +243,7 @@ def copied(source, path, **attributes):
     return path
 
 
-@pytest.mark.parametrize("processes", [1, 2])
-@pytest.mark.parametrize("back", [False, True])
+@pytest.mark.parametrize(("back", "processes"), [(False, 1), (True, 1), (True, 2)])
 def test_a_submission_that_changes_while_it_is_scored(
     truths, tmp_path, monkeypatch, back, processes
 ):

@@ -105,6 +105,7 @@ def test_surfels_are_beside_the_truth(served):
     assert page.controls["scene"].value == 0
 
 
+@pytest.mark.slow
 def test_both_depths_in_a_browser(visit, served):
     rooms, page, server = served
     switch(page, sort="AbsRel", place=ALONE, meshes=False, lights=False)

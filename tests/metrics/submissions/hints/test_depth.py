@@ -72,10 +72,10 @@ def test_innocent_depth_gets_no_hint(hints, room_arrays):
     """A claim of alignment only ever takes hints away."""
     depth, _, _, stretch = room_arrays
     made = innocent(depth, stretch)
-    assert {name: found for name, values in made.items() if (found := hints(values))} == {}
+    assert {name: found for name, values in made.items() if (found := hints(values[:8]))} == {}
 
 
-@pytest.mark.parametrize("count", [1, 4])
+@pytest.mark.parametrize("count", [1, pytest.param(4, marks=pytest.mark.slow)])
 def test_few_rows(hints, room_arrays, count):
     depth, normal, _, stretch = room_arrays
     for values in innocent(depth, stretch).values():

