@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from iqtt.files.reader import QuestionRecord
+from iqtt.questions.specs import LETTERS
 from scenegen.rooms.preview import BACKGROUND, FAINT, INK, srgb_bytes
 
 Array = NDArray[Any]
-LABELS = ("", "A", "B", "C")
 SMALLEST_TILE, LARGEST_TILE = 128, 256  # other images are scaled by a whole factor
 FRAME = 4  # pixels around the right answer
 GAP = 10  # pixels between answers
@@ -71,7 +71,7 @@ def _draw_question(
         box = (x - by, top - by, x + tile.width + by - 1, top + height + by - 1)
         draw.rectangle(box, fill=RIGHT if right else LINE)
         sheet.paste(tile, (x, top))
-        letter, note = LABELS[k], ""
+        letter, note = "" if k == 0 else LETTERS[k - 1], ""
         if k == 0:
             note = f"question {record.index}"
         elif show_answers:

@@ -16,6 +16,7 @@ from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 SPLITS = ("train", "val", "test")
 DISTRACTOR_KINDS = ("other", "near", "mirror", "matched")  # of wrong answers; append only
 QUESTION_KINDS = (*DISTRACTOR_KINDS, "mirror-pair")
+LETTERS = "ABC"  # of answers, wherever people look; files count them from 0
 DISTRACTORS = (*QUESTION_KINDS, "mixed")
 SMALLEST_SECRET, LARGEST_SECRET = 16, 1_000_000  # bytes of a file whose content is a seed
 MAX_QUESTIONS = 10**8  # of each of train, val and test

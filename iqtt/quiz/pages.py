@@ -6,6 +6,8 @@ from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
+from iqtt.questions.specs import LETTERS
+
 FOLDER = Path(__file__).parent
 STATIC = FOLDER / "static"
 _PAGES = Environment(
@@ -16,6 +18,7 @@ _PAGES = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
+_PAGES.globals["letters"] = LETTERS
 
 
 @dataclass(frozen=True)

@@ -44,6 +44,9 @@ TRUTH = click.option(
     metavar="SCORES.json",
     help="Scores on the same truth to show beside these in the page; may be repeated.",
 )
+@click.option(
+    "--all", "whole", is_flag=True, help="Print all scores and groups, not only the headline."
+)
 @MARKDOWN
 @SEED
 @click.option(
@@ -77,12 +80,13 @@ def score(
     csv_path: str | None,
     html_path: str | None,
     beside: tuple[str, ...],
+    whole: bool,
     markdown: bool,
     scheduler: str | None,
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Score a submission, or several training runs of one method, and print a table."""
+    """Score a submission, or several training runs of one method, and print the headline."""
     from metrics.score_file import write_scores
     from metrics.scoring.evaluate import open_runs, score_runs
     from metrics.scoring.runs import Settings, scorer_versions
@@ -118,7 +122,7 @@ def score(
             truth_path, paths = Path(scores.meta.truth_path), [Path(path) for path in submissions]
             write_text(html_path, html_report(scores, truth_path, paths, others), overwrite)
     finally:  # a page that cannot be made loses no score
-        click.echo(text_report(scores, markdown))
+        click.echo(text_report(scores, markdown, whole))
 
 
 @click.command(epilog=EXAMPLE + "bench validate predictions.h5 --truth rooms.h5")

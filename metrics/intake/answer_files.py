@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from iqtt.questions.specs import LETTERS
 from metrics.submissions.problems import JsonError
 from metrics.submissions.rules import MOST_ROWS
 from metrics.submissions.strict_json import parse_json, read_bytes
@@ -15,7 +16,6 @@ from metrics.submissions.writer import write_answers
 from scenegen.common.errors import SceneGenError
 
 MOST_BYTES = 64 * 2**20
-LETTERS = "ABC"
 QUESTION = ("question", "id", "index", "row")  # names that the index of a question may have
 ANSWER = ("answer", "prediction", "choice")
 ENDINGS = (".csv", ".json", ".jsonl")

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iqtt.questions.specs import LETTERS
 from metrics.measures.answers import ABSTAINED
 from metrics.scoring.geometry import planar_depth
 from metrics.scoring.metric_names import HEADLINE, metric
@@ -23,7 +24,6 @@ from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 SHOWN = 6  # examples in a list, where there are enough
-LETTERS = "ABC"
 ANSWERS_ENDING = "-answers"  # of the name of the file of answers, beside that of the questions
 
 

@@ -8,6 +8,7 @@ from typing import get_args
 
 import numpy as np
 
+from iqtt.questions.specs import LETTERS
 from metrics.measures.alignment import Alignment
 from metrics.measures.statistics import FEW_CLUSTERS
 from metrics.scoring.estimates import CONFIDENCE, question_skill
@@ -33,14 +34,15 @@ FLOORS_OF_ROOMS = {
     CUT_OUT: "flat cut-out",
     OTHER_SCENE: "against another scene",
 }
+BY_KIND = "by kind of question"
 GROUP_TITLES = {
     "by_view_angle": "by degrees between the view and the scene's first one",
     "by_object_shape": "of single objects, by shape",
     "by_object_size": "of single objects, by share of the picture in percent",
-    "by_distractor": "by kind of question",
+    "by_distractor": BY_KIND,
     "by_rotation_angle": "by rotation between reference and right answer, degrees",
     "by_position": "by place of the right answer",
-    "by_answer": "by the answer that was given, from 0",
+    "by_answer": "by the answer that was given",
     "by_outcome": "by what the model's text held",
     "by_circle": "circular: right in every order of the answers",
 }
@@ -48,11 +50,19 @@ ALIGNMENT_SCORES = ("abs_rel", "rmse", "delta_1")
 GROUP_SCORES = {"rooms": HEADLINE["rooms"], "iqtt": ("iqtt_accuracy",)}
 
 
-def text_report(scores: ScoreFile, as_markdown: bool = False) -> str:
-    """Return the headline, all scores, and the main ones by group, as aligned text or Markdown."""
-    tables = [headline_rows(scores), *alignment_tables(scores), all_scores(scores)]
-    tables += group_tables(scores)
-    return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes_of(scores))
+def text_report(scores: ScoreFile, as_markdown: bool = False, whole: bool = False) -> str:
+    """Return the headline, as aligned text or Markdown, and accuracy by kind of question.
+
+    Args:
+        whole: whether all scores, and the main ones by group, stand there as well.
+    """
+    tables, notes = [headline_rows(scores)], list(notes_of(scores))
+    if whole:
+        tables += [*alignment_tables(scores), all_scores(scores), *group_tables(scores)]
+    else:
+        tables += [table for table in group_tables(scores) if table.title == BY_KIND]
+        notes.append("--all prints all scores and groups")
+    return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes)
 
 
 def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> None:
@@ -165,9 +175,16 @@ def group_tables(scores: ScoreFile) -> Iterator[Table]:
             group = groups[key]
             cells = [_group_cell(group.get(name)) for name in names]
             n = str(max(score.n for score in group.values()))
-            rows.append((key, *cells, n, *(_kind_cells(scores, key) if with_floors else ())))
+            label = shown_key(grouping, key)
+            rows.append((label, *cells, n, *(_kind_cells(scores, key) if with_floors else ())))
         head = ("", *names, "n", *(("skill", "floor") if with_floors else ()))
         yield make_table(GROUP_TITLES[grouping], head, rows)
+
+
+def shown_key(grouping: str, key: str) -> str:
+    """Return a group's name as people see it: answers have letters."""
+    numbered = grouping in ("by_position", "by_answer") and key.isdigit()
+    return LETTERS[int(key)] if numbered else key
 
 
 def _group_cell(score: Score | None) -> Cell:

@@ -1,4 +1,4 @@
-// Keys 1 to 3, the time per answer, and one answer per question. Without it the quiz works all the
+// Keys A to C or 1 to 3, the time per answer, and one answer per question. Without it the quiz works all the
 // same, with the mouse and the Tab key; then no time is sent.
 "use strict";
 
@@ -29,7 +29,8 @@ document.addEventListener("keydown", (event) => {
   if (event.repeat || event.ctrlKey || event.altKey || event.metaKey) {
     return;
   }
-  const chosen = buttons[Number(event.key) - 1];
+  const key = event.key.toLowerCase();
+  const chosen = buttons["abc".indexOf(key)] ?? buttons["123".indexOf(key)];
   if (chosen) {
     event.preventDefault();
     chosen.click();

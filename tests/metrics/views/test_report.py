@@ -53,12 +53,15 @@ def test_questions_have_the_floor_of_their_kind(monkeypatch):
     monkeypatch.setattr("iqtt.floors.FLOORS", floors)
     accuracy = {"iqtt_accuracy": Skill(0.0, None, None, 0.5, "outline")}
     group = {"mirror": {"iqtt_accuracy": make_score("iqtt_accuracy", 1 / 3)}}
-    scores = iqtt_scores("a", [1, 0], skills=accuracy, by_distractor=group)
+    by_kind, by_answer = {"skills": accuracy, "by_distractor": group}, {"2": group["mirror"]}
+    scores = iqtt_scores("a", [1, 0], **by_kind, by_position=by_answer)
     head = cells_of(headline_rows(scores))
     assert head["skill of iqtt_accuracy"][-1] == "0: outline"
     assert head["iqtt_accuracy"][-1] == "0.5: outline; chance 0.3"
     assert cells_of(all_scores(scores))["  chance"][0] == "0.3"
-    (kinds,) = group_tables(scores)
+    kinds, places = group_tables(scores)
+    assert list(cells_of(places)) == ["C"]
+    assert len(text_report(scores).splitlines()) < len(text_report(scores, whole=True).splitlines())
     assert cells_of(kinds) == {"mirror": ["0.3333", "2", "-0.3333", "0.5000: outline"]}
 
 
@@ -80,7 +83,7 @@ def test_groups_stand_in_the_order_of_their_numbers(form, tmp_path):
     if form == "html":
         text = re.sub('data:[^"]*', "", html_report(scores, tmp_path, []))
     else:
-        text = text_report(scores, form == "markdown")
+        text = text_report(scores, form == "markdown", whole=True)
     shown = re.findall(r"\b(?:\d+)-(?:\d+)\b", text)
     assert shown == ["30-60", "60-90", "90-120", "120-150", "150-180"]
 
