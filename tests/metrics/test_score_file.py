@@ -379,13 +379,6 @@ def test_what_is_not_comparable_says_why():
         assert word in other.warnings[0]
 
 
-def test_other_versions_are_scored_again(tmp_path):
-    path = tmp_path / "s.json"
-    path.write_text(json.dumps(changed(ROOMS, "format_version", "3.0")))
-    with refused(JsonError, "format_version", hint="score the submission again"):
-        read_scores(path)
-
-
 def test_what_a_file_says_is_cut_short_in_errors():
     error = refusal("k" * 10**6, "f" * 10**4, "e" * 10**4)
     assert max(map(len, (error.where, error.found, error.expected))) == LONGEST_SHOWN

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from sheets import find
 
 from iqtt.files.reader import QuestionsFile
 from iqtt.vlm.pictures import composed, draw_pictures, stored_question
@@ -50,20 +51,7 @@ def test_pictures_are_the_stored_ones_drawn_finer(asked: Asked) -> None:
 
 def test_a_composed_picture_holds_the_pictures_themselves() -> None:
     pictures = np.random.default_rng(0).integers(0, 256, (4, 64, 80, 3), np.uint8)
-    sheet = np.asarray(composed(pictures))
-    corners = [
-        (top, left)
-        for top in range(sheet.shape[0] - 63)
-        for left in range(sheet.shape[1] - 79)
-        if any((sheet[top, left] == picture[0, 0]).all() for picture in pictures)
-    ]
-    at = {
-        k: corner
-        for k, picture in enumerate(pictures)
-        for corner in corners
-        if (sheet[corner[0] : corner[0] + 64, corner[1] : corner[1] + 80] == picture).all()
-    }
-    assert sorted(at) == [0, 1, 2, 3]
+    at = [find(np.asarray(composed(pictures)), picture) for picture in pictures]
     assert at[0][0] < at[1][0] == at[2][0] == at[3][0]
     assert at[1][1] < at[2][1] < at[3][1]
 

@@ -101,15 +101,6 @@ def test_pictures_of_another_split_are_left_out(truths, folder):
     assert "data:image/webp" not in (folder / "p.html").read_text()
 
 
-def test_chance_goes_all_the_way(truths, folder):
-    made = bench("baseline", "chance", "--data", truths.iqtt, "--out", "chance.h5")
-    assert made.exit_code == 0, made.output
-    scored = bench("score", "chance.h5", "--html", "chance.html")
-    assert scored.exit_code == 0, scored.output
-    assert "iqtt_accuracy" in scored.stdout
-    assert "chance" in scored.stdout
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [

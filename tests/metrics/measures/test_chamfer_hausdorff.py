@@ -1,7 +1,5 @@
 """Point-cloud distances against brute force, scipy, point-cloud-utils and hand-made cases."""
 
-import os
-import subprocess
 import sys
 
 import numpy as np
@@ -125,22 +123,3 @@ def test_without_pykdtree_scipy_takes_over(monkeypatch):
     assert point_scores(nearest_distances(a, b)) == pytest.approx(expected_scores(a, b))
     with pytest.raises(ImportError):
         nearest_distances(a, b, "pykdtree")
-
-
-IMPORT_CHECK = """
-import os, sys
-import numpy as np
-import metrics.measures.chamfer_hausdorff, metrics.measures.image_search
-import metrics.measures.depth, metrics.measures.normals
-import metrics.measures.answers, metrics.measures.statistics
-assert not {"scipy", "pykdtree"} & set(sys.modules), "a tree was loaded before it was needed"
-metrics.measures.chamfer_hausdorff.nearest_distances(np.zeros((1, 3)), np.ones((1, 3)))
-assert {"scipy", "pykdtree"} & set(sys.modules)
-assert "OMP_NUM_THREADS" not in os.environ
-"""
-
-
-def test_trees_are_imported_when_needed_and_leave_the_environment_alone():
-    environment = {k: v for k, v in os.environ.items() if k != "OMP_NUM_THREADS"}
-    environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
-    subprocess.run([sys.executable, "-c", IMPORT_CHECK], env=environment, check=True)

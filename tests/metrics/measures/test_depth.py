@@ -19,21 +19,6 @@ def random_pair(seed):
     return compare_depth(true * rng.uniform(0.5, 2.0) + 0.3 * rng.random((5, 6)), true)
 
 
-def test_by_hand():
-    scores = depth_scores(compare_depth([1.0, 2.0, 4.0, 8.0], [1.0, 4.0, 2.0, 8.0]))
-    assert scores == {
-        "mse_depth": 2.0,
-        "rmse": pytest.approx(np.sqrt(2.0)),
-        "abs_rel": pytest.approx((0.5 + 1.0) / 4.0),
-        "silog": pytest.approx(100.0 * np.log(2.0) / np.sqrt(2.0)),
-        **dict.fromkeys(("delta_1", "delta_2", "delta_3"), 0.5),
-        "sq_rel": (4.0 / 4.0 + 4.0 / 2.0) / 4.0,
-        "rmse_log": pytest.approx(np.log(2.0) / np.sqrt(2.0)),
-        "log10": pytest.approx(np.log10(2.0) / 2.0),
-        "irmse": pytest.approx(0.25 / np.sqrt(2.0)),
-    }
-
-
 def test_delta_limits_are_strict_and_symmetric():
     pair = compare_depth([1.25, 1.0, 1.24, 1.0, 1.5625, 1.9], [1.0, 1.25, 1.0, 1.24, 1.0, 1.0])
     assert [delta(pair, power) for power in (1, 2, 3)] == [2 / 6, 4 / 6, 6 / 6]

@@ -7,7 +7,6 @@ import pytest
 
 from metrics.measures.boundaries import boundary_scores
 from metrics.measures.depth import compare_depth, depth_scores
-from metrics.measures.normals import normal_scores
 from metrics.measures.points import local_point_scores, point_map_scores
 
 RNG = np.random.default_rng(5)
@@ -51,13 +50,6 @@ def test_depth(name):
     found = depth_scores(compare_depth(PREDICTED, TRUE, MASK))
     assert found.keys() == PUBLISHED.keys()
     assert found[name] == pytest.approx(PUBLISHED[name](pixels()), rel=1e-9)
-
-
-def test_normals_within_angles():
-    angles = RNG.uniform(0.0, 60.0, 500)
-    found = normal_scores(angles)
-    for limit in ("5", "7.5", "11.25", "22.5", "30"):
-        assert found[f"normal_within_{limit}"] == mean(a < float(limit) for a in angles.tolist())
 
 
 def boundaries(depth, ratio):
