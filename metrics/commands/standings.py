@@ -87,7 +87,7 @@ def compare(
             page = html_report(comparison, files, Path(truth) if truth else None, paths)
             write_text(html_path, page, overwrite)
     finally:
-        click.echo(text_report(comparison, markdown))
+        click.echo(text_report(comparison, files, markdown))
 
 
 @click.command(

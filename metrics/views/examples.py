@@ -15,7 +15,7 @@ from metrics.scoring.geometry import planar_depth
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import QuestionPredictions, RoomPredictions, open_predictions
-from metrics.views.pictures import data_url, view_pictures
+from metrics.views.pictures import Picture, data_url, view_pictures
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.common.text_table import number
 from scenegen.rendering.ground_truth import decode_image
@@ -25,21 +25,6 @@ from scenegen.rooms.reader import RoomsFile
 Array = NDArray[Any]
 SHOWN = 6  # examples in a list, where there are enough
 ANSWERS_ENDING = "-answers"  # of the name of the file of answers, beside that of the questions
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A picture, as a data URL.
-
-    Attributes:
-        mark: stands behind the caption; or empty.
-        right: whether it shows the right answer.
-    """
-
-    caption: str
-    url: str
-    mark: str = ""
-    right: bool = False
 
 
 @dataclass(frozen=True)
@@ -149,7 +134,7 @@ def room_pictures(
 ) -> list[Picture]:
     """Return the pictures of a row; `place` is that of its prediction."""
     true_depth = rooms.read("depth", row)
-    urls = view_pictures(
+    return view_pictures(
         decode_image(rooms.read("image", row)),
         true_depth,
         planar_depth(predictions.view(place), true_depth)[0],
@@ -157,7 +142,6 @@ def room_pictures(
         float(rooms.read("camera/fov_y_degrees", row)),
         predictions.normal(place) if predictions.has_normals else None,
     )
-    return [Picture(caption, url) for caption, url in urls.items()]
 
 
 def entry_name(scores: ScoreFile, entry: int) -> str:

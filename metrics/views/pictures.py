@@ -2,23 +2,45 @@
 
 import base64
 import io
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
 from metrics.measures.normals import normals_from_depth
-from scenegen.rooms.preview import NOTHING, srgb_bytes
+from scenegen.common.text_table import number
+from scenegen.rooms.preview import srgb_bytes
 
 Array = NDArray[Any]
 LARGEST = 128  # pixels across; larger images are shown by every second, third, ... of their pixels
 HEAVY = 6_000  # bytes of a picture that is kept to the bit; others lose a little
 FARTHEST = 1e6  # scene units; what is predicted beyond is drawn there
-ERROR_RAMP = np.array([(255, 255, 255), (253, 212, 158), (227, 74, 51), (127, 0, 0)], float)
+NOT_SCORED = (160, 160, 160)  # a grey that neither colour map has
+COLOUR_MAPS = {"depth": "viridis", "error": "inferno"}  # their bars are in templates/style.css
 IMAGE, TRUE_DEPTH, DEPTH, ERROR = "image", "true depth", "predicted depth", "depth error"
 TRUE_NORMALS, NORMALS = "true normals", "predicted normals"
 DERIVED_NORMALS = "normals of predicted depth"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture, as a data URL.
+
+    Attributes:
+        mark: stands behind the caption; or empty.
+        right: whether it shows the right answer.
+        bar: the colour map, whose bar stands below the picture; or empty.
+        ends: what the first and the last colour stand for.
+    """
+
+    caption: str
+    url: str
+    mark: str = ""
+    right: bool = False
+    bar: Literal["", "depth", "error"] = ""
+    ends: tuple[str, str] = ("", "")
 
 
 def view_pictures(
@@ -28,13 +50,12 @@ def view_pictures(
     true_normal: Array,
     fov_y_degrees: float,
     predicted_normal: Array | None = None,
-) -> dict[str, str]:
-    """Return image, depths, error and normals of one view, as data URLs by what they show.
+) -> list[Picture]:
+    """Return image, depths, error and normals of one view.
 
-    Both depths share one grey scale, black at the truth's nearest and white at its farthest. The
-    error |predicted - true| runs from white (none) to dark red (a tenth of the truth's range, or
-    more). Normals are shown as (x, y, z) = (red, green, blue). Pixels that are not scored are
-    purple. No value needs to be finite.
+    Both depths share one scale, from the truth's nearest to its farthest. The error |predicted -
+    true| runs from none to a tenth of that range, or more. Normals are shown as (x, y, z) = (red,
+    green, blue). Pixels that are not scored are grey. No value needs to be finite.
 
     Args:
         radiance: (H, W, 3); true, predicted: planar depth, (H, W), scene units.
@@ -46,24 +67,28 @@ def view_pictures(
     near, far = (true[scored].min(), true[scored].max()) if scored.any() else (0.0, 1.0)
     span = max(float(far - near), 1e-9)
     drawn = np.clip(np.nan_to_num(predicted.astype(np.float64)), -FARTHEST, FARTHEST)
-    error = np.clip(np.abs(predicted_or_far(predicted) - true) / (0.1 * span), 0, 1)
-    stops = np.linspace(0, 1, len(ERROR_RAMP))
-    ramp = [np.interp(np.nan_to_num(error, nan=1.0), stops, ERROR_RAMP[:, c]) for c in range(3)]
+    error = np.abs(predicted_or_far(predicted) - true) / (0.1 * span)
     if predicted_normal is None:
         name, normal = DERIVED_NORMALS, normals_from_depth(drawn, fov_y_degrees, scored)[0]
     else:
         name, normal = NORMALS, predicted_normal
     pictures = {
-        TRUE_DEPTH: _grey((true - near) / span),
-        DEPTH: _grey((drawn - near) / span),
-        ERROR: _bytes(np.stack(ramp, axis=2)),
+        TRUE_DEPTH: _coloured((true - near) / span, "depth"),
+        DEPTH: _coloured((drawn - near) / span, "depth"),
+        ERROR: _coloured(error, "error"),
         TRUE_NORMALS: _normals(true_normal),
         name: _normals(normal),
     }
     for picture in pictures.values():
-        picture[~scored] = NOTHING
+        picture[~scored] = NOT_SCORED
+    depths = {"bar": "depth", "ends": (number(float(near)), number(float(far)))}
+    errors = {"bar": "error", "ends": ("0", f"≥ {0.1 * span:.2g}")}
+    bars: dict[str, dict[str, Any]] = {TRUE_DEPTH: depths, DEPTH: depths, ERROR: errors}
     shown = {IMAGE: srgb_bytes(np.nan_to_num(radiance)), **pictures}
-    return {caption: data_url(pixels) for caption, pixels in shown.items()}
+    return [
+        Picture(caption, data_url(pixels), **bars.get(caption, {}))
+        for caption, pixels in shown.items()
+    ]
 
 
 def predicted_or_far(predicted: Array) -> Array:
@@ -87,9 +112,12 @@ def data_url(pixels: NDArray[np.uint8]) -> str:
     return "data:image/webp;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
-def _grey(shares: Array) -> NDArray[np.uint8]:
+def _coloured(shares: Array, bar: str) -> NDArray[np.uint8]:
+    """Return the colours of a map at shares from 0 to 1."""
+    import matplotlib
+
     clipped = np.clip(np.nan_to_num(shares), 0, 1)
-    return np.repeat(_bytes(255 * clipped)[..., None], 3, axis=2)
+    return np.array(matplotlib.colormaps[COLOUR_MAPS[bar]](clipped, bytes=True)[..., :3])
 
 
 def _normals(normal: Array) -> NDArray[np.uint8]:

@@ -25,9 +25,8 @@ from metrics.views.table import make_table
 from scenegen.common.errors import SceneGenError
 
 ROOMS_REMARK = (
-    "Depth is black at the truth's nearest and white at its farthest point. The error goes from"
-    " white (none) to dark red (a tenth of the truth's range, or more). Normals are x, y, z as red,"
-    " green, blue. Purple pixels are not scored."
+    "Depths share the truth's range; the error ends at a tenth of it. Normals are x, y, z as red,"
+    " green, blue. Grey is not scored. A click enlarges a picture."
 )
 CURVES_REMARK = (
     "Bars are intervals. The paper's figures (†) are in the tables only, as it states no unit of"

@@ -6,7 +6,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 from metrics.scoring.known_tests import known_test
-from metrics.scoring.metric_names import metric
+from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.views.at_hand import submission_at_hand, truth_at_hand
 from metrics.views.compare.compare import (
@@ -21,18 +21,24 @@ from metrics.views.compare.pairing import common_rows
 from metrics.views.examples import (
     Example,
     Lists,
-    Picture,
     chosen_scenes,
     entry_name,
     room_examples,
     shown_score,
 )
-from metrics.views.headline import headline_section, kinds_sections
+from metrics.views.headline import kinds_sections
 from metrics.views.page import Lead, Section, html_page
-from metrics.views.pictures import DEPTH, ERROR
+from metrics.views.pictures import DEPTH, ERROR, Picture
 from metrics.views.plots import Point, strip
 from metrics.views.report import ROOMS_REMARK, curves_section
-from metrics.views.score_tables import too_few
+from metrics.views.score_tables import (
+    SKILL,
+    floor_text,
+    labels_of,
+    score_cell,
+    too_few,
+    what_the_floor_is,
+)
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import Interval, number
@@ -51,8 +57,10 @@ class AtHandError(SceneGenError):
     """A file that was given for pictures and is none of those that were scored."""
 
 
-def text_report(comparison: Comparison, as_markdown: bool = False) -> str:
-    """Return a table for each score: the reference, then the others against it; and a legend."""
+def text_report(
+    comparison: Comparison, files: Sequence[ScoreFile], as_markdown: bool = False
+) -> str:
+    """Return the skills of all methods, then a table of differences in each score; and a legend."""
     stamp = "" if comparison.comparable else " NOT COMPARABLE, compared all the same."
     test = known_test(comparison.truth_digest)
     truth = test.name if test else comparison.truth_digest[:12]
@@ -60,7 +68,22 @@ def text_report(comparison: Comparison, as_markdown: bool = False) -> str:
     notes = [*_legend(comparison), *(f"note: {note}" for note in comparison.notes)]
     write = to_markdown if as_markdown else to_text
     tables = [_text_table(comparison.reference, group) for group in _by_score(comparison)]
-    return write(title, tables, notes)
+    return write(title, [skills_table(files), *tables], notes)
+
+
+def skills_table(files: Sequence[ScoreFile]) -> Table:
+    """Return a row for each main score, with a column of each method's skill, and the floor.
+
+    Scores without a skill are shown themselves.
+    """
+    rows: list[Sequence[Cell | str]] = []
+    for name in HEADLINE[files[0].task]:
+        if name in files[0].metrics:
+            has_skill = name in files[0].skills
+            cells = [(file.skills if has_skill else file.metrics).get(name) for file in files]
+            floor = floor_text(files[0], name) if has_skill else "no floor: the score itself"
+            rows.append((metric(name).title, *map(score_cell, cells), floor))
+    return make_table("Skill of each method", ("score", *labels_of(files), "floor"), rows)
 
 
 def to_json(comparison: Comparison) -> str:
@@ -179,7 +202,12 @@ def html_report(
     basis = f"Over {_size(comparison)}, truth {digest}; paired tests at 5%, corrected."
     examples = _examples(comparison, files, truth, submissions) if rooms else []
     sections = [
-        replace(headline_section(files), remarks=[basis]),
+        Section(
+            "",
+            remarks=[basis],
+            tables=[skills_table(files)],
+            notes=[f"{SKILL} {what_the_floor_is(files[0])}"],
+        ),
         Section(
             "Differences",
             tables=[_page_table(differences) for differences in _by_score(comparison)],
@@ -251,44 +279,47 @@ def _examples(
     truth: Path | None,
     submissions: Sequence[Path],
 ) -> Lists:
-    """Return the scenes in which the first method with a file at hand gains and loses most.
+    """Return the scenes in which the first other method at hand gains and loses most, as all see.
 
     Raises OSError and FileFormatError where a file cannot be read or lacks a row.
     """
     name = next((d.metric for d in comparison.differences), shown_score(files[0]))
     where = truth_at_hand(files[0], truth)
     paths = [submission_at_hand(file, submissions) for file in files]
-    other = next((i for i, path in enumerate(paths) if i and path), 0)
-    first, second = paths[0], paths[other]
-    if where is None or first is None or second is None or not other:
+    there = [(files[i], path) for i, path in enumerate(paths) if path is not None]
+    if where is None or paths[0] is None or len(there) < 2:
         return []
-    reference, method = files[0], files[other]
-    orders = common_rows([reference, method])
+    reference, method = there[0][0], there[1][0]
+    orders = common_rows([file for file, _ in there])
     apart = method.items[name][orders[1]] - reference.items[name][orders[0]]
-    score, labels = metric(name), (comparison.reference, comparison.methods[other - 1])
+    names = (comparison.reference, *comparison.methods)
+    score, labels = metric(name), [names[i] for i, path in enumerate(paths) if path is not None]
     chosen = chosen_scenes(reference.clusters[orders[0]], apart, score.higher_is_better)
     lists: Lists = []
     for place, entries in chosen.items():
-        ours = room_examples(reference, where, first, orders[0][entries].tolist())
-        theirs = room_examples(method, where, second, orders[1][entries].tolist())
+        seen = [
+            room_examples(file, where, path, order[entries].tolist())
+            for (file, path), order in zip(there, orders, strict=True)
+        ]
         scenes = f"{len(entries)} scenes" if len(entries) > 1 else "1 scene"
         title = f"{scenes} by the difference in {score.title}, {_LISTS[place]}: "
         examples = [
             Example(
                 entry_name(reference, int(orders[0][entry])),
                 f"{score.title} {apart[entry]:+.4g}",
-                list(_side_by_side(a, b, labels)),
+                list(_side_by_side(views, labels)),
             )
-            for entry, a, b in zip(entries, ours, theirs, strict=True)
+            for entry, *views in zip(entries, *seen, strict=True)
         ]
         lists.append((title + f"{labels[1]} against {labels[0]}", examples))
     return lists
 
 
-def _side_by_side(a: Example, b: Example, labels: tuple[str, str]) -> Iterator[Picture]:
-    """Yield the image and true depth, then predicted depth and error of both methods."""
-    yield from a.pictures[:2]
-    for example, label in zip((a, b), labels, strict=True):
+def _side_by_side(views: Sequence[Example], labels: Sequence[str]) -> Iterator[Picture]:
+    """Yield the image and true depth, then predicted depth and error of each method."""
+    yield from views[0].pictures[:2]
+    for example, label in zip(views, labels, strict=True):
         for picture in example.pictures:
             if picture.caption in (DEPTH, ERROR):
-                yield replace(picture, caption=f"{picture.caption}, {label}")
+                what = "depth" if picture.caption == DEPTH else "error"
+                yield replace(picture, caption=f"{what}, {label}")

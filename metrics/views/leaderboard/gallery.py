@@ -10,8 +10,8 @@ import numpy as np
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import RoomPredictions, open_predictions
 from metrics.views.at_hand import submission_at_hand, truth_at_hand
-from metrics.views.examples import Example, Picture, entry_name, room_pictures
-from metrics.views.pictures import DEPTH, IMAGE, TRUE_DEPTH
+from metrics.views.examples import Example, entry_name, room_pictures
+from metrics.views.pictures import DEPTH, IMAGE, TRUE_DEPTH, Picture
 from scenegen.rooms.reader import RoomsFile
 
 SCENES = 6

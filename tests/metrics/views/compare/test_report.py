@@ -35,7 +35,7 @@ def comparison():
 
 
 def test_the_table_has_every_number_in_aligned_lines(comparison):
-    lines = text_report(comparison).splitlines()
+    lines = text_report(comparison, three_methods()).splitlines()
     assert all(line.isprintable() for line in lines)
     worse, _ = (line for line in lines if "0/10/0" in line)
     assert "+0.03000 [+0.03000, +0.03000]" in worse
@@ -63,7 +63,7 @@ def test_json_holds_every_attribute_and_no_nan(comparison):
 
 def test_what_is_not_comparable_is_stamped():
     files = [iqtt_scores("a", [1, 0] * 10), iqtt_scores("b", [1, 1] * 10, comparable=False)]
-    text = text_report(compare(files, allow_incomparable=True))
+    text = text_report(compare(files, allow_incomparable=True), files)
     assert "NOT COMPARABLE" in text.splitlines()[0]
     assert "10/0/10" in text
 
