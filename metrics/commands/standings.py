@@ -1,5 +1,6 @@
 """The `bench` commands on score files: compare methods, and rank them."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -107,6 +108,21 @@ def compare(
     show_default=True,
     help="Format of the tables.",
 )
+@click.option(
+    "--tables",
+    "shown_tables",
+    type=click.Choice(["all", "headline"]),
+    default="all",
+    show_default=True,
+    help="All tables, or the ranking of each test set alone.",
+)
+@click.option("--no-intervals", is_flag=True, help="Show the values alone.")
+@click.option("--caption", default="", help="Of the first LaTeX table [default: its test set].")
+@click.option(
+    "--label",
+    default="",
+    help=r"Of the first LaTeX table, for \ref; a number follows it for each other one.",
+)
 @click.option("--out", type=OutputPath(), help="Write to this file instead of printing.")
 @click.option(
     "--html",
@@ -129,6 +145,10 @@ def leaderboard(
     scores: tuple[str, ...],
     metrics: tuple[str, ...],
     form: str,
+    shown_tables: str,
+    no_intervals: bool,
+    caption: str,
+    label: str,
     out: str | None,
     folder: str | None,
     paper: Any,
@@ -142,9 +162,11 @@ def leaderboard(
     """
     from metrics.score_file import read_scores
     from metrics.views.leaderboard.ranking import leaderboard as rank
-    from metrics.views.table import to_latex, to_markdown
+    from metrics.views.table import to_latex, to_markdown, without_rests
     from scenegen.files.new_file import check_writable, write_text
 
+    if (caption or label) and form != "latex":
+        raise click.UsageError("--caption and --label need --format latex")
     if out is not None:
         check_writable(Path(out), overwrite)
     files = [read_scores(path) for path in scores]
@@ -156,13 +178,17 @@ def leaderboard(
         print_line(f"{folder}: {len(scores)} score files; open {Path(folder) / 'index.html'}")
         if out is None:
             return
-    tables = rank(files, metrics or None, paper=shown)
+    tables = list(rank(files, metrics or None, paper=shown, headline=shown_tables == "headline"))
+    if no_intervals:
+        tables = [without_rests(table) for table in tables]
+    if caption and tables:
+        tables[0] = replace(tables[0], title=caption)
     if form == "html":
         from metrics.views.leaderboard.site import to_html
 
         text = to_html(tables)
     else:
-        text = to_latex(tables) if form == "latex" else to_markdown("", tables)
+        text = to_latex(tables, label) if form == "latex" else to_markdown("", tables)
     if out is None:
         click.echo(text)
         return

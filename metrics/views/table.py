@@ -7,7 +7,7 @@ within its cell and does nothing else.
 import itertools
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scenegen.common.text_table import aligned, markdown, piped, printable
 
@@ -129,9 +129,25 @@ def _listed(notes: Iterable[str]) -> str:
     return "\n".join(f"- {_markdown(note)}" for note in notes)
 
 
-def to_latex(tables: Iterable[Table]) -> str:
-    """Return LaTeX tables (booktabs), after a comment that names the packages they need."""
-    text = "\n\n".join("\n".join(_latex_lines(table)) for table in tables)
+def without_rests(table: Table) -> Table:
+    """Return a table of values alone, without what follows them, such as intervals."""
+    rows = (
+        replace(row, cells=tuple(replace(cell, rest="") for cell in row.cells))
+        for row in table.rows
+    )
+    return replace(table, rows=tuple(rows))
+
+
+def to_latex(tables: Iterable[Table], label: str = "") -> str:
+    r"""Return LaTeX tables (booktabs), after a comment that names the packages they need.
+
+    Args:
+        label: of the first table, for \ref; a number follows it for each other one.
+    """
+    labels = (f"{label}-{i}" if label and i > 1 else label for i in itertools.count(1))
+    text = "\n\n".join(
+        "\n".join(_latex_lines(table, name)) for table, name in zip(tables, labels, strict=False)
+    )
     note = "" if text.isascii() else "; names are not all ASCII: XeLaTeX or LuaLaTeX shows them"
     return f"% needs \\usepackage{{booktabs,graphicx,textcomp}}{note}\n{text}"
 
@@ -142,8 +158,10 @@ def latex(text: str) -> str:
     return re.sub("-(?=-)", "-{}", escaped)  # two hyphens in a row would become a dash
 
 
-def _latex_lines(table: Table) -> Iterator[str]:
+def _latex_lines(table: Table, label: str) -> Iterator[str]:
     yield from (r"\begin{table}", r"\centering", rf"\caption{{{latex(table.title)}}}")
+    if label:
+        yield rf"\label{{{label}}}"
     yield r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
     columns = "r" * table.named_by + "l" + "c" * (len(table.head) - table.named_by - 1)
     yield from (rf"\begin{{tabular}}{{{columns}}}", r"\toprule")

@@ -321,5 +321,5 @@ def _side_by_side(views: Sequence[Example], labels: Sequence[str]) -> Iterator[P
     for example, label in zip(views, labels, strict=True):
         for picture in example.pictures:
             if picture.caption in (DEPTH, ERROR):
-                what = "depth" if picture.caption == DEPTH else "error"
-                yield replace(picture, caption=f"{what}, {label}")
+                caption = label if picture.caption == DEPTH else f"error, {label}"
+                yield replace(picture, caption=caption)

@@ -89,10 +89,19 @@ class Ranking:
 
 
 def leaderboard(
-    files: Sequence[ScoreFile], metrics: Sequence[str] | None = None, *, paper: Paper = "task"
+    files: Sequence[ScoreFile],
+    metrics: Sequence[str] | None = None,
+    *,
+    paper: Paper = "task",
+    headline: bool = False,
 ) -> tuple[Table, ...]:
-    """Return the tables of all test sets, and then those that belong to none; see `rankings`."""
+    """Return the tables of all test sets, and then those that belong to none; see `rankings`.
+
+    With `headline` it is the ranking of each test set alone.
+    """
     ranked, others = rankings(files, metrics, paper=paper)
+    if headline:
+        return tuple(ranking.tables[0] for ranking in ranked)
     tables = [table for ranking in ranked for table in (*ranking.tables, *ranking.groups)]
     return (*tables, *others)
 

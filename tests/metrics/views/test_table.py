@@ -1,6 +1,9 @@
 """One table in four formats, with texts that would like to break them."""
 
 import re
+import shutil
+import subprocess
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -17,6 +20,7 @@ from metrics.views.table import (
     to_latex,
     to_markdown,
     to_text,
+    without_rests,
 )
 from scenegen.common.text_table import printable
 
@@ -83,6 +87,20 @@ def test_latex_has_balanced_braces_and_all_its_cells(hostile):
     assert {len(re.findall(r"(?<!\\)&", row)) for row in ends} == {2}
     assert len(ends) == 1 + len(hostile.rows)
     assert tabular.count(r"\midrule") == 2, "one below the head, one before the floor"
+
+
+def test_latex_compiles(hostile, tmp_path):
+    if shutil.which("pdflatex") is None:
+        pytest.skip("no pdflatex")
+    rows = [make_row([c.value for c in row.cells]) for row in hostile.rows if str(row).isascii()]
+    tables = [replace(hostile, rows=tuple(rows), notes=()), make_table("±°↑↓≈†‡", ["a"], [["1"]])]
+    written = to_latex(map(without_rests, tables), "tab:a")
+    assert re.findall(r"\\label{(.*)}", written) == ["tab:a", "tab:a-2"]
+    packages = r"\documentclass{article}\usepackage{booktabs,graphicx,textcomp}\begin{document}"
+    (tmp_path / "t.tex").write_text(f"{packages}\n{written}\n\\end{{document}}\n")
+    command = ["pdflatex", "-halt-on-error", "-interaction=nonstopmode", "t.tex"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout[-2000:]
 
 
 def test_text_stays_within_its_lines(hostile):
