@@ -122,6 +122,7 @@ def baseline(
     overwrite: bool,
 ) -> None:
     """Write the submission of a baseline for rooms or questions."""
+    _check_task(name, data)
     if weights is not None and name not in (*REFERENCE, *TRAINED):
         raise click.UsageError(f"--weights: {name} has none")
     if train is not None and name in (*REFERENCE, *TRAINED):
@@ -155,6 +156,20 @@ def baseline(
 
                 write_room_baseline(name, data, out, train=train, **how)
     print_line(f"{out}: {method} on {data}; {score_it(out, data)}")
+
+
+def _check_task(name: str, data: str) -> None:
+    """Raise UsageError for questions given to a baseline of rooms, or rooms to one of questions."""
+    from metrics.submissions.layout import DATA_FORMATS
+    from scenegen.files.attributes import read_text
+    from scenegen.files.shards import OpenFile
+
+    task = ALL[name].partition(":")[0]
+    with OpenFile(data, "file of rooms or questions") as opened:
+        found = DATA_FORMATS.get(read_text(opened.file, "format", data) or "", task)
+    if task in ("rooms", "questions") and task != found:
+        others = ", ".join(other for other in ALL if ALL[other].startswith(f"{found}:"))
+        raise click.UsageError(f"{name} predicts {task}, and {data} holds {found}; try {others}")
 
 
 def _answer_by_cubes(data: str, out: str, how: Mapping[str, Any]) -> None:

@@ -27,6 +27,7 @@ from metrics.prediction_writer import RoomPredictionWriter
 from metrics.submissions.layout import Shown
 from scenegen.camera import pixel_directions, pixel_size, transform_points
 from scenegen.common.errors import SpecError
+from scenegen.common.names import check_choice
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
@@ -57,8 +58,7 @@ def write_cut_outs(
     Raises SpecError for an unknown name, and where training rooms are missing, not used by the
     baseline, or made with the test file's seed; else as `RoomsFile`.
     """
-    if name not in NAMES:
-        raise SpecError("baseline", repr(name), f"one of {', '.join(NAMES)}")
+    check_choice("baseline", name, NAMES)
     if (name in LEARNING) != (train is not None):
         expected = "rooms to learn from" if name in LEARNING else f"none, as {name} learns nothing"
         raise SpecError("train", "none" if train is None else train, expected)

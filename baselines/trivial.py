@@ -16,6 +16,7 @@ from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.submissions.layout import Shown
 from scenegen.common.errors import SpecError
+from scenegen.common.names import check_choice
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.rooms.reader import RoomsFile
 
@@ -44,8 +45,7 @@ def write_room_baseline(
     baseline, of another image size, or made with the test file's seed; else as `RoomsFile`.
     """
     learns = name in ("constant", "mean-depth")
-    if name not in ROOM_BASELINES:
-        raise SpecError("baseline", repr(name), f"one of {', '.join(ROOM_BASELINES)}")
+    check_choice("baseline", name, ROOM_BASELINES)
     if learns and train is None:
         expected = f"rooms to learn from, as {name} predicts their mean depth"
         hint = "such as those of: scenegen render --n 1000 --seed 1 --out train.h5"

@@ -14,7 +14,7 @@ import click
 from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import LARGEST, MOST_PROCESSES, OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
-from scenegen.command_line.paths import InputPath, OutputFolder, OutputPath
+from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder
 from scenegen.common.errors import SceneGenError
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
@@ -26,7 +26,7 @@ WEIGHTS = click.option(
 )
 SUBMISSION = click.option(
     "--out",
-    type=OutputPath(),
+    type=NewHdf5(),
     default="predictions.h5",
     show_default=True,
     help="Submission to write.",

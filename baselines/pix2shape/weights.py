@@ -14,6 +14,7 @@ from baselines.training.launch import PRECISIONS
 from baselines.training.questions import is_question_file
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
+from scenegen.common.names import check_choice
 from scenegen.common.records import LARGEST, check
 
 FOLDER = Path(__file__).with_name("files")
@@ -39,8 +40,7 @@ class Card(BaseCard):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_numbers(self, {"earlier_labels": (0, LARGEST)})
-        expected = f"one of {', '.join(PRECISIONS)}"
-        check(self.precision in PRECISIONS, "precision", self.precision, expected)
+        check_choice("precision", self.precision, PRECISIONS)
         count, classes = len(self.classes), self.settings.networks.classes
         check(count == classes, "classes", count, f"{classes}, as the networks have")
 
@@ -117,5 +117,5 @@ def open_weights(weights: str | Path) -> tuple[Pix2Shape, Card]:
         return load_weights(FOLDER / f"{text}.safetensors", METHOD)
     if Path(text).suffix != ".safetensors":
         bundled = f"or one of {', '.join(names())}" if names() else "as no weights are bundled"
-        raise SpecError("weights", repr(text), f"a .safetensors file, {bundled}")
+        check_choice("weights", text, names(), expected=f"a .safetensors file, {bundled}")
     return load_weights(text, METHOD)

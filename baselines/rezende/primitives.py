@@ -16,6 +16,7 @@ from baselines.rezende.rasteriser import Views
 from baselines.training.images import Array, channels_first
 from scenegen.camera import Camera, Vector3
 from scenegen.common.errors import SpecError
+from scenegen.common.names import check_choice
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
@@ -61,8 +62,7 @@ def render_primitives(name: str, count: int, size: int, seed: int = 0, first: in
 
     Raises SpecError for an unknown set.
     """
-    if name not in PRIMITIVE_SETS:
-        raise SpecError("set of primitives", repr(name), f"one of {', '.join(PRIMITIVE_SETS)}")
+    check_choice("set of primitives", name, PRIMITIVE_SETS)
     case = PRIMITIVE_SETS[name]
     large = FINER * size
     spec = DatasetSpec(

@@ -197,6 +197,10 @@ def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     path = Path(path)
     if path.exists() and not path.is_file() and not path.is_dir():
         raise FileFormatError(path, "a pipe or a device", "a regular file")  # it may have no end
+    if not path.exists() and path.suffix != ".safetensors":
+        found, expected = f"{str(path)!r:.60}, which is no file", "a .safetensors file of training"
+        hint = "without --weights, bundled ones are used"
+        raise FileFormatError("weights", found, expected, hint)
     with path.open("rb"):  # raises Python's own errors for a missing file or a folder
         pass
     try:

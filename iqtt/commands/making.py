@@ -16,8 +16,8 @@ from scenegen.command_line.options import Color, Range
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import (
     InputPath,
+    NewHdf5,
     OutputFolder,
-    OutputPath,
     refuse_command_inputs,
 )
 
@@ -211,7 +211,7 @@ def make_split(
 
 @click.command(epilog=f"{EXAMPLE}iqtt merge iqtt-split/iqtt-train.h5 --out iqtt-train.h5")
 @click.argument("file", type=QUESTIONS)
-@click.option("--out", type=OutputPath(), required=True, help="File to write.")
+@click.option("--out", type=NewHdf5(), required=True, help="File to write.")
 @options.OVERWRITE
 def merge(file: str, out: str, overwrite: bool) -> None:
     """Make one file of questions that were written to several."""

@@ -10,6 +10,7 @@ from typing import Any, get_args
 from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import MAX_CUBES
 from scenegen.camera import Camera, Vector3
+from scenegen.common.names import check_choice
 from scenegen.common.records import check, check_range, from_json, normalise, to_json
 from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 
@@ -109,7 +110,7 @@ class SplitSpec:
             ("distractors", self.distractors, DISTRACTORS),
             ("image dtype", self.image_dtype, IMAGE_DTYPES),
         ):
-            check(value in choices, name, repr(value), f"one of {', '.join(choices)}")
+            check_choice(name, value, choices)
         _check_within("answers", self.answers, 2, 3)
         if self.distractors == "mirror":
             check(self.answers == 3, "answers", self.answers, "3, or the distractors mirror-pair")
@@ -218,7 +219,7 @@ def preset_spec(preset: str, **settings: Any) -> SplitSpec:
 
     Raises SpecError for an unknown preset or a setting out of range.
     """
-    check(preset in PRESETS, "preset", preset, f"one of {', '.join(PRESETS)}")
+    check_choice("preset", preset, PRESETS)
     numbers = dict(PRESETS[preset])
     if "train" in settings:
         numbers["labeled"] = numbers["labeled"] * settings["train"] // numbers["train"]

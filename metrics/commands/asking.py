@@ -10,7 +10,7 @@ from iqtt.commands.models import model_options
 from scenegen.command_line.groups import EXAMPLE, UserError, needs
 from scenegen.command_line.options import OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
-from scenegen.command_line.paths import InputPath, OutputPath
+from scenegen.command_line.paths import InputPath, NewHdf5, OutputPath
 
 SERVER = "http://127.0.0.1:8000/v1"
 
@@ -45,7 +45,7 @@ SERVER = "http://127.0.0.1:8000/v1"
     show_default=True,
     help="JSON Lines of all replies. The same command goes on where it stopped.",
 )
-@click.option("--out", type=OutputPath(), help="Submission to write, for `bench score`.")
+@click.option("--out", type=NewHdf5(), help="Submission to write, for `bench score`.")
 @click.option(
     "--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file."
 )

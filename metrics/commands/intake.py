@@ -9,7 +9,7 @@ import click
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import ENCODING, OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
-from scenegen.command_line.paths import InputPath, OutputPath
+from scenegen.command_line.paths import InputPath, NewHdf5
 
 
 class Factor(click.ParamType):  # type: ignore[type-arg]
@@ -31,7 +31,7 @@ DATA = click.option(
     help="The file of rooms or questions that is predicted.",
 )  # fmt: skip
 OUT = click.option(
-    "--out", type=OutputPath(), required=True, metavar="PREDICTIONS.h5", help="File to write."
+    "--out", type=NewHdf5(), required=True, metavar="PREDICTIONS.h5", help="File to write."
 )
 METHOD = click.option("--method", help="Name of the method in tables [default: taken from files].")
 RUN = click.option("--run", "run_name", default="", help="Which training run, such as its seed.")

@@ -12,7 +12,7 @@ import click
 from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import LARGEST, OVERWRITE
 from scenegen.command_line.output import print_line
-from scenegen.command_line.paths import InputPath, OutputPath, refuse_inputs
+from scenegen.command_line.paths import InputPath, NewHdf5, OutputPath, refuse_inputs
 from scenegen.commands.viewing import host_options
 
 option = partial(click.option, show_default=True)
@@ -34,7 +34,7 @@ option = partial(click.option, show_default=True)
 @option("--contact", default="", help="Who runs the study; the first page shows it.")
 @click.option("--export", "csv_path", type=OutputPath(),
               help="Write all answers to this CSV file instead.")
-@click.option("--submission", type=OutputPath(),
+@click.option("--submission", type=NewHdf5(),
               help="Write people's answers to SPLIT as a file for `bench score` instead.")
 @option("--whose", type=click.Choice(["one", "majority"]), default="one",
         help="Of --submission: of each question the answer of one participant, drawn with --seed,"

@@ -3,7 +3,6 @@
 The names of keys are those of MoGe (Wang et al. 2025), which wraps other models by them, too.
 """
 
-import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -17,6 +16,7 @@ from metrics.measures.alignment import Alignment
 from metrics.submissions.writer import as_array
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import SceneGenError
+from scenegen.common.names import did_you_mean
 from scenegen.description.specs import MAX_PIXELS
 
 Array = NDArray[Any]
@@ -101,8 +101,7 @@ def read_output(
     chosen = key or next((name for name in KEYS if name in output), None)
     if chosen is None or chosen not in output or chosen not in KEYS:
         names = ", ".join(f"{name!r:.30}" for name in list(output)[:8]) or "none"
-        close = difflib.get_close_matches(str(next(iter(output), "")), KEYS, 1)
-        hint = f"close to {close[0]}" if close and not key else ""
+        hint = "" if key else did_you_mean(str(next(iter(output), "")), KEYS)
         wanted = _WANTED if chosen is None else f"the key {chosen!r}"
         raise OutputError("returned", f"a dict with the keys {names}", wanted, hint)
     kind, alignment = KEYS[chosen]

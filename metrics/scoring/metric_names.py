@@ -3,7 +3,6 @@
 `docs/scores.md` shows the same table, made by `markdown_table`.
 """
 
-import difflib
 import math
 import re
 from collections.abc import Iterable
@@ -11,6 +10,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from scenegen.common.errors import SceneGenError
+from scenegen.common.names import did_you_mean
 
 HEADLINE = {
     "rooms": (
@@ -357,8 +357,7 @@ def metric(name: str) -> Metric:
     if threshold is not None:
         return replace(ALL[F_SCORE], name=name, title=f"F-score at {threshold:g}")
     if name not in ALL or name == F_SCORE:
-        close = ", ".join(difflib.get_close_matches(name[:60], ALL))
-        hint = f"close to {close}" if close else ""
+        hint = did_you_mean(name, ALL)
         raise UnknownMetricError("score", f"{name!r:.60}", "a name listed in docs/scores.md", hint)
     return ALL[name]
 

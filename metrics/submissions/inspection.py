@@ -119,7 +119,8 @@ def _text(file: h5py.File, attribute: layout.Attribute) -> str | Problem | None:
     if name in ("format", "format_version") and text not in attribute.choices:
         kind = layout.DATA_FORMATS.get(text)
         what = f", a file of {kind}, not a submission" if kind else ""
-        return Problem(name, "value", repr(attribute.choices[0]), f"{text!r:.60}{what}")
+        expected = repr(attribute.choices[0]) + (", and this file after --truth" if kind else "")
+        return Problem(name, "value", expected, f"{text!r:.60}{what}")
     return text
 
 

@@ -213,7 +213,8 @@ def array_problem(
         for size, allowed in zip(shape[1:], axes, strict=True)
     )
     if array.dtype.kind not in kinds:
-        return Problem(name, "type", kind_text(column), f"type {array.dtype!s:.40}")
+        unit = ", such as millimetres / 1000" if column.unit == "scene unit" else ""
+        return Problem(name, "type", kind_text(column) + unit, f"type {array.dtype!s:.40}")
     if not fits:
         return Problem(name, "shape", shape_text(column, count, sizes), f"shape {array.shape}")
     if count not in (None, shape[0]):

@@ -79,7 +79,7 @@ def parse_json(data: bytes, most_keys: int, most_memory: int = MOST_MEMORY) -> A
         return members
 
     if data.startswith(b"\x89HDF"):
-        raise refusal("", "an HDF5 file", "JSON")
+        raise refusal("", "an HDF5 file", "JSON, as `bench score --json` makes of a submission")
     memory = memory_needed(data)
     if memory > most_memory:
         found = f"JSON that may take {memory:,} bytes of memory"

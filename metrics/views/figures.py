@@ -21,6 +21,7 @@ from metrics.submissions.reader import RoomPredictions, open_predictions
 from metrics.views.by_angle import angle_floors
 from metrics.views.plots import KINDS, LINE, kind_of
 from scenegen.common.errors import SceneGenError
+from scenegen.common.names import did_you_mean
 from scenegen.files.new_file import written_beside
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.preview import srgb_bytes
@@ -231,8 +232,11 @@ def _common(files: Sequence[ScoreFile], name: str) -> str:
         if all(candidate in file.metrics for file in files):
             return candidate
     lacking = next(file for file in files if not set(names) <= file.metrics.keys())
-    known = ", ".join(lacking.metrics)
-    raise FigureError(lacking.place, f"no score {name or names[0]}", f"one of {known}")
+    asked = name or names[0]
+    known = f"one of {', '.join(lacking.metrics)}"
+    raise FigureError(
+        lacking.place, f"no score {asked}", known, did_you_mean(asked, lacking.metrics)
+    )
 
 
 def _floor(file: ScoreFile, name: str) -> float | None:

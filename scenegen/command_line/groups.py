@@ -39,6 +39,11 @@ class PackageCommands(click.Group):
         """Return a command by name."""
         return next((command for command in self._loaded() if command.name == cmd_name), None)
 
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """Find a command; the error for an unknown one tells those that are spelled alike."""
+        self.commands = {command.name: command for command in self._loaded()}
+        return super().resolve_command(ctx, args)
+
     def main(self, *arguments: Any, **attributes: Any) -> Any:
         """Run a command with streams and signals that keep it from leaving anything half done."""
         with ended_by_signals(), robust_streams():
@@ -100,8 +105,10 @@ def _one_line_errors() -> Iterator[None]:
     try:
         yield
     except click.UsageError as error:
-        line = UserError(" ".join(error.format_message().split())).message
-        raise click.UsageError(line, error.ctx) from error
+        text = " ".join(error.format_message().split())
+        # An argument of many choices lists them twice.
+        text = re.sub(r"Invalid value for '\{[^']*\}': ", "", text) + _spelled_alike(error)
+        raise click.UsageError(UserError(text).message, error.ctx) from error
     except OSError as error:
         where = f"{error.filename}: " if error.filename else ""
         raise UserError(f"{where}{error.strerror or error}") from error
@@ -125,6 +132,17 @@ def _one_line_errors() -> Iterator[None]:
         if not isinstance(error, SceneGenError):
             raise
         raise UserError(str(error)) from error
+
+
+def _spelled_alike(error: click.UsageError) -> str:
+    """Return the choices of an option that are spelled like the wrong one, in words."""
+    from scenegen.common.names import did_you_mean
+
+    kind = getattr(getattr(error, "param", None), "type", None)
+    wrong = re.match("'(.*?)'", error.message)
+    if not isinstance(kind, click.Choice) or wrong is None:
+        return ""
+    return f" {did_you_mean(wrong[1], kind.choices).capitalize()}".rstrip()
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -11,6 +11,10 @@ from click.shell_completion import CompletionItem
 from scenegen.common.errors import SpecError
 
 Spelling = str | Path
+OTHER_FORMATS = (
+    ".png", ".jpg", ".jpeg", ".webp", ".gif", ".tif", ".tiff", ".exr", ".pdf", ".svg", ".html",
+    ".npy", ".npz", ".json", ".csv", ".txt", ".parquet", ".zip",
+)  # fmt: skip
 
 
 @dataclass
@@ -92,6 +96,17 @@ class OutputPath(_Completed):
         for path, within in paths.inputs:
             refuse_inputs([value], [path], within)
         return value
+
+
+class NewHdf5(OutputPath):
+    """An HDF5 file to write, whose name must not promise another format."""
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Refuse the ending of another format, such as .png."""
+        ending = Path(value).suffix.lower()
+        if ending in OTHER_FORMATS:
+            self.fail(f"found the ending {ending}, expected .h5: the file is HDF5", param, ctx)
+        return super().convert(value, param, ctx)
 
 
 def refuse_inputs(

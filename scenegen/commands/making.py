@@ -30,7 +30,7 @@ from scenegen.command_line.options import (
     Size,
 )
 from scenegen.command_line.output import on_scheduler, print_line, progress_bar
-from scenegen.command_line.paths import InputPath, OutputPath
+from scenegen.command_line.paths import InputPath, NewHdf5
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 SHARED = ("parquet", "webdataset")  # and of files of many
@@ -48,7 +48,7 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
     epilog=f"{EXAMPLE}scenegen render --n 1000 --preset shapenet --seed 1 --out rooms.h5"
 )
 @click.option("--n", "count", type=int, required=True, help="Number of scenes.")
-@click.option("--out", type=OutputPath(), default="rooms.h5", show_default=True,
+@click.option("--out", type=NewHdf5(), default="rooms.h5", show_default=True,
               help="File to write, or a URL such as s3://bucket/rooms.h5.")
 @click.option("--preset", default="shapes", show_default=True, shell_complete=_presets,
               help="Settings to start from, as `scenegen presets` lists them.")
@@ -237,7 +237,7 @@ def _told_how_to_go_on(out: str) -> Iterator[None]:
 
 @click.command(epilog=f"{EXAMPLE}scenegen merge rooms.h5 --out one.h5")
 @click.argument("file", type=InputPath())
-@click.option("--out", type=OutputPath(), required=True, help="File to write.")
+@click.option("--out", type=NewHdf5(), required=True, help="File to write.")
 @OVERWRITE
 def merge(file: str, out: str, overwrite: bool) -> None:
     """Make one file of rooms that were rendered to several."""

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
+from scenegen.common.names import check_choice
 from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
 
@@ -67,7 +68,7 @@ def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
     Raises SpecError for an unknown preset, and for settings that are out of range or contradict
     one another.
     """
-    check(preset in PRESETS, "preset", preset, f"one of {', '.join(PRESETS)}")
+    check_choice("preset", preset, PRESETS)
     chosen = {**PRESETS[preset].settings, **settings}
     if len(chosen.get("views", ())) > 1 and "object_radius" not in settings:
         low, high = chosen.get("object_radius", DatasetSpec.object_radius)

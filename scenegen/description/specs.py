@@ -8,6 +8,7 @@ import math
 from dataclasses import dataclass
 
 from scenegen.camera import Camera, Vector3
+from scenegen.common.names import check_choice
 from scenegen.common.records import check, check_range, from_json, normalise, to_json
 from scenegen.description.scenes import FAMILY_NAMES, SHAPE_NAMES
 
@@ -183,8 +184,7 @@ def _check_limits(spec: DatasetSpec) -> None:
         else:
             check(low <= value <= high, shown, value, f"from {low:g} to {high:g}")
     for name, choices in CHOICES.items():
-        value = getattr(spec, name)
-        check(value in choices, name.replace("_", " "), value, f"one of {', '.join(choices)}")
+        check_choice(name.replace("_", " "), getattr(spec, name), choices)
     for name in ("ambient", "reflectance", "room_reflectance"):
         color = getattr(spec, name)
         ok = len(color) == 3 and all(0.0 <= c <= 1.0 for c in color)
@@ -211,8 +211,9 @@ def _check_objects(spec: DatasetSpec) -> None:
     check(len(spec.shapes) > 0, what, "none", expected)
     check(len(spec.shapes) <= MAX_CLASSES, what, len(spec.shapes), f"at most {MAX_CLASSES:,}")
     for name in spec.shapes:
-        ok = name in names if names else name != "" and "/" not in name
-        check(ok, what, repr(name), expected)
+        if names:
+            check_choice(what, name, names, expected=expected)
+        check(name != "" and "/" not in name, what, repr(name), expected)
     check(len(set(spec.shapes)) == len(spec.shapes), what, spec.shapes, "each name once")
     if spec.source == "shapes":
         check(spec.object_split == "all", "object split", spec.object_split, "'all' for shapes")

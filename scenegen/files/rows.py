@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError
-from scenegen.common.records import check
+from scenegen.common.names import check_choice
 from scenegen.files.attributes import read_digest
 from scenegen.files.content import (
     CONTENT_DIGEST,
@@ -91,7 +91,7 @@ class RowFile:
 
     def check_field(self, name: str) -> None:
         """Raise SpecError unless `read` takes this name."""
-        check(name in self._stored, "field", repr(name), f"one of {', '.join(self.fields)}")
+        check_choice("field", name, self._stored, expected=f"one of {', '.join(self.fields)}")
 
     def read(self, name: str, rows: int | slice) -> Any:
         """Read rows of one column, as stored; all values are within the column's range.

@@ -19,6 +19,7 @@ from isal import isal_zlib
 from numpy.typing import NDArray
 
 from scenegen.common.errors import SpecError
+from scenegen.common.names import check_choice
 from scenegen.files.content import SHA256, ColumnDigest, row_digest
 from scenegen.files.schema import Column, name_axes
 from scenegen.files.workers import processors
@@ -61,9 +62,7 @@ class Table:
 
         Raises SpecError for an unknown compression or a negative count.
         """
-        if compression not in COMPRESSIONS:
-            known = f"one of {', '.join(COMPRESSIONS)}"
-            raise SpecError("compression", repr(compression), known)
+        check_choice("compression", compression, COMPRESSIONS)
         if count < 0:
             raise SpecError("count", count, "0 or more")
         self.count, self.rows, self._given = count, 0, 0

@@ -12,7 +12,7 @@ from functools import cache
 
 import numpy as np
 
-from scenegen.common.errors import SpecError
+from scenegen.common.names import check_choice
 from scenegen.objects import teapot
 from scenegen.objects.basic_hulls import kept
 from scenegen.objects.exact_surfaces import FAR, Capsule, Torus, Turned, cone_of
@@ -33,8 +33,7 @@ from scenegen.objects.solids import (
 @cache
 def unit_shape(name: str) -> UnitShape:
     """Return the unit shape of that name. Raises SpecError for an unknown one."""
-    if name not in _BUILDERS:
-        raise SpecError("shape", repr(name), f"one of {', '.join(_BUILDERS)}")
+    check_choice("shape", name, _BUILDERS)
     return _BUILDERS[name]()
 
 

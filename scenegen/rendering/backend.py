@@ -18,6 +18,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from scenegen.common.errors import BackendError
+from scenegen.common.names import check_choice
 
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 LLVM_WHEEL = "karellen-llvm-core"
@@ -43,8 +44,7 @@ def select_variant(device: str) -> str:
     "auto" never picks the GPU: its bits differ from the CPU's. Raises BackendError for a device
     that is unknown or cannot be used here.
     """
-    if device not in DEVICES:
-        raise BackendError("device", repr(device), f"one of {', '.join(DEVICES)}")
+    check_choice("device", device, DEVICES, BackendError)
     if device == "cuda":
         if not _has_cuda_driver():
             raise BackendError("device cuda", "no NVIDIA driver", hint="use --device cpu")

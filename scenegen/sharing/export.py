@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from scenegen.common.names import check_choice
 from scenegen.common.records import check
 from scenegen.files.new_file import folder_written_beside
 from scenegen.files.rows import RowFile
@@ -79,8 +80,8 @@ def write_export(
         FileFormatError: a row is damaged.
     """
     count = len(table.file)
-    check(form in FORMATS, "format", repr(form), f"one of {', '.join(FORMATS)}")
-    check(encoding in ENCODINGS, "encoding", repr(encoding), f"one of {', '.join(ENCODINGS)}")
+    check_choice("format", form, FORMATS)
+    check_choice("encoding", encoding, ENCODINGS)
     check(rows_per_file >= 1, "rows per file", rows_per_file, "1 or more")
     check(count > 0, table.what, "no rows", "at least one")
     chosen = list(range(count) if rows is None else rows)

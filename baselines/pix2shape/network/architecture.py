@@ -15,6 +15,7 @@ from torch.nn import functional
 from baselines.training.checkpoint import check_numbers
 from baselines.training.processes import BatchNorm1d, BatchNorm2d
 from scenegen.common.errors import SpecError
+from scenegen.common.names import check_choice
 from scenegen.common.records import check
 
 SIZES = (32, 64, 128, 256)  # pixels a side
@@ -74,7 +75,7 @@ class NetworkSpec:
             check(self.camera, "camera", self.camera, "true, as rays are those of a known camera")
         expected = "false for networks without rays, which give no relief"
         check(self.rays or not self.bounded, "bounded", self.bounded, expected)
-        check(self.encoder in ENCODERS, "encoder", self.encoder, f"one of {', '.join(ENCODERS)}")
+        check_choice("encoder", self.encoder, ENCODERS)
         if self.encoder == "polar" and self.condition:
             found = "'polar' with a camera or classes that are told"
             raise SpecError("encoder", found, "'paper', or networks without them, as of questions")

@@ -6,7 +6,7 @@ from typing import Any
 
 from baselines.pix2shape.network.architecture import NetworkSpec
 from baselines.training.checkpoint import check_numbers
-from scenegen.common.errors import SpecError
+from scenegen.common.names import check_choice
 from scenegen.common.records import LARGEST, check, from_json, to_json
 
 PAPER_NETWORKS = NetworkSpec()
@@ -236,8 +236,7 @@ def model_config(name: str, /, **settings: Any) -> ModelConfig:
 
     Raises SpecError for unknown names and impossible values.
     """
-    if name not in CONFIGS:
-        raise SpecError("config", repr(name), f"one of {', '.join(CONFIGS)}")
+    check_choice("config", name, CONFIGS)
     record = json.loads(ModelConfig(**CONFIGS[name]).to_json())
     for setting, value in settings.items():
         group, dot, rest = setting.rpartition(".")

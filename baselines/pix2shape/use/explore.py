@@ -21,8 +21,8 @@ from baselines.training.images import Array, Opened
 from scenegen import open_rooms
 from scenegen.camera import Camera, look_at
 from scenegen.common.errors import SpecError
+from scenegen.common.names import check_choice
 from scenegen.common.random.seeding import Purpose, item_seed
-from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
 from scenegen.sampling.cameras import sample_cameras
 from scenegen.sampling.lights import sample_lights
@@ -54,8 +54,9 @@ def sample_sheet(
     """
     _check_camera(card)
     spec = replace(DatasetSpec.from_json(card.data), seed=seed)
-    classes = f"one of {', '.join(card.classes)}" if card.classes else "none: it knows no classes"
-    check(label is None or label in card.classes, "class", repr(label), classes)
+    if label is not None:
+        none = "" if card.classes else "none: it knows no classes"
+        check_choice("class", label, card.classes, expected=none)
     one_hot = np.zeros((count, len(card.classes)))
     for i in range(count if card.classes else 0):
         one_hot[i, i % len(card.classes) if label is None else card.classes.index(label)] = 1

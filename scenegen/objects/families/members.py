@@ -6,6 +6,7 @@ from functools import lru_cache
 import numpy as np
 
 from scenegen.common.errors import SpecError
+from scenegen.common.names import check_choice
 from scenegen.description.scenes import FAMILY_NAMES
 from scenegen.objects.families import bags, bottles, cans, caps, chairs, lamps, tables, vessels
 from scenegen.objects.families.parts.assembly import assemble
@@ -54,7 +55,6 @@ def make_member(family: str, member: int) -> UnitShape:
 
 def check_member(family: str, member: int) -> None:
     """Raise SpecError for a family that is not in FAMILY_NAMES, or a number beyond MEMBERS - 1."""
-    if family not in _BUILDERS:
-        raise SpecError("family", repr(family), f"one of {', '.join(FAMILY_NAMES)}")
+    check_choice("family", family, FAMILY_NAMES)
     if not 0 <= member < MEMBERS:
         raise SpecError(family, f"member {member}", f"0 to {MEMBERS - 1}")

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from scenegen.common.names import check_choice
 from scenegen.description.specs import SPLITS
 from scenegen.objects.meshes.errors import MeshFolderError
 
@@ -84,8 +85,7 @@ def make_listing(
         MeshFolderError: the class or split is unknown, or a class that was asked for, or every
             class, is empty, or two splits share an object.
     """
-    if split not in SPLITS:
-        raise MeshFolderError("object split", repr(split), f"one of {', '.join(SPLITS)}")
+    check_choice("object split", split, SPLITS, MeshFolderError)
     on_disk = {_valid(name): name for name in known}  # classes may be asked for by their valid name
     asked = None if asked is None else [on_disk.get(name, name) for name in asked]
     unknown = [name for name in asked or () if name not in known]

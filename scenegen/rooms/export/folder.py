@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scenegen.common.names import check_choice
 from scenegen.common.records import check
 from scenegen.files.new_file import folder_written_beside
 from scenegen.objects.catalogue import Objects
@@ -76,7 +77,7 @@ def export_folder(
         OSError: as `folder_written_beside`.
         FileFormatError: a row is damaged.
     """
-    check(form in FOLDER_FORMATS, "format", repr(form), f"one of {', '.join(FOLDER_FORMATS)}")
+    check_choice("format", form, FOLDER_FORMATS)
     chosen = list(range(len(rooms)) if rows is None else rows)
     good = len(chosen) > 0 and min(chosen) >= 0 and max(chosen) < len(rooms)
     check(good, "items", f"{len(chosen)} rows", f"rows from 0 to {len(rooms) - 1}")

@@ -8,6 +8,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
+import cli
 from scenegen.command_line.groups import PackageCommands, creation_command
 
 
@@ -68,3 +69,19 @@ def test_an_argument_with_a_nul_is_refused(check_refusal):
 def test_the_batch_is_not_recorded(monkeypatch, batch):
     monkeypatch.setattr(sys, "argv", ["/x/scenegen", *f"render{batch} --n 5".split()])
     assert creation_command("scenegen") == "scenegen render --n 5"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "alike"),
+    [
+        (["scroe"], "score"),
+        (["baseline", "nearst", "--data", "x.h5", "--out", "y.h5"], "nearest?"),
+        (["import", "--kind", "dept", "--data", "x.h5", "--out", "y.h5"], "depth?"),
+        (["score", "--ture", "x.h5"], "--truth"),
+        (["run", "m.py", "--data", "x.h5", "--out", "y.png"], ".h5"),
+    ],
+)
+def test_an_unknown_name_is_answered_with_one_that_is_like_it(arguments, alike):
+    result = CliRunner().invoke(cli.bench, arguments)
+    assert result.exit_code == 2
+    assert alike in result.stderr.splitlines()[-1]
