@@ -18,12 +18,14 @@ SOME = "render --n 4 --out x.h5 --seed 3 --size 32x48 --shapes box,teapot --comp
 TINY = ("--size", "32", "--min-visible-pixels", "3")
 # Settings that no option sets by their own name.
 # --size; --shapes, --classes and the folders; --reflectance own
-BY_OTHERS = {"height", "width", "source", "listing", "own_reflectance"}
+BY_OTHERS = {
+    "height", "width", "source", "listing", "own_reflectance", "fov_degrees", "fov_spread_degrees",
+}  # fmt: skip
 FIXED = {"camera_target"}
 NOT_SETTINGS = {
     "count", "out", "preset", "size", "classes", "shapenet_root", "objects_root", "up", "cache_dir",
     "compression", "batch", "workers", "shard_size", "scheduler", "device", "overwrite",
-    "withhold_truth",
+    "withhold_truth", "fov",
 }  # fmt: skip
 
 

@@ -20,7 +20,7 @@ RENDER_MISTAKES = [
     ("--batch 0", "batch: found 0", "1 to 4096"),
     ("--object-radius 0.5", "item 0", "objects", "smaller --object-radius"),
     ("--min-visible-pixels 1024", "item ", "1024 pixels", "--min-visible-pixels"),
-    ("--preset nosuch", "preset: found nosuch", "shapes-single", "views"),
+    ("--preset nosuch", "preset: found 'nosuch'", "shapes-single", "views"),
     ("--shininess 32", "shininess: found no specular"),
     ("--classes MUG", "classes: found 'MUG'", "mug"),
     ("--shapes box --classes mug", "--shapes beside --classes", "one of them"),
