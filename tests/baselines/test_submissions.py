@@ -29,6 +29,15 @@ QUESTIONS = (
 )  # fmt: skip
 of_rooms = pytest.mark.parametrize("name", ROOMS)
 of_questions = pytest.mark.parametrize("name", QUESTIONS)
+VARIANTS = ("pix2shape-rays", "depth-supervised-code", "siamese", "rezende, 5 labels")
+
+
+def but_variants(names: tuple[str, ...]) -> Any:
+    """Leave methods that read files as another one does to the slow tests."""
+    marked = [pytest.param(n, marks=[pytest.mark.slow] * (n in VARIANTS)) for n in names]
+    return pytest.mark.parametrize("name", marked)
+
+
 Fields = dict[str, Any]
 
 
@@ -111,7 +120,7 @@ BAD_ROOMS: dict[str, tuple[Callable[[h5py.File], Any], str]] = {
 }
 
 
-@of_rooms
+@but_variants(ROOMS)
 @pytest.mark.parametrize("bad", [*BAD_ROOMS, "size", "radiance", "no HDF5", "nothing"])
 def test_rooms_that_cannot_be_predicted_leave_what_was_there(
     name, bad, writers, turned_path, float_path, make_rooms, tmp_path
@@ -181,7 +190,7 @@ def test_questions_of_two_answers(name, writers, tmp_path):
         writers[1][name](path, out)
 
 
-@of_questions
+@but_variants(QUESTIONS)
 @pytest.mark.parametrize("bad", ["rooms", "training", "size", "image", "none", "no HDF5"])
 def test_questions_that_cannot_be_answered_leave_nothing(
     name, bad, writers, truths, train_questions, rooms_path, tmp_path

@@ -36,7 +36,10 @@ CASES: dict[str, tuple[str, str, dict[str, Any], dict[str, Any]]] = {
     "ptn, questions": ("ptn", "questions", PTN, {"labels": 2}),
     "rezende": ("rezende", "questions", REZENDE, {"labels": 2}),
 }
-each = pytest.mark.parametrize("case", CASES)
+VARIANTS = ("siamese", "code", "ptn, ids")  # which share most of their code with another case
+each = pytest.mark.parametrize(
+    "case", [pytest.param(c, marks=[pytest.mark.slow] * (c in VARIANTS)) for c in CASES]
+)
 Train = Callable[..., Path]
 
 

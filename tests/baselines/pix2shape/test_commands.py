@@ -237,7 +237,7 @@ def test_without_the_optional_packages(group, line, gone, tmp_path, monkeypatch,
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
 
-def test_without_torch_help_and_the_other_baselines_work(truths, tmp_path, check_refusal):
+def test_without_torch_the_other_baselines_work(truths, tmp_path, check_refusal):
     """In a Python that has none of the packages."""
     code = f"import sys; sys.modules.update(dict.fromkeys({PACKAGES!r})); import cli; cli."
 
@@ -245,7 +245,6 @@ def test_without_torch_help_and_the_other_baselines_work(truths, tmp_path, check
         command = [sys.executable, "-c", f"{code}{group}()", *map(str, arguments)]
         return subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
 
-    assert all(name in run("pix2shape", "--help").stdout for name in COMMANDS)
     done = run("bench", "baseline", "empty-room", "--data", truths.rooms)
     assert done.returncode == 0, done.stderr
     done = run("pix2shape", "sample")

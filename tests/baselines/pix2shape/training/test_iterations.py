@@ -69,7 +69,7 @@ def run(
 
 
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
-@pytest.mark.parametrize("case", ["rooms", "critic steps", "workers", "questions"])
+@pytest.mark.parametrize("case", ["critic steps", "workers", "questions"])
 def test_a_stop_in_the_middle_changes_nothing(case, rooms_path, train_questions, tmp_path):
     """Weights, moments and losses to the bit; nor do processes that read."""
     config = replace(TINY, decay=True)
