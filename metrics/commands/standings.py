@@ -123,6 +123,10 @@ def compare(
     default="",
     help=r"Of the first LaTeX table, for \ref; a number follows it for each other one.",
 )
+@click.option(
+    "--cards", "cards_path", type=InputPath(), metavar="CARDS.yaml",
+    help="What is known of methods: by their name trained_on, supervised, told, paper, code, date.",
+)  # fmt: skip
 @click.option("--out", type=OutputPath(), help="Write to this file instead of printing.")
 @click.option(
     "--html",
@@ -149,6 +153,7 @@ def leaderboard(
     no_intervals: bool,
     caption: str,
     label: str,
+    cards_path: str | None,
     out: str | None,
     folder: str | None,
     paper: Any,
@@ -161,6 +166,7 @@ def leaderboard(
     on its own data, stand below the methods, without a rank.
     """
     from metrics.score_file import read_scores
+    from metrics.views.leaderboard.cards import read_cards
     from metrics.views.leaderboard.ranking import leaderboard as rank
     from metrics.views.table import to_latex, to_markdown, without_rests
     from scenegen.files.new_file import check_writable, write_text
@@ -169,16 +175,18 @@ def leaderboard(
         raise click.UsageError("--caption and --label need --format latex")
     if out is not None:
         check_writable(Path(out), overwrite)
+    cards = read_cards(cards_path) if cards_path else None
     files = [read_scores(path) for path in scores]
     shown: Any = "none" if no_paper else paper
     if folder is not None:
         from metrics.views.leaderboard.site import write_site
 
-        write_site(files, folder, metrics or None, paper=shown, overwrite=overwrite)
+        write_site(files, folder, metrics or None, paper=shown, cards=cards, overwrite=overwrite)
         print_line(f"{folder}: {len(scores)} score files; open {Path(folder) / 'index.html'}")
         if out is None:
             return
-    tables = list(rank(files, metrics or None, paper=shown, headline=shown_tables == "headline"))
+    short = shown_tables == "headline"
+    tables = list(rank(files, metrics or None, paper=shown, headline=short, cards=cards))
     if no_intervals:
         tables = [without_rests(table) for table in tables]
     if caption and tables:

@@ -72,25 +72,32 @@ def html_page(
     leads: Sequence[Lead] = (),
     warnings: Sequence[str] = (),
     links: Sequence[Link] = (),
+    sortable: bool = False,
 ) -> str:
     """Return a page that asks for nothing: `leads` and `warnings` first, then the sections.
 
     A section without a title belongs to what stands first.
 
     The Content-Security-Policy of the page allows the pictures that it holds and its one style
-    sheet, by SHA-256, and no script, style, frame, form or request.
+    sheet, by SHA-256, and no other style, no script, frame, form or request. With `sortable` it
+    also allows the one script that sorts tables, by SHA-256.
     """
     style = "\n" + (_TEMPLATES / "style.css").read_text(encoding="utf-8")
-    digest = base64.b64encode(hashlib.sha256(style.encode()).digest()).decode()
+    script = "\n" + (_TEMPLATES / "sort.js").read_text(encoding="utf-8") if sortable else ""
     policy = (
-        f"default-src 'none'; style-src 'sha256-{digest}'; img-src data:;"
+        f"default-src 'none'; style-src '{_digest(style)}'; img-src data:;"
         " base-uri 'none'; form-action 'none'"
     )
+    policy += f"; script-src '{_digest(script)}'" if script else ""
     page: str = _template().render(
         title=title, sections=sections, leads=leads, warnings=warnings, links=links,
-        style=Markup(style), policy=policy,
+        style=Markup(style), policy=policy, script=Markup(script),
     )  # fmt: skip
     return page
+
+
+def _digest(text: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 
 @functools.cache

@@ -40,12 +40,14 @@ class Cell:
         rest: what follows in small letters, such as "± 0.01 [0.10, 0.15]"; or empty.
         best: whether the value is bold.
         drawing: a picture before the value on pages, as a data URL; or empty.
+        link: address that the value leads to; or empty.
     """
 
     value: str = "-"
     rest: str = ""
     best: bool = False
     drawing: str = ""
+    link: str = ""
 
     def __str__(self) -> str:
         return " ".join(filter(None, (self.value, self.rest)))

@@ -7,6 +7,7 @@ and so do floors and the paper's figures, which were measured on the authors' da
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -17,6 +18,7 @@ from metrics.scoring.records import ID_COLUMNS, Score, ScoreFile, Skill
 from metrics.views.by_angle import angle_floors
 from metrics.views.compare.compare import Comparison, compare
 from metrics.views.compare.pairing import ComparisonError
+from metrics.views.leaderboard.cards import Card, card_cells
 from metrics.views.leaderboard.floors import (
     SKILL_OF,
     floor_cells,
@@ -94,12 +96,13 @@ def leaderboard(
     *,
     paper: Paper = "task",
     headline: bool = False,
+    cards: Mapping[str, Card] | None = None,
 ) -> tuple[Table, ...]:
     """Return the tables of all test sets, and then those that belong to none; see `rankings`.
 
     With `headline` it is the ranking of each test set alone.
     """
-    ranked, others = rankings(files, metrics, paper=paper)
+    ranked, others = rankings(files, metrics, paper=paper, cards=cards)
     if headline:
         return tuple(ranking.tables[0] for ranking in ranked)
     tables = [table for ranking in ranked for table in (*ranking.tables, *ranking.groups)]
@@ -113,6 +116,7 @@ def rankings(
     paper: Paper = "task",
     tested: bool = False,
     links: Mapping[int, str] | None = None,
+    cards: Mapping[str, Card] | None = None,
 ) -> tuple[list[Ranking], list[Table]]:
     """Return what is shown of each test set, in the order of the files, and further tables.
 
@@ -129,6 +133,7 @@ def rankings(
             those of the files' tasks.
         tested: whether to compare the methods with the first one.
         links: addresses of the methods' own pages, by the id of the score file.
+        cards: what is known of methods, by their names; shown in the rankings.
 
     Raises LeaderboardError where a file is given twice or files that claim to score all of one test
     set score different rows of it, FloorError where they state different floors of it, and
@@ -153,7 +158,7 @@ def rankings(
         there = [n for n in headline if any(n in file.metrics for file in members)]
         columns = _columns(members, names or there or HEADLINE[task][:1], headline=not names)
         figures = [] if paper == "none" else _figures(members, columns)
-        ranking, used = _ranking(members, files, columns, figures, tested, links or {})
+        ranking, used = _ranking(members, files, columns, figures, tested, links or {}, cards or {})
         ranked.append(ranking)
         placed.update(used)
     others = [table] if (table := floors_table(files)) else []
@@ -221,6 +226,7 @@ def _ranking(
     figures: Sequence[Figure],
     tested: bool,
     links: Mapping[int, str],
+    cards: Mapping[str, Card],
 ) -> tuple[Ranking, list[Figure]]:
     """Return what is shown of a test set, and the figures of the paper that have found a place."""
     labels = labels_of(members)
@@ -230,12 +236,13 @@ def _ranking(
     key = next(iter(columns))
     entries = tuple(
         Entry(
-            _label(members[i], labels[i]),
+            _label(members[i], labels[i], cards.get(members[i].method, Card()).supervised),
             members[i],
             _by_key(members[i]),
             own_floors(members[i]),
             rank,
             links.get(id(members[i]), ""),
+            card_cells(cards.get(members[i].method, Card()), members[i]) if cards else {},
         )
         for i, rank in zip(order, _ranks(ranked, key), strict=True)
     )
@@ -390,19 +397,23 @@ def _group_tables(
 
 
 def _title(file: ScoreFile) -> str:
-    """Return task and truth, and the kind of the questions if all have one."""
-    task = "Rooms" if file.task == "rooms" else "3D-IQTT"
-    if file.sees_first_view_alone:
-        task += " from the first view"
-    if len(file.by_distractor) == 1:
-        task += f", {plain(*file.by_distractor)} questions"
+    """Return the test set in words: how much of what, and its name."""
     test = known_test(file.meta.truth_digest)
-    return f"{task}, {plain(test.name) if test else f'truth {file.meta.truth_digest[:12]}'}"
+    name = plain(test.name if test else Path(file.meta.truth_path).name)
+    if file.task == "iqtt":
+        kind = f" of the kind {plain(*file.by_distractor)}" if len(file.by_distractor) == 1 else ""
+        return f"Mental rotation: {len(file.ids):,} questions{kind}, {name}"
+    task = "Rooms from the first view" if file.sees_first_view_alone else "Rooms"
+    scenes, views = (len(np.unique(c)) for c in (file.clusters, file.columns["view_index"]))
+    angles = file.columns.get("view_angle_degrees", np.array([-1]))
+    span = f" from 0° to {angles.max()}°" if angles.max() > 0 else ""
+    each = f" in {views} views{span}" if views > 1 else ""
+    return f"{task}: {scenes:,} scenes{each}, {name}"
 
 
-def _label(file: ScoreFile, name: str) -> str:
+def _label(file: ScoreFile, name: str, supervised: bool) -> str:
     """Return a method's name with what has to be known about it."""
-    texts = [f"{file.runs} runs"] if file.runs > 1 else []
+    texts = ["supervised"] * supervised + [f"{file.runs} runs"] * (file.runs > 1)
     if file.alignment != "none":
         claim = metric(f"rmse_after_{file.alignment}").title.partition(", ")[2]
         texts.append(f"claims depth when {claim}")
@@ -412,13 +423,14 @@ def _label(file: ScoreFile, name: str) -> str:
 
 def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
     first = files[0]
+    truth = f", truth {first.meta.truth_digest[:12]}"
     if first.task == "rooms":
-        yield f"{len(first.ids):,} images of {len(np.unique(first.clusters)):,} scenes."
+        yield f"{len(first.ids):,} images of {len(np.unique(first.clusters)):,} scenes{truth}."
         if first.sees_first_view_alone:
             yield "These methods saw each scene's first view alone; others have their own list."
     else:
         chance = 1.0 / first.meta.counts["answers"]
-        yield f"{len(first.ids):,} questions; chance is {chance:.4f}."
+        yield f"{len(first.ids):,} questions{truth}; chance is {chance:.4f}."
     if any(file.skills for file in files):
         yield f"{SKILL} {what_the_floor_is(first)}"
     over = "shapes" if "shape" in first.items else "questions"

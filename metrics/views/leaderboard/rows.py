@@ -1,7 +1,7 @@
 """Rows of a leaderboard: methods with their ranks, then floors, then the paper's figures."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Score, ScoreFile, Skill
@@ -40,6 +40,7 @@ class Entry:
         floors: those that other methods do not share, by the keys of the columns.
         rank: its place, which methods that are not told apart share; empty for those without one.
         link: address of its own page; or empty.
+        card: cells of its card, by their heads; empty where no method has one.
     """
 
     label: str
@@ -48,6 +49,7 @@ class Entry:
     floors: Mapping[str, float]
     rank: str = ""
     link: str = ""
+    card: Mapping[str, Cell] = field(default_factory=dict)
 
 
 def build_table(
@@ -70,6 +72,7 @@ def build_table(
         ranked: whether the first column shows the ranks.
     """
     best = {key: _best(entries, key, column) for key, column in columns.items()}
+    about = tuple(dict.fromkeys(head for e in entries for head in e.card)) if ranked else ()
     rows = [
         make_row(
             [
@@ -83,6 +86,7 @@ def build_table(
                     )
                     for key in columns
                 ),
+                *(entry.card.get(head, Cell()) for head in about),
             ],
             "" if entry.file.comparable else "incomparable",
             entry.link,
@@ -90,7 +94,7 @@ def build_table(
         for entry in entries
     ]
     above = sum(bool(entry.rank) for entry in entries)
-    keys, notes = tuple(columns), list(notes)
+    keys, notes = (*columns, *about), list(notes)
     rows[above:above] = unranked_rows("floor", {k: v for k, v in floors.items() if k == line}, keys)
     rows += unranked_rows("floor", {k: v for k, v in floors.items() if k != line}, keys)
     rows += unranked_rows("reported", figures, keys)
@@ -101,7 +105,7 @@ def build_table(
     if figures:
         unit = "; it states no unit of length" if entries[0].file.task == "rooms" else ""
         notes.append(f"{REPORTED_MARK} {SOURCE}, {REPORTED}, so not ranked{unit}.")
-    head = ("#", "method", *(column.head for column in columns.values()))
+    head = ("#", "method", *(column.head for column in columns.values()), *about)
     return Table(title, head, tuple(rows), tuple(notes), named_by=1)
 
 

@@ -8,6 +8,7 @@ import itertools
 import re
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from metrics.scoring.known_tests import known_test
@@ -16,7 +17,9 @@ from metrics.scoring.records import ScoreFile
 from metrics.views.at_hand import submission_at_hand, truth_at_hand
 from metrics.views.by_angle import view_curves
 from metrics.views.compare.report import TESTS_HEAD, difference_cell, paired_cells
+from metrics.views.examples import Example
 from metrics.views.headline import answer
+from metrics.views.leaderboard.cards import Card
 from metrics.views.leaderboard.gallery import gallery
 from metrics.views.leaderboard.ranking import Paper, Ranking, rankings
 from metrics.views.page import Lead, Link, Section, html_page
@@ -28,12 +31,14 @@ from scenegen.files.new_file import folder_written_beside
 
 INDEX, GALLERY = "index.html", "gallery.html"
 REPORT = re.compile(r"report-\d+-[a-z0-9-]*\.html")
+METHODS = ("", "incomparable")  # kinds of rows
 GALLERY_TITLE = "Predicted depth of the same scenes, spread evenly over the test set"
 
 
 def to_html(tables: Sequence[Table]) -> str:
     """Return the tables of a leaderboard as one page."""
-    return html_page("Leaderboard", [Section(table.title, tables=[table]) for table in tables])
+    sections = [Section(table.title, tables=[table]) for table in tables]
+    return html_page("Leaderboard", sections, sortable=True)
 
 
 def write_site(
@@ -42,6 +47,7 @@ def write_site(
     metrics: Sequence[str] | None = None,
     *,
     paper: Paper = "task",
+    cards: Mapping[str, Card] | None = None,
     overwrite: bool = False,
 ) -> None:
     """Write index.html, gallery.html and a report of each score file to a folder.
@@ -54,19 +60,23 @@ def write_site(
     folder = Path(folder)
     names = report_names(files)
     links = {id(file): name for file, name in zip(files, names, strict=True)}
-    ranked, others = rankings(files, metrics, paper=paper, tested=True, links=links)
+    ranked, others = rankings(files, metrics, paper=paper, tested=True, links=links, cards=cards)
     old = [p.name for p in folder.glob("report-*.html") if REPORT.fullmatch(p.name)]
     with folder_written_beside(folder, {INDEX, GALLERY, *names, *old}, overwrite) as new:
-        sections = [section for ranking in ranked for section in _sections(ranking)]
+        scenes = [gallery(ranking.files, labels_of(ranking.files)) for ranking in ranked]
+        sections = [s for args in zip(ranked, scenes, strict=True) for s in _sections(*args)]
         sections += [Section(table.title, tables=[table], folded=True) for table in others]
-        gallery_sections = [_gallery_section(ranking, links) for ranking in ranked]
+        gallery_sections = [
+            _gallery_section(ranking, shown, links)
+            for ranking, shown in zip(ranked, scenes, strict=True)
+        ]
         for name, title, content in (
             (INDEX, "Leaderboard", sections),
             (GALLERY, "Gallery", gallery_sections),
         ):
             pages = ((INDEX, "Leaderboard"), (GALLERY, "Gallery"))
             navigation = [Link(address, text, address == name) for address, text in pages]
-            page = html_page(title, content, links=navigation)
+            page = html_page(title, content, links=navigation, sortable=name == INDEX)
             (new / name).write_text(page, encoding="utf-8")
         for file, name in zip(files, names, strict=True):
             (new / name).write_text(_report(file), encoding="utf-8")
@@ -86,8 +96,11 @@ def _report(file: ScoreFile) -> str:
     return html_report(file, truth or Path(file.meta.truth_path), runs, home=INDEX)
 
 
-def _sections(ranking: Ranking) -> Iterator[Section]:
-    """Yield the ranking of a test set with its curves, then folded tables."""
+def _sections(ranking: Ranking, scenes: Sequence[Example]) -> Iterator[Section]:
+    """Yield the ranking of a test set with its curves, then folded tables.
+
+    Beside each method is its depth of the first of the gallery's scenes.
+    """
     compared = [file for file in ranking.files if file.comparable]
     charts = []
     if compared and compared[0].task == "rooms":
@@ -97,7 +110,7 @@ def _sections(ranking: Ranking) -> Iterator[Section]:
         ranking.title,
         leads=[lead_of(ranking)],
         remarks=[_how_made(ranking.files[0])],
-        tables=ranking.tables,
+        tables=[_with_thumbnails(ranking, scenes[:1]), *ranking.tables[1:]],
         charts=charts,
     )
     for table in ranking.groups:
@@ -110,6 +123,17 @@ def _sections(ranking: Ranking) -> Iterator[Section]:
         against = f"method, against {ranking.comparison.reference}"
         table = make_table("Paired tests", (against, "difference", *TESTS_HEAD), rows)
         yield Section(f"Paired tests: {ranking.title}", tables=[table], folded=True)
+
+
+def _with_thumbnails(ranking: Ranking, scenes: Sequence[Example]) -> Table:
+    """Return the ranking with each method's depth of one scene before its name."""
+    urls = {picture.caption: picture.url for scene in scenes for picture in scene.pictures}
+    labels, rows = iter(labels_of(ranking.files)), []
+    for row in ranking.tables[0].rows:
+        url = urls.get(f"depth of {next(labels)}", "") if row.kind in METHODS else ""
+        first, name, *rest = row.cells
+        rows.append(replace(row, cells=(first, replace(name, drawing=url), *rest)))
+    return replace(ranking.tables[0], rows=tuple(rows))
 
 
 def lead_of(ranking: Ranking) -> Lead:
@@ -129,7 +153,9 @@ def lead_of(ranking: Ranking) -> Lead:
     return Lead(entry.label, f"{words}: {row.cells[2]} {head}", entry.link)
 
 
-def _gallery_section(ranking: Ranking, links: Mapping[int, str]) -> Section:
+def _gallery_section(
+    ranking: Ranking, scenes: Sequence[Example], links: Mapping[int, str]
+) -> Section:
     """Return the answer of each method, with a link to its report, and scenes as they see them."""
     labels = labels_of(ranking.files)
     rows = []
@@ -137,7 +163,6 @@ def _gallery_section(ranking: Ranking, links: Mapping[int, str]) -> Section:
         lead = answer(file)
         rows.append(make_row([label, lead.strong, lead.text], link=links[id(file)]))
     table = Table("", ("method", "", "of what"), tuple(rows))
-    scenes = gallery(ranking.files, labels)
     examples = [(GALLERY_TITLE, scenes)] if scenes else []
     remark = _how_made(ranking.files[0])
     return Section(ranking.title, remarks=[remark], tables=[table], examples=examples)

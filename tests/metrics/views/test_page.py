@@ -88,6 +88,20 @@ def test_folded_numbers_are_printed(visit, pages):
     assert table.is_visible()
 
 
+def test_tables_of_a_leaderboard_are_sorted_at_a_click_and_pictures_enlarged(visit, pages):
+    seen = visit(pages["ranked"].as_uri())
+    table = seen.page.locator("table").first
+    column = table.locator("tbody tr :nth-child(3) bdi")
+    table.locator("th button").nth(2).click()
+    numbers = [float(n) for n in column.all_inner_texts() if n not in ("", "-")]
+    assert numbers == sorted(numbers)
+    seen = visit(pages["rooms"].as_uri())
+    picture = seen.page.locator(".pictures label").first
+    for wide in (1280, 200):
+        picture.locator("input").click()
+        assert abs(picture.locator("img").bounding_box()["width"] - wide) < 20
+
+
 def test_links_of_a_site_lead_to_reports_and_back(visit, pages):
     seen = visit(pages["site-index"].as_uri())
     links = seen.page.locator("a").evaluate_all("all => all.map(a => a.getAttribute('href'))")

@@ -12,10 +12,12 @@ from iqtt.floors import Floor
 from metrics.score_file import Skill
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
+from metrics.views.leaderboard.cards import HEAD, read_cards
 from metrics.views.leaderboard.floors import FloorError
 from metrics.views.leaderboard.ranking import LeaderboardError, leaderboard, rankings
 from metrics.views.leaderboard.site import lead_of
 from metrics.views.paper import TABLES
+from scenegen.common.errors import SpecError
 
 
 @pytest.fixture(autouse=True)
@@ -56,7 +58,8 @@ def test_ranks_and_best_cells():
     assert best(table) == [[True, True, False], [False, True, True], [False, True, False]]
     assert table.head[2] == "Chamfer ↓ (scene unit)"
     assert rests(table)["a"][0] == "[0.1000, 0.1000]"
-    assert table.title == f"Rooms, truth {DIGEST[:12]}"
+    assert table.title == "Rooms: 2 scenes in 2 views, rooms.h5"
+    assert table.notes[0].endswith(f"truth {DIGEST[:12]}.")
 
 
 def test_higher_is_better_where_it_is():
@@ -66,7 +69,7 @@ def test_higher_is_better_where_it_is():
     floor = "floor: chance, as no probe was measured"
     assert ranks(table) == [("1", "high"), ("", floor), ("", "low")]
     assert table.head[2:] == ("IQTT accuracy: skill ↑", "IQTT accuracy ↑ (fraction)")
-    assert table.title == f"3D-IQTT, mirror questions, truth {DIGEST[:12]}"
+    assert table.title == "Mental rotation: 15 questions of the kind mirror, rooms.h5"
 
 
 def test_what_is_not_comparable_is_never_ranked_nor_best():
@@ -101,7 +104,7 @@ def test_truths_of_one_request_but_other_bits_are_not_ranked_together():
 def test_known_test_sets_bear_their_name(monkeypatch):
     known = KnownTest("rooms-test", "rooms", DIGEST, 3, "scenegen render")
     monkeypatch.setattr("metrics.scoring.known_tests.KNOWN_TESTS", (known,))
-    assert leaderboard([rooms("a")], paper="none")[0].title == "Rooms, rooms-test"
+    assert leaderboard([rooms("a")], paper="none")[0].title.endswith(", rooms-test")
 
 
 def test_files_that_claim_the_whole_test_set_must_agree_on_it():
@@ -133,6 +136,24 @@ def test_labels_tell_runs_and_claims():
     table = leaderboard([several, rooms("b")], paper="none")[0]
     rest = rests(table)["a (3 runs; claims depth when scaled and shifted)"][0]
     assert rest.startswith("± 0.002000 [")
+
+
+def test_cards_stand_beside_the_scores(tmp_path):
+    path = tmp_path / "cards.yaml"
+    path.write_text("a: {supervised: true, date: 2026-01-02, code: 'https://a.b', paper: P}\n")
+    cards = read_cards(path)
+    table = leaderboard([rooms("a"), rooms("b")], paper="none", cards=cards)[0]
+    assert table.head[-6:] == HEAD
+    assert values(table)["a (supervised)"][-6:] == [
+        *("-", "-", "the scored one", "P", "https://a.b", "2026-01-02")
+    ]
+    assert [cell.link for cell in table.rows[0].cells[-3:]] == ["", "https://a.b", ""]
+    assert values(table)["b"][-6:] == ["-", "-", "the scored one", "-", "-", "-"]
+    for text in ("a: {shoes: 3}", "a: [", "[1]", "a: &x {}\nb: *x", "[" * 5000):
+        path.write_text(text)
+        with pytest.raises(SpecError) as refusal:
+            read_cards(path)
+        assert refusal.value.where.startswith(str(path))
 
 
 def skilled(name, chamfer=0.2, **other):

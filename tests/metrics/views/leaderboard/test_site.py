@@ -39,8 +39,9 @@ def test_a_site_has_a_page_for_each_file_and_names_stay_text(files, tmp_path):
     pages = {path.name: Page(path.read_text()) for path in (tmp_path / "site").iterdir()}
     assert set(pages) == {"index.html", "gallery.html", *report_names(files)}
     assert all(re.fullmatch(r"[a-z0-9.-]+", name) for name in pages)
-    for page in pages.values():
-        assert page.tags.isdisjoint({"script", "iframe", "form"})
+    for name, page in pages.items():
+        assert page.tags.isdisjoint({"iframe", "form"})
+        assert ("script" in page.tags) == (name == "index.html")
         assert {a for a in page.addresses if not a.startswith("data:")} <= set(pages)
     assert set(report_names(files)) <= set(pages["index.html"].addresses)
     assert HOSTILE in pages["index.html"].text
@@ -132,6 +133,7 @@ def test_pictures_come_from_unchanged_files_alone(rooms_path, tmp_path, monkeypa
 
     (report,) = report_names([file])
     assert pictures(file, "gallery.html") == 6 * 3
+    assert pictures(file, "index.html") == 1
     assert pictures(file, report) == 6 * 6
     assert "preset" in (tmp_path / "site" / "index.html").read_text()
     other = replace(file, meta=replace(file.meta, truth_digest="0" * 64))
