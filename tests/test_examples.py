@@ -1,8 +1,7 @@
 """The examples that users copy run, and refuse bad input; the shipped sample has its scores."""
 
-import os
+import runpy
 import shutil
-import subprocess
 import sys
 from pathlib import Path
 
@@ -19,19 +18,27 @@ ROOT = Path(__file__).parents[1]
 EXAMPLES, SAMPLE = ROOT / "examples", ROOT / "examples" / "sample"
 
 
-def run(name, *arguments, folder):
-    command = [sys.executable, EXAMPLES / f"{name}.py", *arguments]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        command, capture_output=True, text=True, check=False, cwd=folder, env=environment
-    )
+@pytest.fixture
+def run(tmp_path, monkeypatch, capsys):
+    """Run an example inside this process; return its exit code, and what it printed."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(name, *arguments):
+        monkeypatch.setattr(sys, "argv", [name, *map(str, arguments)])
+        code = 0
+        try:
+            runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name="__main__")
+        except SystemExit as end:
+            code = end.code
+        return code, *capsys.readouterr()
+
+    return call
 
 
 @pytest.mark.parametrize("name", ["submit", "submit_iqtt"])
-def test_an_example_writes_what_can_be_scored(name, truths, tmp_path):
+def test_an_example_writes_what_can_be_scored(name, run, truths, tmp_path):
     truth = truths.rooms if name == "submit" else truths.iqtt
-    done = run(name, truth, "out.h5", folder=tmp_path)
-    assert (done.returncode, done.stdout) == (0, f"now: bench score out.h5 --truth {truth}\n")
+    assert run(name, truth, "out.h5")[:2] == (0, f"now: bench score out.h5 --truth {truth}\n")
     assert score([tmp_path / "out.h5"], truth).comparable
 
 
@@ -53,7 +60,7 @@ def test_a_model_runs_and_can_be_scored(name, kind, truths, tmp_path):
         ("submit_iqtt", "rooms", "iqtt"),
     ],
 )
-def test_a_mistake_ends_in_one_line_and_exit_code_2(name, mistake, words, truths, tmp_path):
+def test_a_mistake_ends_in_one_line_and_exit_code_2(name, mistake, words, run, truths, tmp_path):
     (tmp_path / "text.h5").write_text("mine")
     arguments = {
         "no such file": ["none.h5", "out.h5"],
@@ -61,9 +68,9 @@ def test_a_mistake_ends_in_one_line_and_exit_code_2(name, mistake, words, truths
         "not HDF5": ["text.h5", "out.h5"],
         "rooms": [truths.rooms, "out.h5"],
     }[mistake]
-    done = run(name, *arguments, folder=tmp_path)
-    assert (done.returncode, done.stdout) == (2, "")
-    (line,) = done.stderr.splitlines()
+    code, out, err = run(name, *arguments)
+    assert (code, out) == (2, "")
+    (line,) = err.splitlines()
     assert words in line
     assert [path.name for path in tmp_path.iterdir()] == ["text.h5"]
     assert (tmp_path / "text.h5").read_text() == "mine"

@@ -1,6 +1,7 @@
-"""Rooms for the metric tests: exact depth images without a renderer, and what hints say of some."""
+"""Rooms for the metric tests, what hints say of some, and questions that people answered."""
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import h5py
@@ -14,7 +15,6 @@ from metrics.submissions.reader import open_predictions
 from scenegen.camera import pixel_directions
 from scenegen.rooms.reader import RoomsFile
 
-FOV_Y_DEGREES = 20.0
 Depth = NDArray[np.float64]
 
 # The first example pays for imports and the machine may be busy.
@@ -22,64 +22,19 @@ settings.register_profile("unhurried", deadline=None)
 settings.load_profile("unhurried")
 
 
-def _rays(size: int) -> tuple[Depth, Depth, Depth]:
-    """Origin (3,), world directions (size, size, 3) with unit planar depth, camera axes (3, 3)."""
-    origin = 0.25 + 2.5 * np.array([0.6, 0.45, 0.66])
-    back = np.array([0.6, 0.45, 0.66]) / np.linalg.norm([0.6, 0.45, 0.66])
-    right = np.cross([0.0, 1.0, 0.0], back)
-    right /= np.linalg.norm(right)
-    up = np.cross(back, right)
-    step = 2.0 * np.tan(np.radians(FOV_Y_DEGREES) / 2.0) / size
-    x = (np.arange(size) + 0.5 - size / 2.0) * step
-    directions = x[None, :, None] * right - x[:, None, None] * up - back
-    return origin, directions, np.stack([right, up, back])
-
-
-def _walls(origin: Depth, directions: Depth) -> Depth:
-    """Nearest of the three faces x=0, y=0, z=0 of the unit box, NaN beyond them."""
-    best = np.full(directions.shape[:2], np.inf)
-    for axis in range(3):
-        t = -origin[axis] / directions[..., axis]
-        hit = origin + t[..., None] * directions
-        others = np.delete(hit, axis, axis=-1)
-        inside = (t > 0.0) & ((others >= 0.0) & (others <= 1.0)).all(axis=-1)
-        best = np.where(inside & (t < best), t, best)
-    return np.where(np.isfinite(best), best, np.nan)
-
-
-def _sphere(origin: Depth, directions: Depth, center: Depth, radius: float) -> Depth:
-    a = (directions**2).sum(axis=-1)
-    b = directions @ (origin - center)
-    c = ((origin - center) ** 2).sum() - radius**2
-    root = b * b - a * c
-    return np.where(root > 0.0, (-b - np.sqrt(np.maximum(root, 0.0))) / a, np.nan)
-
-
-def _box(origin: Depth, directions: Depth, low: Depth, high: Depth) -> Depth:
-    first, second = (low - origin) / directions, (high - origin) / directions
-    near = np.minimum(first, second).max(axis=-1)
-    far = np.maximum(first, second).min(axis=-1)
-    return np.where((near < far) & (near > 0.0), near, np.nan)
-
-
-def make_room_depth(seed: int, size: int) -> Depth:
-    """Planar depth (size, size) of a box corner with two spheres and two boxes, from 2.5 away."""
-    rng = np.random.default_rng(seed)
-    origin, directions, _ = _rays(size)
-    layers = [_walls(origin, directions)]
-    for _ in range(2):
-        radius = rng.uniform(0.06, 0.14)
-        center = np.append(rng.uniform(0.1, 0.5, 1), [radius, rng.uniform(0.1, 0.5)])
-        layers.append(_sphere(origin, directions, center, radius))
-        low = np.array([rng.uniform(0.0, 0.4), 0.0, rng.uniform(0.0, 0.4)])
-        layers.append(_box(origin, directions, low, low + rng.uniform(0.08, 0.25, 3)))
-    return np.fmin.reduce(layers)
-
-
 @pytest.fixture(scope="session")
-def room_depth() -> Callable[[int, int], Depth]:
-    """Depth of a room, by seed and image size."""
-    return make_room_depth
+def room_depth(
+    make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory
+) -> Callable[[int, int], Depth]:
+    """Planar depth (size, size) of a room, by seed and image size."""
+
+    @cache
+    def depth(seed: int, size: int) -> Depth:
+        path = tmp_path_factory.mktemp("depth") / "room.h5"
+        with RoomsFile(make_rooms(path, 1, height=size, width=size, seed=seed)) as rooms:
+            return rooms.read("depth", 0).astype(np.float64)
+
+    return depth
 
 
 @pytest.fixture(scope="session")

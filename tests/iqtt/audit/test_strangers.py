@@ -32,7 +32,6 @@ def faults(tmp_path: Path, *questions: Any, **more: Any) -> list[set[str]]:
 
 
 GOOD = {"reference": view(L), "answers": [view(L, OTHER), view(mirrored(L), OTHER)], "key": 0}
-BEHIND = [[0, 0, 0], [1, 0, 0], [0, 0, -1], [1, 0, -1], [0, 0, -2]]  # the last one seen from +z
 CASES = [
     (GOOD, set()),
     ({**GOOD, "key": 1}, {"wrong key"}),
