@@ -1,6 +1,7 @@
 """The page of predictions: predicted surfels beside the true ones, the worst scenes first."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from metrics.viewing.order import RowScores, sortable, worst_first
 from scenegen.camera import transform_vectors
 from scenegen.rooms.preview import normal_bytes
 from scenegen.rooms.reader import Room, RoomsFile
+from scenegen.viewing.drawing import Look
 from scenegen.viewing.geometry import ShapeOf, Surfels, has_surfel, pixel_colors, surfels_of
 from scenegen.viewing.page import (
     LAYERS,
@@ -158,13 +160,14 @@ class PredictionPage(ScenePage):
             lines["angle of normals"] = f"{angle:.1f}°"
         return lines
 
-    def start(self, room: Room) -> tuple[Array, Array]:
-        """Return where to look from and at: farther back where both are beside each other."""
-        position, target = super().start(room)
+    def start(self, room: Room) -> Look:
+        """Return how to look first: from farther back where both are beside each other."""
+        look = super().start(room)
         if self.controls["place"].value != BESIDE:
-            return position, target
-        middle = target + aside(room) / 2
-        return middle + BACK * (position - target), middle
+            return look
+        middle, width = look.target + aside(room) / 2, look.size[0] * (1 + GAP)
+        position = middle + BACK * (look.position - look.target)
+        return replace(look, position=position, target=middle, size=(width / BACK, 1 / BACK))
 
 
 def aside(room: Room) -> Array:

@@ -188,7 +188,7 @@ def render(
     seconds = time.perf_counter() - started
     megabytes = _set_bytes(out) / 1e6
     print_line(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
-    for line in source.notes():
+    for line in source.notes(spec.own_reflectance):
         print_line(line, err=True)
 
 

@@ -65,7 +65,7 @@ def check_objects(
     from scenegen.objects.meshes.check import check_models
     from scenegen.objects.meshes.folders import open_models
     from scenegen.objects.meshes.listing import shared_by_splits
-    from scenegen.objects.sources import unused_notes
+    from scenegen.objects.sources import folder_notes
 
     if json_path:
         check_writable(Path(json_path), overwrite)
@@ -76,7 +76,7 @@ def check_objects(
         records = check_models(found, cache, jobs, bar.update)
     if json_path:
         write_text(json_path, _json(found, records), overwrite)
-    for line in [*_table(found, records), *unused_notes(found)]:
+    for line in [*_table(found, records), *folder_notes(found)]:
         print_line(line)
     shared = shared_by_splits(found.splits)
     for first, second in shared:

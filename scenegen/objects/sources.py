@@ -1,6 +1,8 @@
 """Turn the command line's options on objects into `DatasetSpec` settings and a catalogue."""
 
+import re
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,13 @@ from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.meshes.shapenet import open_shapenet
 from scenegen.objects.meshes.store import MeshStore
 
+USUALLY_UP = {".stl": "z", ".glb": "y"}  # as printers and CAD have it, and as glTF demands
+COLORED = {
+    ".ply": rb"property \w+ red\b",
+    ".glb": rb'"(COLOR_0|baseColorTexture|baseColorFactor)"',
+    ".obj": rb"(?m)^v([ \t]+[-+.\deE]+){6}\s*$",
+}
+HEAD = 2**16  # bytes of a file that are searched for colours
 NOTES_SHOWN = 5  # refused models that are named after a run
 
 
@@ -34,23 +43,47 @@ class ObjectSource:
     objects: Objects | None = None
     store: MeshStore | None = None
 
-    def notes(self) -> list[str]:
-        """Return lines that name the models refused so far, and files that are not used."""
+    def notes(self, own_colors: bool = False) -> list[str]:
+        """Return lines on the models refused so far, and those of `folder_notes`."""
         problems = sorted(self.store.problems.items()) if self.store else []
         lines = [f"note: {name} was passed over: {why}" for name, why in problems[:NOTES_SHOWN]]
         if len(problems) > NOTES_SHOWN:
             more = len(problems) - NOTES_SHOWN
             lines.append(f"note: and {more} more; `scenegen check-objects` lists all")
-        return lines + (unused_notes(self.store.folder) if self.store else [])
+        return lines + (folder_notes(self.store.folder, own_colors) if self.store else [])
 
 
-def unused_notes(folder: ModelFolder) -> list[str]:
-    """Return lines that name the mesh files of a folder that are no models, if any."""
+def folder_notes(folder: ModelFolder, own_colors: bool = False) -> list[str]:
+    """Return lines on what may surprise in a folder of meshes.
+
+    They name files that are no models, formats in which another axis is usually up, and, unless
+    objects keep their own, a model with colours. Of each class the first model is looked at.
+    """
     reasons = (
         (folder.unused, "a file of the same name is used"),
         (folder.astray, "they are in no class's sub-folder"),
     )
-    return [_unused_note(files, why) for files, why in reasons if files]
+    notes = [_unused_note(files, why) for files, why in reasons if files]
+    paths = [file.path for files in folder.models.values() for file in files]
+    for suffix, up in USUALLY_UP.items():
+        count = sum(path.suffix.lower() == suffix for path in paths)
+        if count and up != folder.up and folder.kind == "folder":
+            usual = f"note: {folder.up} is up in {count} {suffix} files, where {up} usually is"
+            notes.append(f"{usual}; if objects lie on their side, use --up {up}")
+    firsts = [files[0].path for files in folder.models.values() if files]
+    colored = next(filter(_has_colors, () if own_colors else firsts), None)
+    if colored:
+        grey = f"note: {colored.name} has colours, which are not shown"
+        notes.append(f"{grey}; scenegen render --reflectance own shows them")
+    return notes
+
+
+def _has_colors(path: Path) -> bool:
+    """Return whether the beginning of a mesh file tells of colours that `meshes.colors` reads."""
+    pattern = COLORED.get(path.suffix.lower())
+    with suppress(OSError), path.open("rb") as file:
+        return pattern is not None and re.search(pattern, file.read(HEAD)) is not None
+    return False
 
 
 def _unused_note(files: Sequence[Path], why: str) -> str:

@@ -1,6 +1,7 @@
 """Arrays on a 3D page: surfels, meshes, cameras, lights, and the camera that looks at them."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from scenegen.rooms.reader import Room
 from scenegen.viewing.geometry import Mesh, Surfels
 
 if TYPE_CHECKING:
-    from viser import ViserServer
+    from viser import ClientHandle, ViserServer
 
     from scenegen.description.scenes import SceneSpec
 
@@ -20,6 +21,9 @@ OPENCV = np.diag([1.0, -1.0, -1.0])  # from its axes (y down, z forward) to thos
 FRUSTUM = 0.12  # scene units
 SHOWN, OTHER = (30, 110, 200), (150, 150, 150)  # colours of cameras
 LIGHT = 0.04  # radius, scene units
+UP = np.array([0.0, 1.0, 0.0])
+NARROW = 576  # pixels; in narrower pages viser puts its controls over the lower part
+FREE = 0.4  # of the height of such a page
 MARK, MARK_COLOR = "/mark", (220, 0, 160)
 
 
@@ -95,12 +99,31 @@ def clear_mark(server: "ViserServer") -> None:
     server.scene.remove_by_name(MARK)
 
 
-def look(server: "ViserServer", position: Array, target: Array, fov_y_degrees: float) -> None:
-    """Let all browsers, and those to come, look from a point, (3,), at a target, with y up."""
-    up, fov = np.array([0.0, 1.0, 0.0]), float(np.radians(fov_y_degrees))
-    start = server.initial_camera
-    start.position, start.look_at, start.up, start.fov = position, target, up, fov
-    for client in server.get_clients().values():
-        with client.atomic():
-            client.camera.position, client.camera.look_at = position, target
-            client.camera.up_direction, client.camera.fov = up, fov
+@dataclass(frozen=True, eq=False)
+class Look:
+    """A way to look at a scene, with y up.
+
+    Attributes:
+        position, target: points to look from and at, (3,), world.
+        size: width and height of what has to be in view, in heights of the field of view.
+    """
+
+    position: Array
+    target: Array
+    fov_y_degrees: float
+    size: tuple[float, float]
+
+
+def look(client: "ClientHandle", how: Look) -> None:
+    """Let a browser look so; with a larger field of view where its page is too narrow for that."""
+    camera = client.camera
+    free = FREE if camera.image_width < NARROW else 1.0
+    larger = max(1.0, how.size[0] / camera.aspect, how.size[1] / free)
+    half = larger * np.tan(np.radians(how.fov_y_degrees) / 2)
+    forward = how.target - how.position
+    right = np.cross(forward, UP)
+    above = np.cross(right, forward) / max(float(np.linalg.norm(right)), 1e-12)  # as long
+    with client.atomic():
+        camera.position = how.position
+        camera.look_at = how.target - (1 - free) * half * above
+        camera.up_direction, camera.fov = UP, float(2 * np.arctan(half))

@@ -2,7 +2,7 @@
 
 import html
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -29,7 +29,7 @@ from scenegen.viewing.geometry import (
 )
 
 if TYPE_CHECKING:
-    from viser import SceneClickEvent, ViserServer
+    from viser import ClientHandle, SceneClickEvent, ViserServer
 
 Array = NDArray[Any]
 ALL_VIEWS = "All views"
@@ -96,7 +96,7 @@ class ScenePage:
         self._views: dict[str, Room] = {}
         self._meshes: list[Mesh] = []
         self._reasons: list[str] = []  # why meshes are missing
-        self._looked_from: tuple[Array, Array] | None = None
+        self._looking: drawing.Look | None = None
         gui = server.gui
         self.add("scene", gui.add_slider(self.scene_label, 0, len(scenes) - 1, 1, 0))
         self.add("view", gui.add_dropdown("View", [ALL_VIEWS]))
@@ -110,6 +110,7 @@ class ScenePage:
         self.add("follow", gui.add_checkbox("Look from each new view", True, hint=hint))
         gui.add_button("Look from this view").on_click(lambda _: self._look())
         server.scene.on_click()(self._click)
+        server.on_client_connect(lambda client: self._look_again([client]))
 
     def add(self, name: str, control: Any) -> Any:
         """Draw anew whenever this control changes; return it."""
@@ -153,14 +154,12 @@ class ScenePage:
             "point": ", ".join(f"{value:.4f}" for value in point) + " (world)",
         }
 
-    def start(self, room: Room) -> tuple[Array, Array]:
-        """Return a point to look from and one to look at, (3,) each, world.
-
-        They are a view's camera, and a point before it at the median depth.
-        """
+    def start(self, room: Room) -> drawing.Look:
+        """Return how to look first: from a view's camera, at a point at the median depth."""
         position, back = room.world_from_camera[:3, 3], room.world_from_camera[:3, 2]
-        depth = room.depth[has_surfel(room.depth)]
-        return position, position - back * (float(np.median(depth)) if depth.size else 1.0)
+        depth, (height, width) = room.depth[has_surfel(room.depth)], room.depth.shape
+        target = position - back * (float(np.median(depth)) if depth.size else 1.0)
+        return drawing.Look(position, target, room.fov_y_degrees, (width / height, 1.0))
 
     def show(self) -> None:
         """Draw what the controls say."""
@@ -195,8 +194,11 @@ class ScenePage:
         missing = "".join(paragraph(f"No mesh: {reason}.") for reason in reasons)
         self._about.content = self.describe(shown) + missing
         self._clicked.content = paragraph(NOTHING_CLICKED)
-        start = self.start(shown[0])
-        if self.controls["follow"].value and not np.array_equal(start, self._looked_from or ()):
+        start, last = self.start(shown[0]), self._looking
+        same = last is not None and np.array_equal(
+            (start.position, start.target), (last.position, last.target)
+        )
+        if self.controls["follow"].value and not same:
             self._look()
 
     def _shown(self) -> list[Room]:
@@ -225,8 +227,15 @@ class ScenePage:
 
     def _look(self) -> None:
         for room in self._shown()[:1]:
-            self._looked_from = position, target = self.start(room)
-            drawing.look(self._server, position, target, room.fov_y_degrees)
+            self._looking = how = self.start(room)
+            first = self._server.initial_camera  # where "Reset view" goes
+            first.position, first.look_at, first.up = how.position, how.target, drawing.UP
+            self._look_again(self._server.get_clients().values())
+
+    def _look_again(self, clients: Iterable["ClientHandle"]) -> None:
+        if self._looking is not None:
+            for client in clients:
+                drawing.look(client, self._looking)
 
     def _click(self, event: "SceneClickEvent") -> None:
         """Mark the surfel that a click hits first, and its pixel in other clouds; describe it."""

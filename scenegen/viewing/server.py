@@ -33,6 +33,7 @@ def started(title: str, hosts: Hosts, port: int) -> Iterator["ViserServer"]:
         try:
             server.request_share_url = lambda verbose=True: None  # type: ignore[method-assign]
             server.gui.configure_theme(show_logo=False, show_share_button=False)
+            server.gui.main_panel.dock_right()  # beside the drawing, not over it
             server.scene.set_up_direction("+y")
             # Shadows of lights that the scene has not would mislead, and cost most of a frame.
             server.scene.configure_default_lights(cast_shadow=False)

@@ -1,6 +1,7 @@
 """What a browser shows of a 3D page: the pixels of a view in a screenshot, and where they are.
 
-The page is as high as SIDE, and a square image fills its middle when one looks from its camera.
+The page is as high as SIDE, and a square image fills the middle of what the controls
+leave when one looks from its camera.
 """
 
 import io
@@ -12,8 +13,9 @@ import pytest
 from PIL import Image
 
 SIDE = 400
-WIDTH = 1100
-LEFT = (WIDTH - SIDE) // 2
+WIDTH = 1400  # a warning of viser about WebGL in software is left of the view
+CONTROLS = 324  # pixels beside the drawing
+LEFT = (WIDTH - CONTROLS - SIDE) // 2
 WHITE = 245  # all channels of the background are above it
 SECONDS = 120  # that a drawing without a GPU may take on a busy machine
 SAME = 0.9  # intersection over union of two drawings of one view, at least

@@ -17,7 +17,7 @@ def test_a_broken_model_is_passed_over_and_told_of(run: Run, meshes: Path) -> No
     result = render(run, "--objects-root", meshes, count=20)
     assert result.stdout.startswith("rooms.h5: 20 images, ")
     assert len(result.stdout.splitlines()) == 1
-    (note,) = result.stderr.splitlines()
+    note, _ = result.stderr.splitlines()  # the other is on the axis of .stl files
     assert note.startswith("note: mug/broken was passed over: ")
     used = set(models_of())
     assert used == {"mug/tall", "mug/round", "bowl/ball", "bowl/cone"}

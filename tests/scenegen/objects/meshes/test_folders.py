@@ -13,6 +13,7 @@ from scenegen.objects.meshes.errors import MeshFolderError
 from scenegen.objects.meshes.folders import open_models, open_objects
 from scenegen.objects.meshes.listing import ModelFile, object_split
 from scenegen.objects.meshes.shapenet import open_shapenet
+from scenegen.objects.sources import folder_notes
 
 Make = Callable[..., Path]
 INSIDE = {1: "model.obj", 2: "models/model_normalized.obj"}
@@ -239,3 +240,24 @@ def test_files_and_folders_that_cannot_be_read(shapenet, monkeypatch):
     with pytest.raises(MeshFolderError) as refused:
         open_objects(root)
     assert "Permission denied" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "up", "own", "count"),
+    [
+        ("a.stl", b"", "y", False, 1),
+        ("a.stl", b"", "z", False, 0),
+        ("a.glb", b"", "z", False, 1),
+        ("a.glb", b'{"baseColorTexture": {}}', "y", False, 1),
+        ("a.ply", b"property uchar red\n", "y", False, 1),
+        ("a.ply", b"property uchar red\n", "y", True, 0),
+        ("a.obj", b"v 0 0 1 0.5 0.5 1e-1\n", "y", False, 1),
+        ("a.obj", b"mtllib a.mtl\nv 0 0 1\n", "y", False, 0),
+    ],
+)
+def test_notes_tell_of_axes_and_colours_that_may_surprise(make, name, content, up, own, count):
+    root = make(f"mug/{name}")
+    (root / "mug" / name).write_bytes(content)
+    notes = folder_notes(open_objects(root, up=up), own)
+    assert len(notes) == count
+    assert all(("--reflectance own" if content else "--up") in note for note in notes)
