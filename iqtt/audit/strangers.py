@@ -9,6 +9,7 @@ up, z towards the viewer; without one the shape is seen as it lies. `key` is the
 0. Without `camera_distance`, in cube edges from the middle of the shape, rays are parallel.
 """
 
+import itertools
 import json
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -26,6 +27,7 @@ from scenegen.common.errors import FileFormatError
 Array = NDArray[Any]
 SIDE = 192  # rays along each side of a picture
 SAME = 1e-3  # share of pixels that may differ in pictures that count as equal
+CORNERS = np.array(list(itertools.product((0, 1), repeat=3)))  # of a cube
 SHIFT = 1e-6  # moves rays off the edges of cubes that lie along the axes
 MOST_BYTES = 256 * 2**20
 RULES = {
@@ -254,15 +256,27 @@ def _cast(cubes: Array, rotation: Array, distance: float) -> tuple[Array, Array]
     nearest = np.full((SIDE, SIDE), np.inf)
     owner = np.full((SIDE, SIDE), -1)
     for number, corner in enumerate(low):
-        ends = (np.stack([corner, corner + 1])[:, None, None] - origins) / directions
+        seen = (corner + CORNERS) @ rotation.T
+        at = seen[:, :2] / radius
+        if np.isfinite(distance):
+            at = at * (distance / wide) / (distance - seen[:, 2:])
+        # Only rays within the box around the corners' places in the picture can meet the cube.
+        column, row = ((at * [1, -1] + 1) / 2 * SIDE).T
+        part = np.s_[_span(row), _span(column)]
+        ends = (np.stack([corner, corner + 1])[:, None, None] - origins[part]) / directions[part]
         enter, leave = ends.min(axis=0).max(axis=-1), ends.max(axis=0).min(axis=-1)
-        closer = (enter < leave) & (enter < nearest)
-        nearest[closer], owner[closer] = enter[closer], number
+        closer = (enter < leave) & (enter < nearest[part])
+        nearest[part][closer], owner[part][closer] = enter[closer], number
     hit = owner >= 0
     points = origins[hit] + nearest[hit][:, None] * directions[hit]
     depth = np.full((SIDE, SIDE), np.nan)
     depth[hit] = points @ rotation[2]
     return depth, np.bincount(owner[hit], minlength=len(cubes))
+
+
+def _span(places: Array) -> slice:
+    """Return the pixels from the first place to the last, with one more at each end."""
+    return slice(max(int(places.min()) - 1, 0), int(places.max()) + 2)
 
 
 def _equal(first: Array, other: Array) -> bool:
