@@ -8,6 +8,7 @@ import math
 import unicodedata
 from collections.abc import Iterable, Sequence
 
+NOTHING = 1e-9  # what is smaller comes from rounding
 DIGITS = 4  # significant digits of a score
 LONGEST = 60  # characters of a name
 UNNAMED = "(unnamed)"
@@ -85,7 +86,7 @@ def number(value: float, interval: Interval = (None, None)) -> str:
     low, high = interval
     half = 0.0 if low is None or high is None else (high - low) / 2
     largest = max(abs(value), half)
-    if largest == 0.0:
+    if largest < NOTHING:
         return "0"
     if not 1e-5 <= largest < 1e6:
         return f"{value:.{DIGITS}g}"
