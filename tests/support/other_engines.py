@@ -59,25 +59,20 @@ RENDER = """
 import pickle, sys
 from scenegen.rendering import renderer
 from scenegen.rendering.packing import pack
-scalar = sys.argv[1] == "True"
-if scalar:
-    renderer.select_variant = lambda device: "scalar_rgb"
+renderer.select_variant = lambda device: "scalar_rgb"
 spec, scenes = pickle.load(sys.stdin.buffer)
 truth = renderer.render(pack(spec, scenes))
-if scalar:
-    import mitsuba
-    assert mitsuba.variant() == "scalar_rgb"
-    assert "scenegen.rendering.drjit_renderer" not in sys.modules
+import mitsuba
+assert mitsuba.variant() == "scalar_rgb"
+assert "scenegen.rendering.drjit_renderer" not in sys.modules
 pickle.dump(truth, sys.stdout.buffer)
 """
 
 
-def render_elsewhere(
-    spec: DatasetSpec, scenes: list[SceneSpec], scalar: bool = False
-) -> GroundTruth:
-    """Render in a process of its own; `scalar` where no vectorised variant is ever loaded."""
+def render_by_the_fallback(spec: DatasetSpec, scenes: list[SceneSpec]) -> GroundTruth:
+    """Render in a process of its own, where no vectorised variant is ever loaded."""
     done = subprocess.run(
-        [sys.executable, "-W", "error", "-c", RENDER, str(scalar)],
+        [sys.executable, "-W", "error", "-c", RENDER],
         input=pickle.dumps((spec, scenes)),
         capture_output=True,
         check=False,

@@ -316,6 +316,9 @@ def split_of_two(tmp_path_factory):
     return folder / "split" / "iqtt-train.h5"
 
 
+@pytest.mark.parametrize(
+    "task", ["rooms", pytest.param("questions", marks=pytest.mark.slow)], indirect=True
+)
 def test_reading_in_several_processes(sets, task, tmp_path):
     script = tmp_path / "read.py"
     script.write_text(PROCESSES)

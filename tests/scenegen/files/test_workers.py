@@ -21,9 +21,9 @@ import sys, time
 from scenegen.files.workers import worker_pool
 try:
     with worker_pool(2) as pool:
-        tasks = [pool.submit(time.sleep, seconds) for seconds in (float(sys.argv[1]), 1)]
+        tasks = [pool.submit(time.sleep, seconds) for seconds in (float(sys.argv[1]), 0.1)]
         tasks[1].result()  # one process is busy now, and the other waits
-        time.sleep(1)
+        time.sleep(0.3)
         print("busy", flush=True)
         [task.result() for task in tasks]
 except KeyboardInterrupt:
@@ -55,7 +55,7 @@ def test_no_worker_outlives_a_process_that_is_killed():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
 def test_ctrl_c_is_left_to_the_process_that_started_them():
-    process = start(3)
+    process = start(1)
     os.killpg(process.pid, signal.SIGINT)
     assert process.communicate(timeout=20) == ("stopped\n", "")
 

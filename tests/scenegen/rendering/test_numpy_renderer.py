@@ -40,7 +40,10 @@ def check_against_whole_scenes(spec, scenes, objects=None):
     assert (truth.object_id > 0).mean() > 0.02
 
 
-@pytest.mark.parametrize("name", ["shapes", "shapenet", "furniture-256", "folder"])
+@pytest.mark.parametrize(
+    "name",
+    ["shapes", "shapenet", "folder", pytest.param("furniture-256", marks=pytest.mark.slow)],
+)
 def test_whole_scenes_agree_with_another_engine(name, model_folder):
     if name == "folder":
         spec, objects = folder_spec(model_folder), folder_objects(model_folder)

@@ -19,6 +19,7 @@ from scenegen.rendering.renderer import render
 
 Array = NDArray[Any]
 SPEC = replace(FAMILIES, height=96, width=128, objects=(0, 3), shadows=False)
+FEWER = replace(SPEC, height=48, width=64)
 FAR = Camera((0.0, 0.0, 4.0), (0.0, 0.0, 0.0), 35.0)
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
@@ -57,8 +58,8 @@ def soup(rng: np.random.Generator, count: int) -> Array:
 
 def cast_in_double(scene: SceneSpec, objects: Objects) -> tuple[Array, Array, Array]:
     """Return depth, object id and face normal of every pixel, from every triangle, in float64."""
-    batch = pack(SPEC, [scene], objects=objects)
-    rays = pixel_directions(SPEC.height, SPEC.width, float(batch.fov_y_degrees[0])).reshape(-1, 3)
+    batch = pack(FEWER, [scene], objects=objects)
+    rays = pixel_directions(FEWER.height, FEWER.width, float(batch.fov_y_degrees[0])).reshape(-1, 3)
     depth, ids, normal = np.full(len(rays), np.inf), np.full(len(rays), -1), np.zeros_like(rays)
     for slot, model in enumerate(batch.shape[0].tolist()):
         matrix = np.linalg.inv(batch.world_from_camera[0]) @ batch.world_from_object[0, slot]
@@ -75,17 +76,19 @@ def cast_in_double(scene: SceneSpec, objects: Objects) -> tuple[Array, Array, Ar
             nearer = nearest < depth
             depth[nearer], ids[nearer] = nearest[nearer], slot + 1
             normal[nearer] = across[t.argmin(axis=1)][nearer]
-    size = SPEC.height, SPEC.width
+    size = FEWER.height, FEWER.width
     return depth.reshape(size), ids.reshape(size), normal.reshape(*size, 3)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(
+    "seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (1, 2, 3))]
+)
 def test_hard_meshes_agree_with_all_triangles_cast_in_double_precision(seed: int) -> None:
     rng = np.random.default_rng(seed)
     objects = objects_of(a=soup(rng, 300), b=soup(rng, 6000) * 0.7)
     camera = Camera(tuple((rng.normal(size=3) * 1.5 + (0, 0, 2)).tolist()), (0.0, 0.1, 0.0), 40.0)
     scene = scene_of("ab", camera, 0.9, rng.normal(size=4))
-    truth = seen(scene, objects)
+    truth = seen(scene, objects, height=FEWER.height, width=FEWER.width)
     depth, ids, normal = cast_in_double(scene, objects)
     hit = (ids >= 0) & (truth.object_id[0] == ids)
     assert hit.mean() > 0.05

@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from model_rooms import FAMILIES
-from other_engines import render_elsewhere
+from other_engines import render_by_the_fallback
 
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering import renderer
@@ -25,11 +24,17 @@ def scenes(scenes_of):
     return scenes_of(TINY, 4)
 
 
-@pytest.mark.parametrize("spec", [TINY, GLOSSY_MODELS], ids=["shapes", "glossy models"])
+@pytest.mark.parametrize(
+    "spec",
+    [
+        pytest.param(TINY, id="shapes"),
+        pytest.param(GLOSSY_MODELS, id="glossy models", marks=pytest.mark.slow),
+    ],
+)
 def test_the_scalar_fallback_agrees_with_the_wavefront(spec, scenes_of):
     """In a process of its own, where no vectorised variant is ever loaded."""
     scenes = scenes_of(spec, 4)
-    slow, fast = render_elsewhere(spec, scenes, scalar=True), render(pack(spec, scenes))
+    slow, fast = render_by_the_fallback(spec, scenes), render(pack(spec, scenes))
     for name in fast.pixels():
         ours, theirs = getattr(fast, name), getattr(slow, name)
         assert (ours.shape, ours.dtype) == (theirs.shape, theirs.dtype)
@@ -58,9 +63,3 @@ def test_without_llvm_the_work_is_done_when_fetched(monkeypatch, scenes):
     assert made == []
     assert fetch().image is truth.image
     assert made == [batch]
-
-
-def test_another_process_gives_the_same_bits(scenes):
-    there, here = render_elsewhere(TINY, scenes), render(pack(TINY, scenes))
-    for name in here.pixels():
-        np.testing.assert_array_equal(getattr(there, name), getattr(here, name))

@@ -68,7 +68,7 @@ def test_no_ray_slips_through_basic_shapes_and_without_overlap_some_do(variant, 
     assert min(count(unit.unit_scene.__wrapped__)) > 30
 
 
-@pytest.mark.parametrize("names", [BASIC, MODELS], ids=["basic", "families"])
+@pytest.mark.parametrize("names", [MODELS, pytest.param(BASIC, marks=pytest.mark.slow)])
 def test_no_ray_slips_through_models_and_without_overlap_some_do(
     names, variant, models, monkeypatch
 ):

@@ -90,7 +90,7 @@ def test_image_types_agree(make_rooms, tmp_path):
     np.testing.assert_array_equal(images["float16"], exact.astype(np.float16))
 
 
-@pytest.mark.parametrize(("height", "width"), [(8, 8), (9, 11), (37, 31), (33, 8)])
+@pytest.mark.parametrize(("height", "width"), [(9, 11), (33, 8)])
 def test_odd_sizes(tmp_path, height, width):
     """No number of pixels has to be a multiple of anything."""
     spec = DatasetSpec(
@@ -105,6 +105,7 @@ def test_odd_sizes(tmp_path, height, width):
             assert np.abs(points).min(axis=1).max() < 1e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("height", "width"), [(48, 64), (64, 48)])
 def test_defaults_can_be_placed_in_images_that_are_not_square(make_rooms, tmp_path, height, width):
     with open_rooms(make_rooms(tmp_path / "x.h5", 60, height=height, width=width)) as rooms:
@@ -114,11 +115,11 @@ def test_defaults_can_be_placed_in_images_that_are_not_square(make_rooms, tmp_pa
 def test_retries_keep_the_order_and_do_not_depend_on_batches(tmp_path):
     spec = DatasetSpec(height=32, width=32, min_visible_pixels=45, seed=5)
     easy = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=5)
-    for batch in (1, 2, 5, 64):
+    for batch in (1, 5, 64):
         make_dataset(tmp_path / f"{batch}", spec, 12, batch=batch, command="tests")
     make_dataset(tmp_path / "easy", easy, 12, command="tests")
-    files = [(tmp_path / f"{batch}").read_bytes() for batch in (1, 2, 5, 64)]
-    assert files[0] == files[1] == files[2] == files[3]
+    files = [(tmp_path / f"{batch}").read_bytes() for batch in (1, 5, 64)]
+    assert files[0] == files[1] == files[2]
     strict, relaxed = contents(tmp_path / "1")[0], contents(tmp_path / "easy")[0]
     np.testing.assert_array_equal(strict["scene_index"], np.arange(12))
     visible = strict["object/visible_pixels"]
@@ -130,10 +131,10 @@ def test_retries_keep_the_order_and_do_not_depend_on_batches(tmp_path):
         np.testing.assert_array_equal(strict[name], relaxed[name], err_msg=name)
 
 
-@pytest.mark.parametrize("kind", ["family", "folder"])
+@pytest.mark.parametrize("kind", ["folder", pytest.param("family", marks=pytest.mark.slow)])
 def test_worker_processes_never_change_a_byte(tmp_path, monkeypatch, kind):
     """Nor do they forget which models were refused."""
-    monkeypatch.setattr(rendering, "BLOCK", 16)
+    monkeypatch.setattr(rendering, "BLOCK", 8)
     how = {"height": 32, "width": 32, "min_visible_pixels": 20, "seed": 5}
     how |= {"source": "families", "shapes": ("mug", "bowl")} if kind == "family" else {}
     found = []
@@ -145,7 +146,7 @@ def test_worker_processes_never_change_a_byte(tmp_path, monkeypatch, kind):
             source = object_source("shapes", **where)
             objects, spec = source.objects, DatasetSpec(**how, **source.settings)
         path = tmp_path / f"{workers}.h5"
-        make_dataset(path, spec, 40, workers=workers, objects=objects, command="tests")
+        make_dataset(path, spec, 20, workers=workers, objects=objects, command="tests")
         found.append((path.read_bytes(), objects.problems if objects else {}))
     assert found[0] == found[1]
     assert (set(found[0][1]) == {"odd/bad"}) == (kind == "folder")

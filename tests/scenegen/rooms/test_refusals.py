@@ -137,13 +137,10 @@ def test_a_file_that_was_cut_is_not_kept_open(tmp_path, rooms_path, part):
 
 # Edits of row 5: words of the error of whoever reads it, and a check of verify that fails.
 DAMAGED_ROWS = {
-    **{
-        f"chunk of {name}": (damaged_chunk(name, 5), name, name)
-        for name in ("image", "depth", "normal", "object_id")
-    },
+    **{f"chunk of {name}": (damaged_chunk(name, 5), name, name) for name in ("image", "depth")},
     **{
         f"scene {text[:9]!r}": (put("scene", 5, text), "scene", "description")
-        for text in ("{", "", "null", "{}", '"x"', "[1]", b"\xff\xfe", '{"index":5}', "[" * 9000)
+        for text in ("{", "null", b"\xff\xfe", '{"index":5}', "[" * 9000)
     },
 }
 

@@ -34,6 +34,7 @@ def croissant(made):
     return faultless_croissant(made / "croissant.json")
 
 
+@pytest.mark.slow
 def test_the_validator_accepts_it(made, tmp_path):
     done = validate(made / "croissant.json")
     assert done.returncode == 0, done.stderr

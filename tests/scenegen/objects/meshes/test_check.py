@@ -97,7 +97,7 @@ def test_a_shapenet_model_without_a_file_is_refused(run, root, tmp_path, inside)
 def test_jobs_give_what_one_gives(root, tmp_path):
     folder, ticks = open_objects(root), []
     alone = check_models(folder, None, 1, ticks.append)
-    together = check_models(folder, tmp_path / "cache", 3, ticks.append)
+    together = check_models(folder, tmp_path / "cache", 2, ticks.append)
     assert ticks == [1] * 14
     assert [replace(r, seconds=0) for r in alone] == [replace(r, seconds=0) for r in together]
     assert [r.name for r in alone] == [f.name for c in folder.classes for f in folder.models[c]]
@@ -143,7 +143,7 @@ def test_a_model_that_crashes_its_process_is_refused_alone(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="uses Linux system calls")
-@pytest.mark.parametrize("jobs", ["1", "2"])
+@pytest.mark.parametrize("jobs", ["1", pytest.param("2", marks=pytest.mark.slow)])
 def test_an_unreadable_file_is_refused_and_a_locked_cache_costs_one_warning(root, jobs):
     """Root gives up its rights over files, so that this tests something for root too."""
     (root / "box" / "a.off").chmod(0)

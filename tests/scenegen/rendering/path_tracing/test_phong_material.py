@@ -82,8 +82,14 @@ def test_under_a_point_light_it_is_the_shading_equation(material, phong_material
             np.testing.assert_allclose(np.pi * found, expected, rtol=2e-4, atol=1e-6)
 
 
-@pytest.mark.parametrize("angle", INCIDENT)
-@pytest.mark.parametrize("material", MATERIALS, ids=str)
+@pytest.mark.parametrize(
+    ("material", "angle"),
+    [
+        pytest.param(material, angle, marks=[] if i == k else pytest.mark.slow)
+        for i, material in enumerate(MATERIALS)
+        for k, angle in enumerate(INCIDENT)
+    ],
+)
 def test_directions_come_as_often_as_their_density_says(material, angle, phong_material):
     """Chi-square over 24 x 16 cells above the surface, and one for those lost below it."""
     bsdf = phong_material.phong_bsdf(RHO, *material)

@@ -40,7 +40,7 @@ def unit_rays(radius, seed):
     return start.astype(np.float32).astype(float), u.astype(np.float32).astype(float)
 
 
-@pytest.mark.parametrize("radius", [1.0001, 0.3, 0.05], ids=["outside", "inside", "center"])
+@pytest.mark.parametrize("radius", [1.0001, 0.3, pytest.param(0.05, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("name", EXACT)
 def test_hits_are_exact_to_a_millionth(name, radius, variant):
     surface = unit_shape(name).surface

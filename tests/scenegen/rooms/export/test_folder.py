@@ -18,6 +18,7 @@ from scenegen.rooms.export.folder import CONVENTIONS, FOLDER_FORMATS, export_fol
 from tests.support.loaders import check_srgb
 
 ROWS = [0, 1, 5, 3, 2]  # both views of scenes 0 and 1, one of scene 2
+FLAT = ("box", "pyramid", "octahedron")  # whose meshes are small
 STEP = 1e-4  # scene units of a depth
 
 
@@ -27,7 +28,7 @@ def path(make_rooms, tmp_path_factory):
     folder = tmp_path_factory.mktemp("views")
     size = {"height": 40, "width": 32, "min_visible_pixels": 5}
     return make_rooms(folder / "x.h5", 4, seed=8, views=(0.0, 35.0), fov_degrees=60.0,
-                      objects=(2, 3), random_reflectance=True, **size)  # fmt: skip
+                      objects=(2, 3), random_reflectance=True, shapes=FLAT, **size)  # fmt: skip
 
 
 @pytest.fixture(scope="module")
