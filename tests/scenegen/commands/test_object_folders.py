@@ -26,15 +26,13 @@ def test_a_broken_model_is_passed_over_and_told_of(run: Run, meshes: Path) -> No
 def test_the_same_bytes_with_and_without_the_cache_and_in_any_batch(run: Run, meshes: Path) -> None:
     for name, options in (
         ("a", ()),
-        ("b", ("--batch", 1)),
-        ("c", ("--cache-dir", "other", "--batch", 5)),
+        ("b", ("--cache-dir", "other", "--batch", 1)),
     ):
-        result = run("render", "--n", 9, *SMALL, "--objects-root", meshes, *options, "--out", name)
+        result = run("render", "--n", 6, *SMALL, "--objects-root", meshes, *options, "--out", name)
         assert result.exit_code == 0, result.output
-    with h5py.File("a") as a, h5py.File("b") as b, h5py.File("c") as c:
+    with h5py.File("a") as a, h5py.File("b") as b:
         for name in ("image", "depth", "normal", "object_id", "scene"):
-            for other in (b, c):
-                np.testing.assert_array_equal(a[name][:], other[name][:])
+            np.testing.assert_array_equal(a[name][:], b[name][:])
 
 
 def test_a_folder_with_nothing_usable_is_refused(refuses: Callable[..., str], meshes: Path) -> None:
@@ -81,7 +79,7 @@ def test_scenes_of_models_may_be_without_objects(
     assert verdict("rooms.h5", "--objects-root", meshes, "--cache-dir", "cache")[0] == 0
 
 
-@pytest.mark.parametrize("options", ["--objects 2", "--objects 0", "--objects 0-1 --batch 1"])
+@pytest.mark.parametrize("options", ["--objects 0", "--objects 0-1 --batch 1"])
 def test_built_in_families_need_no_folder(run: Run, verdict: Any, options: str) -> None:
     render(run, "--preset", "shapenet", *options.split(), count=3)
     assert verdict("rooms.h5")[0] == 0
@@ -90,11 +88,8 @@ def test_built_in_families_need_no_folder(run: Run, verdict: Any, options: str) 
     assert run("export", "rooms.h5", "--items", 0, "--format", "obj").exit_code == 0
 
 
-@pytest.mark.parametrize("views", ["0", "0,40"])
-def test_a_file_is_verified_with_its_folder(
-    run: Run, verdict: Any, meshes: Path, views: str
-) -> None:
-    render(run, "--objects-root", meshes, "--views", views, count=4)
+def test_a_file_is_verified_with_its_folder(run: Run, verdict: Any, meshes: Path) -> None:
+    render(run, "--objects-root", meshes, "--views", "0,40", count=3)
     folder = ("--objects-root", meshes, "--cache-dir", "cache")
     code, checks, output = verdict("rooms.h5", *folder)
     assert code == 0, output
@@ -121,7 +116,7 @@ def test_with_another_folder_or_none_it_is_refused(
     refuses("verify", "rooms.h5", "--objects-root", other, *cache, words=("mug",))
 
 
-@pytest.mark.parametrize("how", ["other", "broken", "gone"])
+@pytest.mark.parametrize("how", ["other", "broken"])
 def test_a_model_that_changed_since_is_found(
     run: Run, verdict: Any, meshes: Path, how: str
 ) -> None:
@@ -131,10 +126,8 @@ def test_a_model_that_changed_since_is_found(
     assert "mug/tall" in models_of()
     if how == "other":
         trimesh.creation.box((1, 1, 1)).export(path)
-    elif how == "broken":
-        path.write_text("v 1 2 3")
     else:
-        path.write_bytes(b"")
+        path.write_text("v 1 2 3")
     code, checks, output = verdict("rooms.h5", "--objects-root", meshes, "--cache-dir", "cache")
     assert code == 1, output
     failed = {name for name, word in checks.items() if word == "FAIL"}
@@ -177,13 +170,10 @@ def test_a_folder_whose_files_have_changed_is_noticed(run: Run, meshes: Path) ->
     assert "made from other files than the folder's" in verified.stdout
 
 
-@pytest.mark.parametrize("command", ["verify", "export --items 0 --format obj",
-                                     "export --items 0 --format exr"])  # fmt: skip
 def test_folder_options_that_contradict_one_another_are_refused(
-    run: Run, refuses: Callable[..., str], meshes: Path, shapenet: Path, command: str
+    run: Run, refuses: Callable[..., str], meshes: Path, shapenet: Path
 ) -> None:
     """As `render` refuses them; the file itself could be read with the first option alone."""
-    name, *options = command.split()
     for root, more, words in (
         (("--shapenet-root", shapenet), ("--up", "z"), ("up: found 'z'", "--shapenet-root")),
         (("--shapenet-root", shapenet), ("--objects-root", meshes), ("expected one of them",)),
@@ -191,5 +181,8 @@ def test_folder_options_that_contradict_one_another_are_refused(
         ((), ("--up", "z"), ("up: found 'z'", "--objects-root")),
     ):
         render(run, *(root or ("--objects-root", meshes)), "--overwrite", count=1)
-        told = (*root, "--cache-dir", "cache")
-        refuses(name, "rooms.h5", *options, *told, *more, words=words)
+        options = (*root, "--cache-dir", "cache", *more)
+        refuses("verify", "rooms.h5", *options, words=words)
+        for form in ("obj", "exr"):
+            how = ("--items", 0, "--format", form)
+            refuses("export", "rooms.h5", *how, *options, words=words)

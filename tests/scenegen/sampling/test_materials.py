@@ -9,14 +9,14 @@ import pytest
 from scipy.stats import kstest
 
 from scenegen.description.specs import DatasetSpec
-from scenegen.sampling.scenes import sample_scene
+from scenegen.sampling.scenes import sample_scene, sample_scenes
 
 SPARSE = DatasetSpec(objects=(1, 4), object_radius=(0.03, 0.04), seed=6)
 
 
 def scenes(spec, count):
-    found = [sample_scene(spec, index) for index in range(count)]
-    return [scene for scene in found if scene is not None]
+    _, found = sample_scenes(spec, range(count), [0] * count)
+    return [found.scene(row) for row in range(len(found))]
 
 
 @pytest.mark.parametrize(
