@@ -61,6 +61,7 @@ TARGETS = {
         "iqtt card iqtt --creator A --date 2026-01-31 --out new",
         "iqtt export iqtt/iqtt-train.h5 --part labeled --format parquet --out new",
         "iqtt export released.h5 --format webdataset --out new",
+        "iqtt verify iqtt --items 0",
         "iqtt audit iqtt --json new.json",
         "iqtt audit released.h5",
     ),
