@@ -30,9 +30,9 @@ from scenegen.command_line.output import print_line
 from scenegen.command_line.paths import InputPath, OutputFolder
 
 UNTRAINED = {
-    "constant": "one depth everywhere, the mean of the training rooms",
-    "mean-depth": "the mean depth of the training rooms at each pixel",
-    "empty-room": "the room's walls and floor, which it is told; no objects",
+    "constant": "rooms: one depth everywhere, the mean of the training rooms",
+    "mean-depth": "rooms: the mean depth of the training rooms at each pixel",
+    "empty-room": "rooms: the room's walls and floor, which it is told; no objects",
     "cut-out": "rooms: true masks, flat, at each object's true distance",
     "picture-outline": "rooms: a mask from the picture, lifted by one constant",
     "balls": "rooms: a ball for each blob of that mask in the first view",
@@ -40,7 +40,7 @@ UNTRAINED = {
     "outline-relief": "rooms: that mask, lifted by trees, from --train",
     "nearest": "rooms: the relief of the most similar picture of --train",
     "oracle": "the truth itself, which must score perfectly",
-    "chance": "random answers to questions",
+    "chance": "questions: random answers",
     "cubes": "questions: pictures decoded to cubes in 3D; nothing is learned",
     "outline": "questions: the nearest outline, without labels or 3D",
     "outline-trees": "questions: trees on outline features, from --train",

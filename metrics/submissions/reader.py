@@ -282,7 +282,7 @@ def inspect_predictions(
     else:
         if not tried:
             trial.try_file(path)
-        file = open_unchecked(path, "submission")
+        file = open_unchecked(path, "submission; `bench import` makes one of other files")
         with checking(file):
             content = inspect(file)
     opened: RoomPredictions | QuestionPredictions | None = None

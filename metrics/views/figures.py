@@ -233,9 +233,9 @@ def _common(files: Sequence[ScoreFile], name: str) -> str:
             return candidate
     lacking = next(file for file in files if not set(names) <= file.metrics.keys())
     asked = name or names[0]
-    known = f"one of {', '.join(lacking.metrics)}"
+    hint = did_you_mean(asked, lacking.metrics)
     raise FigureError(
-        lacking.place, f"no score {asked}", known, did_you_mean(asked, lacking.metrics)
+        lacking.place, f"no score {asked}", "one that `bench score --all` prints", hint
     )
 
 

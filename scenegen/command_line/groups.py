@@ -39,6 +39,12 @@ class PackageCommands(click.Group):
         """Return a command by name."""
         return next((command for command in self._loaded() if command.name == cmd_name), None)
 
+    def format_commands(self, _ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the first sentence of each command's help, whole."""
+        with formatter.section("Commands"):
+            rows = [(command.name, command.get_short_help_str(400)) for command in self._loaded()]
+            formatter.write_dl(rows)
+
     def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
         """Find a command; the error for an unknown one tells those that are spelled alike."""
         self.commands = {command.name: command for command in self._loaded()}

@@ -101,7 +101,8 @@ def open_unchecked(path: str | Path, kind: str) -> h5py.File:
         return h5py.File(path, "r")
     except OSError as error:
         _raise_if_of_system(error, path)
-        raise FileFormatError(f"{path}: not a readable HDF5 file ({reason(error)})") from error
+        problem = f"{path}: not a readable HDF5 file ({reason(error)})"
+        raise FileFormatError(problem, hint=f"name a {kind}") from error
 
 
 @contextmanager

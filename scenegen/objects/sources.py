@@ -81,8 +81,10 @@ def folder_notes(folder: ModelFolder, own_colors: bool = False) -> list[str]:
 def _has_colors(path: Path) -> bool:
     """Return whether the beginning of a mesh file tells of colours that `meshes.colors` reads."""
     pattern = COLORED.get(path.suffix.lower())
-    with suppress(OSError), path.open("rb") as file:
-        return pattern is not None and re.search(pattern, file.read(HEAD)) is not None
+    with suppress(OSError):
+        if pattern is not None and path.is_file():  # a pipe may have no end
+            with path.open("rb") as file:
+                return re.search(pattern, file.read(HEAD)) is not None
     return False
 
 

@@ -133,3 +133,14 @@ def test_a_mistake_is_one_line_and_leaves_nothing(line, words, folder, check_ref
     result = bench(*line.split())
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
     assert files_in(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("name", "data", "other"),
+    [("chance", "rooms.h5", "nearest"), ("empty-room", "iqtt-test.h5", "outline")],
+)
+def test_data_of_the_other_task_is_answered_with_baselines_of_it(name, data, other, folder):
+    refused = bench("baseline", name, "--data", data, "--out", "x.h5")
+    assert refused.exit_code == 2
+    assert other in refused.stderr.splitlines()[-1]
+    assert not (folder / "x.h5").exists()

@@ -85,3 +85,7 @@ def test_an_unknown_name_is_answered_with_one_that_is_like_it(arguments, alike):
     result = CliRunner().invoke(cli.bench, arguments)
     assert result.exit_code == 2
     assert alike in result.stderr.splitlines()[-1]
+
+
+def test_the_help_of_a_group_is_in_whole_sentences():
+    assert "..." not in CliRunner().invoke(cli.bench, ["--help"]).stdout.partition("Commands:")[2]
