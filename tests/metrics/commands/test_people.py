@@ -143,7 +143,7 @@ def test_without_scripts_the_quiz_works(visit, quiz_split, tmp_path):
     with running(quiz_split, tmp_path / "a.db", 2) as site:
         page = visit(f"http://localhost:{site.port}/", java_script_enabled=False).page
         page.check("#consent")
-        for name in ("Start", "Answer 2", "Answer 2"):
+        for name in ("Start", "Answer B", "Answer B"):
             with page.expect_navigation():
                 page.click(f"text={name}")
         assert page.title().startswith("Your score")

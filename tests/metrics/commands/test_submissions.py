@@ -187,7 +187,7 @@ def test_score_gives_the_hints_of_validate_and_never_a_floor_of_zero(truths, fol
     ):
         for row, room in enumerate(rooms):
             out.add(row, 1000 * room.depth)
-    scored = bench("score", "mm.h5", "--truth", truths.rooms)
+    scored = bench("score", "mm.h5", "--truth", truths.rooms, "--all")
     told = bench("validate", "mm.h5", "--truth", truths.rooms).stdout
     assert scored.exit_code == 0
     (hint,) = [line for line in told.splitlines() if line.startswith("hint")]
