@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -15,6 +16,13 @@ from click.testing import CliRunner, Result
 TINY = {"height": 32, "width": 32, "min_visible_pixels": 3, "seed": 3}
 
 Edit = Callable[[h5py.File], Any]
+
+# Under nohup, or in the background of a shell, signals are ignored, which the processes of tests
+# would inherit. Those that are handled here have their defaults there.
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
+    signal.signal(signal.SIGHUP, lambda *_: None)
 
 
 @pytest.fixture(autouse=True)

@@ -30,7 +30,6 @@ with ended_by_signals():
 BLOCK = """
 import signal, sys, time
 from scenegen.common.signals import ended_by_signals
-signal.signal(signal.SIGHUP, signal.SIG_DFL)  # even where the tests run under nohup
 {before}
 with ended_by_signals():
     try:

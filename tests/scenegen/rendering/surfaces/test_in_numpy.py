@@ -11,7 +11,7 @@ from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
 EXACT = tuple(name for name in SHAPE_NAMES if name != "teapot")
 POLYHEDRA = set(EXACT) - {"sphere", "cone", "torus", "cylinder", "capsule"}
-RAYS = 10_000
+RAYS = 5000  # from outside, and as many from inside
 TESSELLATION = 4.5e-5  # how far a mesh may lie off its surface
 
 
@@ -24,24 +24,24 @@ def rays(distance, seed):
     return origins, (targets - origins) * rng.uniform(0.3, 3.0, (RAYS, 1))
 
 
-@pytest.mark.parametrize("distance", [3.0, 0.2], ids=["outside", "inside"])
 @pytest.mark.parametrize("name", EXACT)
-def test_hits_are_those_of_the_mesh_within_its_tessellation(name, distance):
+def test_hits_are_those_of_the_mesh_within_its_tessellation(name):
+    """Of rays from outside and from inside."""
     shape = unit_shape(name)
     assert shape.surface is not None
-    origins, directions = rays(distance, seed=1)
+    origins, directions = (np.concatenate(x) for x in zip(rays(3.0, 1), rays(0.2, 1), strict=True))
     t, normals = cast_at_surface(shape.surface, origins, directions)
     corners = shape.triangles.reshape(-1, 3)
     mesh = Trimesh(corners, np.arange(len(corners)).reshape(-1, 3), process=False)
     points, which, faces = RayMeshIntersector(mesh).intersects_location(
         origins, directions, multiple_hits=False
     )
-    met = np.zeros(RAYS, bool)
+    met = np.zeros(len(origins), bool)
     met[which] = True
-    assert (np.isfinite(t) != met).sum() <= (0 if name in POLYHEDRA else 3)
+    assert (np.isfinite(t) != met).sum() <= (0 if name in POLYHEDRA else 6)
     both = np.isfinite(t[which])
     points, which, faces = points[both], which[both], faces[both]
-    assert len(which) > RAYS / 4
+    assert len(which) > RAYS / 2
     found = origins[which] + t[which, None] * directions[which]
     off = np.einsum("ri,ri->r", found - points, mesh.face_normals[faces])
     aligned = np.einsum("ri,ri->r", normals[which], mesh.face_normals[faces])
