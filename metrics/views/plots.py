@@ -113,12 +113,15 @@ def histogram(values: Array, title: str, unit: str) -> Chart | None:
     return Chart(title, picture)
 
 
-def curves(series: Sequence[Series], title: str, unit: str) -> Chart | None:
+def curves(
+    series: Sequence[Series], title: str, unit: str, top: float | None = None
+) -> Chart | None:
     """Return a chart of values and their intervals over an angle in degrees, which begins at 0.
 
     Args:
         series: one or more; those without points are left out.
         title, unit: of the values.
+        top: where the axis of the values ends.
     """
     series = [line for line in series if line.points]
     if not series:
@@ -130,7 +133,7 @@ def curves(series: Sequence[Series], title: str, unit: str) -> Chart | None:
         axes.set(xlabel="degrees", ylabel=unit)
         axes.set_xticks(_apart(degrees))
         axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
-        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0] if _lowest(series) < 0.0 else 0.0))
+        axes.set_ylim(min(0.0, axes.get_ylim()[0] if _lowest(series) < 0.0 else 0.0), top)
         picture = _svg(figure)
     by_degrees = [{point.at: point for point in line.points} for line in series]
     rows = [

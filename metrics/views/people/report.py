@@ -148,6 +148,7 @@ def _charts(figures: Figures) -> Iterator[Chart]:
     """Yield right answers and times over the angle, with the line that fits the times."""
     groups, line = figures.by_angle, figures.line
     right = [_point(group, group.accuracy, 100) for group in groups]
+    chance = [Point(point.at, 100 / figures.candidates) for point in right]
     times = [_point(group, group.seconds) for group in groups if group.seconds is not None]
     series = [Series("people", times, "s0")]
     if line is not None and times:
@@ -156,7 +157,12 @@ def _charts(figures: Figures) -> Iterator[Chart]:
         ]
         series.append(Series("fitted line", ends, LINE))
     for chart in (
-        curves([Series("people", right, "s0")], "Right answers by angle", "percent"),
+        curves(
+            [Series("people", right, "s0"), Series("chance", chance, LINE)],
+            "Right answers by angle",
+            "percent",
+            top=100,
+        ),
         curves(series, "Time of right answers by angle", "seconds"),
     ):
         if chart is not None:
