@@ -19,6 +19,8 @@ def answered(row: Mapping[str, Any], text: str) -> dict[str, Any]:
     kept = ("question_index", "rotation", "kind", "shape", "floor")
     return {
         **{name: row[name] for name in kept},
+        "choices": list(row["choices"]),
+        "digest": row["digest"],
         "letter": letter,
         "outcome": reading.outcome,
         "score": float(letter == row["answer"]),

@@ -185,7 +185,8 @@ def _of_lines(path: Path) -> Log:
         return _of_ask(path)
     answers = []
     for line in map(json.loads, filter(bytes.strip, lines)):
-        doc, text = line["doc"], line["filtered_resps"]
+        # lmms-eval 0.7 leaves the row out, but for what `process_results` returned of it.
+        doc, text = line["doc"] if "doc" in line else line["accuracy"], line["filtered_resps"]
         while isinstance(text, list):
             text = text[0]
         if "question_index" not in doc:

@@ -15,6 +15,7 @@ from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from iqtt.vlm.ask import ask
 from iqtt.vlm.export import CIRCULAR, export_for_models, row_values
+from iqtt.vlm.harness import process_results
 from iqtt.vlm.reading import LETTERS
 from iqtt.vlm.rows import Asked, Row, vlm_rows
 from metrics.intake.harness_logs import is_log, read_returned, write_returned
@@ -50,8 +51,8 @@ def text_for(row: Row) -> str:
 def lmms_log(path: Path, rows: list[Row]) -> Path:
     lines = []
     for number, row in enumerate(rows):
-        doc = {k: v for k, v in row_values(row).items() if k not in ("image", "images")}
-        lines.append({"doc_id": number, "doc": doc, "filtered_resps": [text_for(row)]})
+        kept = process_results(row_values(row), [text_for(row)])
+        lines.append({"doc_id": number, "filtered_resps": text_for(row), **kept})
     path.write_text("".join(json.dumps(line) + "\n" for line in lines))
     return path
 
