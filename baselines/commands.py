@@ -9,6 +9,7 @@ import shlex
 from collections.abc import Mapping
 from dataclasses import fields
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import click
@@ -164,6 +165,8 @@ def _check_task(name: str, data: str) -> None:
     from scenegen.files.attributes import read_text
     from scenegen.files.shards import OpenFile
 
+    if not Path(data).is_file():
+        return  # its reader says so, after what is missing otherwise
     task = ALL[name].partition(":")[0]
     with OpenFile(data, "file of rooms or questions") as opened:
         found = DATA_FORMATS.get(read_text(opened.file, "format", data) or "", task)

@@ -198,9 +198,8 @@ def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     if path.exists() and not path.is_file() and not path.is_dir():
         raise FileFormatError(path, "a pipe or a device", "a regular file")  # it may have no end
     if not path.exists() and path.suffix != ".safetensors":
-        found, expected = f"{str(path)!r:.60}, which is no file", "a .safetensors file of training"
-        hint = "without --weights, bundled ones are used"
-        raise FileFormatError("weights", found, expected, hint)
+        text = "no such file; name a .safetensors file, or leave it out for bundled weights"
+        raise FileNotFoundError(errno.ENOENT, text, str(path))
     with path.open("rb"):  # raises Python's own errors for a missing file or a folder
         pass
     try:

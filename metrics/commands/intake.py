@@ -48,7 +48,7 @@ MISSING = click.option(
 
 # fmt: off
 @click.command("import", epilog=f"{EXAMPLE}bench import --depth 'out/*.png' --unit mm"
-                                " --data rooms.h5 --out mine.h5")
+                                " --invalid 0 --data rooms.h5 --out mine.h5")
 @click.option("--depth", "pattern", metavar="FILES",
               help="A folder, a pattern in quotes such as 'out/*.png', or one NPY or NPZ file with"
               " an image for each row. PNG, TIFF, EXR, PFM, NPY and NPZ are read.")

@@ -19,6 +19,7 @@ from scenegen.common.errors import SceneGenError
 from scenegen.common.names import did_you_mean
 from scenegen.description.specs import MAX_PIXELS
 
+STRETCHED = 0.05  # by so much networks may change the ratio of sides, to multiples of 14 or 32
 Array = NDArray[Any]
 Frame = Literal["opencv", "opengl"]
 Missing = Literal["refuse", "nearest"]
@@ -128,7 +129,8 @@ def fitted_to(
 ) -> Geometry:
     """Return a geometry of any size and frame in ours, at (H, W) pixels. Raises OutputError."""
     name, image, normal = geometry.key or geometry.kind, geometry.geometry, geometry.normal
-    _refuse_transposed(image, name, height, width)
+    _refuse_shape(image, name, height, width)
+    _refuse_zeros(geometry, name)
     image = np.where(np.isfinite(image), image, np.nan)
     if geometry.kind == "points":
         image = image * FRAMES[frame]
@@ -137,7 +139,7 @@ def fitted_to(
     if not valid.any():
         raise OutputError(name, "no finite value", "numbers")
     if normal is not None:
-        _refuse_transposed(normal, "normal", height, width)
+        _refuse_shape(normal, "normal", height, width)
         normal = nearest(normal * FRAMES[frame], height, width)
     if missing == "nearest":
         image = filled(image, valid)
@@ -190,10 +192,23 @@ def _fov(matrix: Any, height: int) -> float | None:
     return math.degrees(2.0 * math.atan(half / float(values[1, 1])))
 
 
-def _refuse_transposed(image: Array, name: str, height: int, width: int) -> None:
+def _refuse_zeros(geometry: Geometry, name: str) -> None:
+    """Raise OutputError for depths of 0: the camera's own place, or a file's mark for no value."""
+    zeros = np.count_nonzero(geometry.geometry == 0.0)
+    if geometry.kind == "depth" and geometry.alignment != "scale_shift" and zeros:
+        hint = "say --invalid 0 where 0 stands for no value"
+        raise OutputError(name, f"0 at {zeros} pixels", "depths above 0", hint)
+
+
+def _refuse_shape(image: Array, name: str, height: int, width: int) -> None:
+    """Raise OutputError for an image whose sides have another ratio than those of the truth."""
     if height != width and image.shape[:2] == (width, height):
         found = f"{width} rows and {height} columns"
         raise OutputError(name, found, f"({height}, {width}), rows first", "transpose it")
+    tall, wide = image.shape[:2]
+    if abs(tall * width - wide * height) > STRETCHED * wide * height:
+        expected = f"the ratio of sides of the images, {height}x{width}"
+        raise OutputError(name, f"{tall}x{wide} pixels", expected, "undo padding and crops")
 
 
 def _described(value: Any) -> str:

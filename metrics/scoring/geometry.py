@@ -4,9 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.alignment import Alignment, depth_of_disparity
+from metrics.measures.depth import align, compare_depth
 from metrics.submissions.reader import PredictedView
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 WIDER: tuple[Alignment, ...] = (
     "scale", "scale_shift", "scale_l1", "scale_shift_l1", "disparity_scale_shift",
 )  # fmt: skip
@@ -29,6 +31,24 @@ def planar_depth(predicted: PredictedView, true_depth: Array) -> tuple[Array, Al
         true = true_depth[both].astype(np.float64)
         depth[both] = depth_of_disparity(predicted.geometry[both], true)
     return depth, scored_alignment(predicted.kind, predicted.alignment)
+
+
+def fitted_depth(depth: Array, true_depth: Array, mask: Mask, alignment: Alignment) -> Array:
+    """Return depth (H, W) after the alignment that its scores need, NaN outside of the mask.
+
+    Where nothing is left to fit, it is `depth` itself.
+    """
+    if alignment in ("none", "disparity_scale_shift") or not mask.any():
+        return depth
+    fitted = np.full(depth.shape, np.nan)
+    fitted[mask] = align(compare_depth(depth, true_depth, mask), alignment).predicted
+    return fitted
+
+
+def depth_as_scored(predicted: PredictedView, true_depth: Array) -> Array:
+    """Return planar depth (H, W) as scores see it, for pictures; no value needs to be finite."""
+    depth, alignment = planar_depth(predicted, true_depth)
+    return fitted_depth(depth, true_depth, np.isfinite(depth) & np.isfinite(true_depth), alignment)
 
 
 def scored_alignment(kind: str, alignment: Alignment) -> Alignment:

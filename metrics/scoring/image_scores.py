@@ -17,7 +17,7 @@ from metrics.measures.chamfer_hausdorff import (
     nearest_distances,
     point_scores,
 )
-from metrics.measures.depth import align, compare_depth, depth_scores, mse_depth
+from metrics.measures.depth import compare_depth, depth_scores, mse_depth
 from metrics.measures.empty_room import empty_room
 from metrics.measures.image_search import nearest_distances_on_image
 from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
@@ -25,7 +25,7 @@ from metrics.measures.objects import counted_objects, object_means, single_objec
 from metrics.measures.points import local_point_scores, point_map_scores
 from metrics.measures.relief import relief_scores
 from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores
-from metrics.scoring.geometry import alignments_scored, planar_depth
+from metrics.scoring.geometry import alignments_scored, fitted_depth, planar_depth
 from metrics.scoring.metric_names import CUT_OUT, EMPTY_ROOM, OF_EMPTY_ROOM, OTHER_SCENE
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
@@ -206,10 +206,7 @@ def score_view(
     """
     mask = truth.mask
     depth, normal, broken = _repaired(depth, normal, truth, non_finite)
-    if alignment not in ("none", "disparity_scale_shift"):
-        fitted = align(compare_depth(depth, truth.depth, mask), alignment).predicted
-        depth = np.full(depth.shape, np.nan)
-        depth[mask] = fitted
+    depth = fitted_depth(depth, truth.depth, mask, alignment)
     nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, mask)
     scores = point_scores(nearest, F_SCORE_THRESHOLDS)
     pair = compare_depth(depth, truth.depth, mask)

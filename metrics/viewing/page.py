@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.normals import angular_errors_degrees
-from metrics.scoring.geometry import planar_depth
+from metrics.scoring.geometry import depth_as_scored
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.submissions.reader import RoomPredictions
 from metrics.viewing.order import RowScores, sortable, worst_first
@@ -114,7 +114,7 @@ class PredictionPage(ScenePage):
         return clouds
 
     def _depth(self, room: Room) -> Array:
-        return planar_depth(self._predictions.view(self._entries[room.index]), room.depth)[0]
+        return depth_as_scored(self._predictions.view(self._entries[room.index]), room.depth)
 
     def _normal(self, room: Room) -> Array | None:
         if not self._predictions.has_normals:

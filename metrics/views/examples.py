@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from iqtt.questions.specs import LETTERS
 from metrics.measures.answers import ABSTAINED
-from metrics.scoring.geometry import planar_depth
+from metrics.scoring.geometry import depth_as_scored
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import QuestionPredictions, RoomPredictions, open_predictions
@@ -137,7 +137,7 @@ def room_pictures(
     return view_pictures(
         decode_image(rooms.read("image", row)),
         true_depth,
-        planar_depth(predictions.view(place), true_depth)[0],
+        depth_as_scored(predictions.view(place), true_depth),
         rooms.read("normal", row),
         float(rooms.read("camera/fov_y_degrees", row)),
         predictions.normal(place) if predictions.has_normals else None,

@@ -140,7 +140,7 @@ def draw_grid(
     Raises FigureError where a row is not there, or a submission answers questions; OSError;
     FileFormatError for damaged files.
     """
-    from metrics.scoring.geometry import planar_depth
+    from metrics.scoring.geometry import depth_as_scored
 
     opened = [open_predictions(path) for path in submissions]
     try:
@@ -153,7 +153,7 @@ def draw_grid(
                     )
                 true = rooms.read("depth", row).astype(np.float64)
                 picture = srgb_bytes(np.nan_to_num(decode_image(rooms.read("image", row))))
-                depths = [_predicted(file, row, true, planar_depth) for file in opened]
+                depths = [_predicted(file, row, true, depth_as_scored) for file in opened]
                 lines.append((picture, true, depths))
     finally:
         for file in opened:
@@ -170,15 +170,13 @@ def labels_of(files: Sequence[ScoreFile]) -> list[str]:
     ]
 
 
-def _predicted(
-    file: Any, row: int, true: Array, planar_depth: Callable[..., tuple[Array, Any]]
-) -> Array:
+def _predicted(file: Any, row: int, true: Array, depth_as_scored: Callable[..., Array]) -> Array:
     if not isinstance(file, RoomPredictions):
         raise FigureError(file.path, "answers to questions", "predictions of rooms")
     places = np.flatnonzero(file.rows == row)
     if not len(places):
         raise FigureError(f"{file.path}: row {row}", "no prediction", "one of this row")
-    return np.asarray(planar_depth(file.view(int(places[0])), true)[0], np.float64)
+    return np.asarray(depth_as_scored(file.view(int(places[0])), true), np.float64)
 
 
 def _grid(

@@ -7,9 +7,10 @@ from scenegen.common.errors import SceneGenError, SpecError
 
 
 def did_you_mean(name: str, names: Iterable[str]) -> str:
-    """Return a hint with those of `names` that are spelled like `name`; "" where none is."""
-    lower = {other.lower(): other for other in names}
-    close = difflib.get_close_matches(name[:60].lower(), lower)
+    """Return a hint with `names` that begin with `name` or are spelled like it; "" for none."""
+    lower, wrong = {other.lower(): other for other in names}, name[:60].lower()
+    longer = [other for other in lower if wrong and other.startswith(wrong)]
+    close = longer[:3] or difflib.get_close_matches(wrong, lower)
     return f"did you mean {' or '.join(lower[other] for other in close)}?" if close else ""
 
 

@@ -221,7 +221,7 @@ def _notes(
             )
         if file.alignment != "none":
             how = metric(f"rmse_after_{file.alignment}").title.partition(", ")[2]
-            yield f"{label} claims its depth only when {how}; scores of points are never aligned"
+            yield f"{label} is scored {how}, fitted to the truth of each image"
         for submission in file.meta.submissions:
             if seen.setdefault(submission.sha256, label) != label:
                 yield f"{label} and {seen[submission.sha256]} were scored from the same submission"

@@ -416,7 +416,7 @@ def _label(file: ScoreFile, name: str, supervised: bool) -> str:
     texts = ["supervised"] * supervised + [f"{file.runs} runs"] * (file.runs > 1)
     if file.alignment != "none":
         claim = metric(f"rmse_after_{file.alignment}").title.partition(", ")[2]
-        texts.append(f"claims depth when {claim}")
+        texts.append(f"scored {claim}")
     mark = "" if file.comparable else f" {INCOMPARABLE_MARK}"
     return name + (f" ({'; '.join(texts)})" if texts else "") + mark
 

@@ -69,7 +69,8 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
         write_json(place / "scene_gt.json", poses)
         write_json(place / "scene_gt_info.json", infos)
     write_json(folder / f"{SPLIT}_targets_bop19.json", targets)
-    write_json(folder / "camera.json", _sensor(spec, encoding.depth_unit))
+    # That of one image; `scene_camera.json` has each image's own.
+    write_json(folder / "camera.json", _sensor(spec, views[0].fov_y_degrees, encoding.depth_unit))
     _write_models(folder / "models", models, objects)
     return {
         "world": "right-handed, z up: our (x, y, z) is (x, -z, y) here",
@@ -108,8 +109,7 @@ def _camera(room: Room, depth_unit: float) -> dict[str, Any]:
     }
 
 
-def _sensor(spec: Any, depth_unit: float) -> dict[str, Any]:
-    fov = spec.fov_y_degrees
+def _sensor(spec: Any, fov: float, depth_unit: float) -> dict[str, Any]:
     matrix = intrinsics(spec.height, spec.width, fov, pixel_centers="integer")
     names = {"fx": matrix[0, 0], "fy": matrix[1, 1], "cx": matrix[0, 2], "cy": matrix[1, 2]}
     size = {"width": spec.width, "height": spec.height}

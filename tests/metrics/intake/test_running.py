@@ -93,7 +93,7 @@ POINTS = "np.dstack([0 * d, 0 * d + 0.5, d])"
         ({"disparity_affine_invariant": "d.tolist()"}, "disparity", "scale_shift", 2.0),
         ({"points_metric": POINTS, "depth_affine_invariant": "d"}, "points", "none", -2.0),
         ({"points_affine_invariant": POINTS}, "points", "scale_shift", -2.0),
-        ({"depth_metric": "np.kron(d, np.ones((3, 2)))", "other": "'x'"}, "depth", "none", 2.0),
+        ({"depth_metric": "np.kron(d, np.ones((3, 3)))", "other": "'x'"}, "depth", "none", 2.0),
     ],
 )
 def test_the_keys_say_what_is_predicted(keys, kind, alignment, value, run):

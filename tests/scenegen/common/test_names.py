@@ -21,6 +21,8 @@ def test_an_unknown_name_is_refused_and_one_that_is_like_it_told():
         )
         assert "shapenet" in caught.value.hint
     assert did_you_mean("qqq", NAMES) == ""
+    keys = ("points_metric", "points_affine_invariant", "depth_metric")
+    assert [key in did_you_mean("points", keys) for key in keys] == [True, True, False]
 
 
 @given(st.text(max_size=100), st.lists(st.text(max_size=9)))

@@ -134,7 +134,7 @@ def test_labels_tell_runs_and_claims():
     runs = [[0.198] * 4, [0.2] * 4, [0.202] * 4]
     several = rooms("a", np.array(runs), runs=3, alignment="scale_shift")
     table = leaderboard([several, rooms("b")], paper="none")[0]
-    rest = rests(table)["a (3 runs; claims depth when scaled and shifted)"][0]
+    rest = rests(table)["a (3 runs; scored scaled and shifted)"][0]
     assert rest.startswith("± 0.002000 [")
 
 
