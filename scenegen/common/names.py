@@ -10,7 +10,7 @@ def did_you_mean(name: str, names: Iterable[str]) -> str:
     """Return a hint with `names` that begin with `name` or are spelled like it; "" for none."""
     lower, wrong = {other.lower(): other for other in names}, name[:60].lower()
     longer = [other for other in lower if wrong and other.startswith(wrong)]
-    close = longer[:3] or difflib.get_close_matches(wrong, lower)
+    close = dict.fromkeys([*longer[:3], *difflib.get_close_matches(wrong, lower)])
     return f"did you mean {' or '.join(lower[other] for other in close)}?" if close else ""
 
 
