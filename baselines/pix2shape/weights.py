@@ -14,7 +14,7 @@ from baselines.training.launch import PRECISIONS
 from baselines.training.questions import is_question_file
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
-from scenegen.common.names import check_choice
+from scenegen.common.names import check_choice, did_you_mean
 from scenegen.common.records import LARGEST, check
 
 FOLDER = Path(__file__).with_name("files")
@@ -117,5 +117,6 @@ def open_weights(weights: str | Path) -> tuple[Pix2Shape, Card]:
         return load_weights(FOLDER / f"{text}.safetensors", METHOD)
     if Path(text).suffix != ".safetensors":
         bundled = f"or one of {', '.join(names())}" if names() else "as no weights are bundled"
-        check_choice("weights", text, names(), expected=f"a .safetensors file, {bundled}")
+        expected = f"a .safetensors file, {bundled}"
+        raise SpecError("weights", f"{text!r:.60}", expected, did_you_mean(text, names()))
     return load_weights(text, METHOD)

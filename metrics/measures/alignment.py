@@ -23,7 +23,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.checks import MeasureError
-from scenegen.common.names import check_choice
 
 Array = NDArray[np.float64]
 Alignment = Literal[
@@ -64,7 +63,7 @@ def align(p: Array, t: Array, alignment: Alignment) -> Array:
     elif alignment == "scale_shift_l1":
         scale, shift = l1_scale_shift(unit, t, 1.0 / t)
     else:
-        check_choice("alignment", alignment, get_args(Alignment), MeasureError)
+        raise MeasureError("alignment", alignment, f"one of {', '.join(get_args(Alignment))}")
     return np.asarray(scale * unit + shift)
 
 

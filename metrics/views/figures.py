@@ -5,7 +5,7 @@ bytes.
 """
 
 import io
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from iqtt.floors import floor_of_kind
 from metrics.scoring.estimates import ACCURACY
+from metrics.scoring.geometry import depth_as_scored
 from metrics.scoring.metric_names import HEADLINE, SKILLED, metric
 from metrics.scoring.records import Score, ScoreFile
 from metrics.submissions.reader import RoomPredictions, open_predictions
@@ -140,8 +141,6 @@ def draw_grid(
     Raises FigureError where a row is not there, or a submission answers questions; OSError;
     FileFormatError for damaged files.
     """
-    from metrics.scoring.geometry import depth_as_scored
-
     opened = [open_predictions(path) for path in submissions]
     try:
         with RoomsFile(truth) as rooms:
@@ -153,7 +152,7 @@ def draw_grid(
                     )
                 true = rooms.read("depth", row).astype(np.float64)
                 picture = srgb_bytes(np.nan_to_num(decode_image(rooms.read("image", row))))
-                depths = [_predicted(file, row, true, depth_as_scored) for file in opened]
+                depths = [_predicted(file, row, true) for file in opened]
                 lines.append((picture, true, depths))
     finally:
         for file in opened:
@@ -170,7 +169,7 @@ def labels_of(files: Sequence[ScoreFile]) -> list[str]:
     ]
 
 
-def _predicted(file: Any, row: int, true: Array, depth_as_scored: Callable[..., Array]) -> Array:
+def _predicted(file: Any, row: int, true: Array) -> Array:
     if not isinstance(file, RoomPredictions):
         raise FigureError(file.path, "answers to questions", "predictions of rooms")
     places = np.flatnonzero(file.rows == row)

@@ -148,7 +148,8 @@ def _spelled_alike(error: click.UsageError) -> str:
     wrong = re.match("'(.*?)'", error.message)
     if not isinstance(kind, click.Choice) or wrong is None:
         return ""
-    return f" {did_you_mean(wrong[1], kind.choices).capitalize()}".rstrip()
+    hint = did_you_mean(wrong[1], kind.choices)
+    return f" {hint[0].upper()}{hint[1:]}" if hint else ""
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

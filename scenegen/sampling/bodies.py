@@ -34,6 +34,16 @@ def along(points: Array, directions: Array) -> Array:
     return products
 
 
+def _products(points: Array, directions: Array) -> Array:
+    """Return the products of each body's points, (N, C, 3), and directions: (N, C, D).
+
+    Directions are those of all bodies, (D, 3), or of each, (N, D, 3).
+    """
+    if directions.ndim == 3:
+        return np.asarray(points @ directions.swapaxes(1, 2))
+    return along(points.reshape(-1, 3), directions).reshape(*points.shape[:2], -1)
+
+
 class Bodies:
     """What placement needs of a number of shapes, in groups of shapes with about as many points."""
 
@@ -60,27 +70,20 @@ class Bodies:
             coarse: whether bodies with very many corners may be larger than they are, by a few
                 thousandths.
         """
-        shared = directions.ndim == 2
         reaches = np.empty((len(kind), directions.shape[-2]))
         for rows, corners in _members(self._coarse if coarse else self._hulls, kind):
             turned = _turned(rotation[rows, None], corners[..., :3])
             radius = np.broadcast_to(corners[..., 3:], (*turned.shape[:2], 1))
             flat = rounded(rotation[rows], POINT_STEP)
-            own = directions if shared else directions[rows].swapaxes(1, 2)
-            if shared:
-                ahead, across = along(flat[:, :, 0], own), along(flat[:, :, 2], own)
-            else:
-                ahead, across = ((flat[:, None, :, k] @ own)[:, 0] for k in (0, 2))
+            own = directions[rows] if directions.ndim == 3 else directions
+            ahead, across = (_products(flat[:, None, :, k], own)[:, 0] for k in (0, 2))
             sine = np.sqrt(ahead * ahead + across * across)[:, None]
             farthest = np.empty((len(rows), directions.shape[-2]))
             count = turned.shape[1]
             step = max(1, BLOCK // count)  # bodies, so few that all stays in the cache
             for first in range(0, len(rows), step):
                 block = slice(first, first + step)
-                if shared:
-                    reach = along(turned[block].reshape(-1, 3), own).reshape(-1, count, len(own))
-                else:
-                    reach = turned[block] @ own[block]
+                reach = _products(turned[block], own[block] if own.ndim == 3 else own)
                 reach += radius[block] * sine[block]
                 reach.max(axis=1, out=farthest[block])
             reaches[rows] = farthest

@@ -1,5 +1,5 @@
-// Keys A to C or 1 to 3, the time per answer, and one answer per question. Without it the quiz works all the
-// same, with the mouse and the Tab key; then no time is sent.
+// Keys A to C or 1 to 3, the time per answer, and one answer per question. Without it the quiz works
+// all the same, with the mouse and the Tab key; then no time is sent.
 "use strict";
 
 const form = document.getElementById("answers");
