@@ -33,7 +33,6 @@ KEYS: dict[str, tuple[str, Alignment]] = {
     "depth_affine_invariant": ("depth", "scale_shift"),
     "disparity_affine_invariant": ("disparity", "scale_shift"),
 }
-OTHERS = ("normal", "mask", "intrinsics")
 FRAMES: dict[Frame, Array] = {  # what an axis is multiplied by to be one of ours
     "opencv": np.array([1.0, -1.0, -1.0]),
     "opengl": np.array([1.0, 1.0, 1.0]),
