@@ -1,4 +1,4 @@
-"""`depth-supervised`: relief networks that learn from the true depth."""
+"""`depth-supervised`: relief networks that learn from true depth and object ids."""
 
 from functools import partial
 from pathlib import Path
@@ -18,9 +18,9 @@ __all__ = ["Settings", "train", "write_submission"]
 
 
 def lessons_of(rooms: Rooms, settings: Settings, _folder: Path, _progress: Any) -> Lessons:
-    """Return the relief that the depth tells, where there is a surface.
+    """Return the relief that the depth tells, where there is a surface, and the objects.
 
-    The network "code" learns to predict each scene's other views, too, if there are any.
+    The network "sweep" learns to predict each scene's other views, too, if there are any.
     """
     assert rooms.depth is not None, "train asks for it"
     depths = rooms.depth
@@ -31,8 +31,8 @@ def lessons_of(rooms: Rooms, settings: Settings, _folder: Path, _progress: Any) 
         surface = depth.isfinite()
         return torch.where(surface, walls - depth, 0), surface.float()
 
-    views = views_of_scenes(rooms) if settings.network == "code" else None
-    return Lessons(torch.arange(len(rooms)), target, views)
+    views = views_of_scenes(rooms) if settings.network == "sweep" else None
+    return Lessons(torch.arange(len(rooms)), target, views, rooms.inside)
 
 
 def views_of_scenes(rooms: Rooms) -> list[Tensor]:

@@ -12,16 +12,25 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from baselines.pix2shape.network.architecture import Decoder, Encoder, NetworkSpec, contrast
-from baselines.pix2shape.network.empty_rooms import FLAT, Cameras, empty_rooms, planes_of
+from baselines.pix2shape.matching.reprojection import reprojected
+from baselines.pix2shape.matching.search import STEPS, reliefs
+from baselines.pix2shape.network.architecture import RAY_PLANES, contrast
+from baselines.pix2shape.network.empty_rooms import (
+    FLAT,
+    NEAREST,
+    Cameras,
+    empty_rooms,
+    planes_of,
+)
 from baselines.training.checkpoint import Card as BaseCard
 from baselines.training.checkpoint import check_numbers
 from scenegen.common.records import LARGEST, check
 
-KINDS = ("unet", "code")
+KINDS = ("unet", "sweep")
 SIZES = (32, 64, 128, 256)  # pixels a side
 LEVELS = (32, 64, 96, 128)  # channels at 1/2, 1/4, 1/8 and 1/16 of the image size
 FINE = 16  # channels at full size
+THICK = 0.2  # scene units; how far behind a surface is told, at most
 
 
 @dataclass(frozen=True)
@@ -30,10 +39,9 @@ class Settings:
 
     Attributes:
         network: "unet" has skip connections and gives the relief at the input's own camera alone;
-            "code" is the reference model's encoder and decoder, which pass the image through a
-            code of 128 numbers and give the relief at any camera.
+            "sweep" completes what a trained one sees, and gives the relief at any camera.
         size: image size, pixels a side.
-        width: multiplies the channels; of "code" those of the paper's tables.
+        width: multiplies the channels.
         seed: of the first weights and of every random choice of training.
         iterations, batch: length of training, and images in each batch.
         learning_rate: of Adam; it rises over WARM_UP iterations and falls to 0 along a cosine.
@@ -64,13 +72,10 @@ class Card(BaseCard):
     settings: Settings
 
 
-def relief_network(card: Card) -> nn.Module:
-    """Return an untrained network: (image (B, 3, S, S), its `Cameras`, `Cameras` asked for).
-
-    It returns the relief that the cameras asked for see, (B, S, S), which may be below 0.
-    """
+def relief_network(card: Card) -> "Relief":
+    """Return an untrained network."""
     settings = card.settings
-    return CodeNetwork(settings) if settings.network == "code" else UNet(settings)
+    return Sweep(settings) if settings.network == "sweep" else UNet(settings)
 
 
 def predicted_depth(
@@ -98,13 +103,33 @@ class Residual(nn.Module):
         return functional.relu(self.norms[1](self.second(inner)) + self.around(values))
 
 
-class UNet(nn.Module):
+class Relief(nn.Module):
+    """(image (B, 3, S, S), its `Cameras`, `Cameras` asked for) -> what the latter see, (B, S, S).
+
+    Relief may be below 0. It is made of channels that each pixel is told, so that training can show
+    windows of them.
+    """
+
+    def forward(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
+        """As the class says."""
+        return self.relief(self.channels(image, cameras, targets))
+
+    def channels(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
+        """Return what the pixels of the cameras asked for are told, (B, C, S, S)."""
+        raise NotImplementedError
+
+    def relief(self, channels: Tensor) -> Tensor:
+        """(B, C, H, W), H and W multiples of 16 -> (B, H, W)."""
+        raise NotImplementedError
+
+
+class UNet(Relief):
     """An encoder and a decoder joined at every size (Ronneberger et al. 2015)."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, inputs: int = 3 + 3 + RAY_PLANES) -> None:
         super().__init__()
         fine, *levels = (max(4, round(settings.width * n)) for n in (FINE, *LEVELS))
-        self.full = nn.Conv2d(3 + 3 + 4, fine, 3, padding=1)
+        self.full = nn.Conv2d(inputs, fine, 3, padding=1)
         self.halve = nn.Conv2d(fine, levels[0], 4, 2, 1)
         before = [levels[0], *levels[:-1]]
         self.down = nn.ModuleList(Residual(a, b) for a, b in zip(before, levels, strict=True))
@@ -115,11 +140,15 @@ class UNet(nn.Module):
         self.join = nn.Conv2d(2 * fine, fine, 3, padding=1)
         self.last = nn.Conv2d(fine, 1, 3, padding=1)
 
-    def forward(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
-        """As `relief_network` says; only the image's own camera can be asked for."""
+    def channels(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
+        """As `Relief` says; only the image's own camera can be asked for."""
         if targets is not cameras:
             raise ValueError("a unet gives the relief at the image's own camera alone")
-        channels = torch.cat([image, contrast(image), planes_of(cameras, image.shape[-1])], dim=1)
+        planes = planes_of(cameras, image.shape[-1])
+        return torch.cat([image, contrast(image), planes], dim=1)
+
+    def relief(self, channels: Tensor) -> Tensor:
+        """As `Relief` says."""
         channels = channels.contiguous(memory_format=torch.channels_last)
         full = functional.relu(self.full(channels))
         values, kept = functional.relu(self.halve(full)), []
@@ -131,19 +160,40 @@ class UNet(nn.Module):
             values = block(torch.cat([larger, beside], dim=1))
         values = functional.relu(functional.pixel_shuffle(self.enlarge(values), 2))
         values = functional.relu(self.join(torch.cat([values, full], dim=1)))
-        with torch.autocast(values.device.type, enabled=False):  # bfloat16 is too coarse
-            return self.last(values.float())[:, 0]
+        last: Tensor = self.last(values)
+        return last[:, 0]
 
 
-class CodeNetwork(nn.Module):
-    """The reference model's encoder and decoder, as in the paper's tables, between them a code."""
+class Sweep(Relief):
+    """A unet that gives the input's own surface, and one that completes it for other cameras.
+
+    The second one is told of each ray how far the points at a list of reliefs lie behind the first
+    one's surface, as the input's camera sees them: below 0 is empty space, and what lies behind an
+    object may be part of it.
+    """
 
     def __init__(self, settings: Settings) -> None:
         super().__init__()
-        networks = NetworkSpec(size=settings.size, width=settings.width)
-        self.encoder, self.decoder = Encoder(networks), Decoder(networks)
+        self.seen = UNet(settings).requires_grad_(False)
+        self.completed = UNet(settings, STEPS + RAY_PLANES)
 
-    def forward(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
-        """As `relief_network` says."""
-        code = self.encoder(image, cameras.world_from_camera[:, :3, 3])
-        return self.decoder(code, targets.world_from_camera[:, :3, 3])[:, 0]
+    def train(self, mode: bool = True) -> "Sweep":
+        """As `nn.Module.train`; the first network stays as it is."""
+        super().train(mode)
+        self.seen.eval()
+        return self
+
+    def channels(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
+        """As `Relief` says."""
+        size = image.shape[-1]
+        with torch.no_grad():
+            surface = predicted_depth(self.seen, image, cameras, cameras)
+        walls = empty_rooms(targets.world_from_camera, targets.fov_y_degrees, size)[0][:, None]
+        depth = (walls - reliefs(walls)[:, None, None]).clamp(min=NEAREST)
+        there, away, _ = reprojected(surface[:, None], cameras, depth, targets)
+        behind = ((away - there[:, 0]) / THICK).clamp(-1, 1)
+        return torch.cat([behind, planes_of(targets, size)], dim=1)
+
+    def relief(self, channels: Tensor) -> Tensor:
+        """As `Relief` says."""
+        return self.completed.relief(channels)

@@ -19,7 +19,7 @@ FILES = Path(__file__).with_name("files")
 TOLD = "told: the camera, and where the empty room's floor and walls are"
 FROM = {
     "unet": "each view is predicted from its own image",
-    "code": "each view is predicted from the image of the scene's first one",
+    "sweep": "each view is predicted from the image of the scene's first one",
 }
 
 
@@ -35,8 +35,8 @@ def write_submission(
 ) -> None:
     """Write depth and normals of every view of a file of rooms, as `baselines.training` says.
 
-    A network "unet" predicts each view from its own image; one of "code" each scene from one image
-    alone, view 0 or the first that the file holds, under the name "NAME-code". The submission's
+    A network "unet" predicts each view from its own image; one of "sweep" each scene from one image
+    alone, view 0 or the first that the file holds, under the name "NAME-sweep". The submission's
     notes say it, too.
 
     Args:
@@ -50,14 +50,14 @@ def write_submission(
         check_reducible(data, rooms.spec.height, rooms.spec.width, size)
         poses = torch.from_numpy(camera_poses(rooms).astype(np.float32))
         fov, source = rooms.spec.fov_y_degrees, np.arange(len(rooms))
-        if kind == "code":
+        if kind == "sweep":
             inputs, place = input_views(rooms)
             source = inputs[place]
 
         def depth(rows: Array) -> Tensor:
             image = room_images(rooms, source[rows], size)
             cameras = target_cameras = Cameras(poses[source[rows]], fov)
-            if kind == "code":
+            if kind == "sweep":
                 target_cameras = Cameras(poses[rows], fov)
             return predicted_depth(network, image, cameras, target_cameras)
 

@@ -9,6 +9,7 @@ import torch
 from torch import Tensor
 
 from baselines.training.images import Array, channels_first, check_reducible, reduced
+from metrics.measures.shape import inside_objects
 from scenegen.common.errors import FileFormatError
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
@@ -28,6 +29,8 @@ class Rooms:
         angle: of the view, about the vertical axis from the scene's first one, degrees, (N,).
         rounded: whether radiance was stored in 8 bits.
         depth: planar, scene units, (N, S, S), NaN where there is no surface; None if not asked for.
+        inside: the object that each pixel lies inside, (N, S, S) int32, as `shape.inside_objects`;
+            0 at other pixels. None if depth is not asked for.
         data, fingerprint: request and fingerprint of the file.
     """
 
@@ -38,6 +41,7 @@ class Rooms:
     angle: Tensor
     rounded: bool
     depth: Tensor | None
+    inside: Tensor | None
     data: str
     fingerprint: str
 
@@ -48,6 +52,9 @@ class Rooms:
 def read_rooms(rooms: RoomsFile, size: int, *, depth: bool = False) -> Rooms:
     """Read all rooms of a file, their images reduced to size x size pixels.
 
+    Args:
+        depth: whether depth and object ids are read, too.
+
     Raises FileFormatError where a camera or an image is not known or, if depth is asked for, an
     image has none; SpecError where images cannot be reduced.
     """
@@ -55,9 +62,11 @@ def read_rooms(rooms: RoomsFile, size: int, *, depth: bool = False) -> Rooms:
     poses = camera_poses(rooms).astype(np.float32)
     images = np.empty((len(rooms), 3, size, size), np.float16)
     depths = np.empty((len(rooms), size, size), np.float32) if depth else None
+    inside = np.empty((len(rooms), size, size), np.int32) if depth else None
     for row in range(len(rooms)):
         images[row] = room_image(rooms, row, size)
-        if depths is not None:
+        if depths is not None and inside is not None:
+            inside[row] = inside_objects(_alone(rooms.read("object_id", row), size))
             depths[row] = reduced(rooms.read("depth", row), size)
             if not np.isfinite(depths[row]).any():
                 raise FileFormatError(f"{rooms.path}: depth, row {row}", "no surface", "some")
@@ -70,9 +79,18 @@ def read_rooms(rooms: RoomsFile, size: int, *, depth: bool = False) -> Rooms:
         torch.from_numpy(np.asarray(angle)),
         rooms.spec.image_dtype == "uint8",
         None if depths is None else torch.from_numpy(depths),
+        None if inside is None else torch.from_numpy(inside),
         rooms.spec.to_json(),
         rooms.fingerprint,
     )
+
+
+def _alone(object_id: Array, size: int) -> Array:
+    """Return the ids of the square blocks that show one object alone, (S, S), else 0."""
+    block = object_id.shape[0] // size
+    blocks = object_id.reshape(size, block, size, block)
+    least, most = blocks.min(axis=(1, 3)), blocks.max(axis=(1, 3))
+    return np.where(least == most, most, 0)
 
 
 def room_image(rooms: RoomsFile, row: int, size: int) -> Array:

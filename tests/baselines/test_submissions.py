@@ -23,7 +23,7 @@ TRUTH = (
     "light/attenuation", "material/reflectance", "view_angle_degrees",
 )  # fmt: skip
 OWN_IMAGE = ("depth-supervised",)  # the others see a scene's view 0 alone
-ROOMS = ("pix2shape", "pix2shape-rays", "ptn", "depth-supervised", "depth-supervised-code")
+ROOMS = ("pix2shape", "pix2shape-rays", "ptn", "depth-supervised", "depth-supervised-sweep")
 QUESTIONS = (
     "pix2shape", "cnn", "siamese", "ptn", "rezende, 0 labels", "rezende, 5 labels"
 )  # fmt: skip

@@ -18,6 +18,7 @@ from pix2shape_models import edited
 from refusals import refused
 
 from baselines.commands import HOMES
+from baselines.relief import depth_supervised
 from baselines.training.checkpoint import CHECKPOINT, WEIGHTS, load_tensors
 from scenegen.common.errors import SceneGenError, SpecError
 
@@ -29,7 +30,7 @@ CASES: dict[str, tuple[str, str, dict[str, Any], dict[str, Any]]] = {
     "cnn": ("cnn", "questions", RESNET, {}),
     "siamese": ("siamese", "questions", RESNET, {"labels": 2}),
     "unet": ("depth-supervised", "rooms", RELIEF, {}),
-    "code": ("depth-supervised", "rooms", {**RELIEF, "width": 0.05, "network": "code"}, {}),
+    "sweep": ("depth-supervised", "rooms", {**RELIEF, "network": "sweep"}, {}),
     "view-pairs": ("view-pairs", "rooms", RELIEF, {}),
     "ptn, rooms": ("ptn", "rooms", PTN, {}),
     "ptn, ids": ("ptn", "rooms", {**PTN, "silhouettes": "ids"}, {}),
@@ -49,10 +50,18 @@ def data(turned_path: Path, truths: Any) -> dict[str, Path]:
     return {"rooms": turned_path, "questions": Path(truths.iqtt).with_name("iqtt-train.h5")}
 
 
+@pytest.fixture(scope="session")
+def unet(data: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    settings = depth_supervised.Settings(**RELIEF, iterations=1)
+    return depth_supervised.train(data["rooms"], tmp_path_factory.mktemp("unet"), settings)
+
+
 @pytest.fixture
-def train(case: str, data: dict[str, Path], tmp_path: Path, monkeypatch: Any) -> Train:
+def train(case: str, data: dict[str, Path], unet: Path, tmp_path: Path, monkeypatch: Any) -> Train:
     """Train a case into a folder; settings are those of the case unless it goes on."""
     name, kind, settings, how = CASES[case]
+    if case == "sweep":
+        how = {"networks": str(unet)}
     module = import_module(f"baselines.{HOMES[name][0]}")
     package = HOMES[name][0].partition(".")[0]
     monkeypatch.setattr(f"baselines.{package}.training.EVERY", 2)

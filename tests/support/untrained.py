@@ -44,9 +44,9 @@ def stand_out(network: Any) -> None:
         network.volume[-1].weight.mul_(20)
         network.volume[-1].bias.fill_(0.1)
         return
-    last = network.last if hasattr(network, "last") else network.decoder.last
-    last.weight.mul_(10)
-    last.bias.fill_(0.1)
+    for last in (module.last for module in network.modules() if hasattr(module, "last")):
+        last.weight.mul_(10)
+        last.bias.fill_(0.1)
 
 
 def of_reference(weights: Path) -> Write:
@@ -67,7 +67,7 @@ def room_writers(folder: Path) -> dict[str, Write]:
         ),
         "ptn": of_module(ptn, stored(folder, PTN, card_of(), stand_out)),
     }
-    for name, kind in (("depth-supervised", "unet"), ("depth-supervised-code", "code")):
+    for name, kind in (("depth-supervised", "unet"), ("depth-supervised-sweep", "sweep")):
         (folder / kind).mkdir()
         card = ReliefCard("depth-supervised", ReliefSettings(kind, 32, 0.1))
         writers[name] = of_module(depth_supervised, stored(folder / kind, relief, card, stand_out))

@@ -18,8 +18,8 @@ NEAR = 0.05  # scene units; points nearer to the other camera than this, or behi
 
 def reprojected(
     values: Tensor, others: Cameras, depth: Tensor, cameras: Cameras
-) -> tuple[Tensor, Tensor]:
-    """Return other images' values at surface points, and which points lie within these images.
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return other images' values at surface points, the points' depths there, and which are shown.
 
     Args:
         values: of the other cameras' images, (B, C, S, S).
@@ -27,7 +27,8 @@ def reprojected(
             (B, D, S, S).
 
     Returns:
-        Bilinear values, (B, C, D, S, S), and a mask, (B, D, S, S). Whether something stands between
+        Bilinear values, (B, C, D, S, S), planar depths, (B, D, S, S), and a mask of the points that
+        lie within these images, (B, D, S, S). Whether something stands between
         a point and the other camera is not asked.
     """
     batch, count, size, _ = depth.shape
@@ -41,4 +42,5 @@ def reprojected(
     place = torch.stack([points[:, 0], -points[:, 1]], dim=3) / edge[..., None]
     shown = functional.grid_sample(values, place, padding_mode="border", align_corners=False)
     seen = (place.abs() < 1).all(dim=3) & (away > NEAR)
-    return shown.view(batch, -1, count, size, size), seen.view(batch, count, size, size)
+    shape = (batch, count, size, size)
+    return shown.view(batch, -1, count, size, size), away.view(shape), seen.view(shape)

@@ -46,7 +46,7 @@ def matching_cost(
     depth = torch.maximum(walls[:, None] - tried, entry[:, None])
     slope, other_slope = _squared_slope(image), _squared_slope(other)
     values = torch.cat([other, other_slope], dim=1)
-    shown, seen = reprojected(values, others, depth, cameras)
+    shown, _, seen = reprojected(values, others, depth, cameras)
     squared = (shown[:, :3] - image[:, :, None]).square().sum(dim=1)
     ratio = squared / (3 * noise**2 + SHIFT**2 * (shown[:, 3] + slope) / 2)
     return torch.where(seen, ratio / (ratio + SCALE), UNSEEN) + RISE * tried / tried[-1]

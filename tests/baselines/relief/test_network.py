@@ -5,7 +5,8 @@ import torch
 
 from baselines.pix2shape.network.architecture import contrast
 from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
-from baselines.relief.network import Card, Settings, predicted_depth, relief_network
+from baselines.pix2shape.matching.search import reliefs
+from baselines.relief.network import THICK, Card, Settings, predicted_depth, relief_network
 
 
 def cameras(*positions: tuple[float, float, float]) -> Cameras:
@@ -22,7 +23,7 @@ OWN, OTHER = cameras((0.5, 0.5, 2.0), (0.4, 0.6, 2.2)), cameras((0.6, 0.5, 2.1),
 
 
 @pytest.mark.parametrize("size", [32, 64])
-@pytest.mark.parametrize("kind", ["unet", "code"])
+@pytest.mark.parametrize("kind", ["unet", "sweep"])
 def test_depth_lies_between_the_walls_and_the_open_sides(kind, size):
     torch.manual_seed(0)
     network = network_of(kind, size).eval()
@@ -30,7 +31,7 @@ def test_depth_lies_between_the_walls_and_the_open_sides(kind, size):
     walls, entry, _ = empty_rooms(OWN.world_from_camera, 30.0, size)
     with torch.no_grad():
         relief = network(image, OWN, OWN)
-        last = network.last if kind == "unet" else network.decoder.last
+        last = (network if kind == "unet" else network.completed).last
         for factor in (1.0, 1e4):
             last.weight.mul_(factor)
             depth = predicted_depth(network, image, OWN, OWN)
@@ -47,17 +48,17 @@ def test_a_unet_sees_with_the_images_own_camera_alone():
         network(torch.rand(2, 3, 32, 32), OWN, OTHER)
 
 
-def test_a_code_is_seen_from_any_camera():
-    torch.manual_seed(0)
-    network = network_of("code", 32).train()
-    image = torch.rand(2, 3, 32, 32)
-    for _ in range(2):  # the condition's layers begin at 0
-        loss = (network(image, OWN, OWN) - torch.rand(2, 32, 32)).square().mean()
-        loss.backward()
-        with torch.no_grad():
-            for weights in network.parameters():
-                weights.sub_(0.1 * weights.grad)
-    assert not torch.allclose(network(image, OWN, OWN), network(image, OWN, OTHER))
+def test_a_sweep_tells_how_far_points_lie_behind_what_is_seen(monkeypatch):
+    """Seen from its own camera, the surface lies at the relief that the first network gives."""
+    network, told = network_of("sweep", 32).eval(), []
+    monkeypatch.setattr(network.seen, "forward", lambda *_: torch.full((2, 32, 32), 0.1))
+    monkeypatch.setattr(network.completed, "relief", told.append)
+    for targets in (OWN, OTHER):
+        network(torch.rand(2, 3, 32, 32), OWN, targets)
+    behind = told[0][:, : len(reliefs(told[0])), 1:-1, 1:-1]
+    expected = (0.1 - reliefs(behind)) / THICK
+    torch.testing.assert_close(behind.mean(dim=(0, 2, 3)), expected.clamp(-1, 1), atol=1e-3, rtol=0)
+    assert not torch.allclose(*told)
 
 
 def test_contrast_is_blind_to_what_is_even():

@@ -75,8 +75,8 @@ def test_view_pairs_reads_nothing_but_images_and_cameras(near_path, tmp_path):
     assert same(view_pairs.train(blank, tmp_path / "two", SMALL), expected)
     other = edited(near_path, tmp_path / "other.h5", put("image", 1, np.float16(0.5)))
     assert not same(view_pairs.train(other, tmp_path / "three", SMALL), expected)
-    with refused(SpecError, "network", "code"):
-        view_pairs.train(near_path, tmp_path / "four", replace(SMALL, network="code"))
+    with refused(SpecError, "network", "sweep"):
+        view_pairs.train(near_path, tmp_path / "four", replace(SMALL, network="sweep"))
 
 
 def test_each_row_is_seen_from_the_cameras_of_its_own_scene(turned_path):

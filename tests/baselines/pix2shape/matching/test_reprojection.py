@@ -35,7 +35,7 @@ def reprojection(depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the second image seen through the first one's depth, and where it shows it."""
     other = batched(np.moveaxis(seen(POSES[1])[0], -1, 0))
     cameras = [Cameras(batched(camera.world_from_camera), FOV) for camera in POSES]
-    found, inside = reprojected(other, cameras[1], batched(depth)[:, None], cameras[0])
+    found, _, inside = reprojected(other, cameras[1], batched(depth)[:, None], cameras[0])
     return np.moveaxis(found[0, :, 0].numpy(), 0, -1), inside[0, 0].numpy()
 
 
@@ -64,7 +64,9 @@ def test_points_behind_the_other_camera_are_not_seen():
     turned = pose @ torch.diag(torch.tensor([-1.0, 1.0, -1.0, 1.0], dtype=torch.float64))
     values = image.movedim(3, 1)
     for other, expected in ((pose, True), (turned, False)):
-        found, inside = reprojected(values, Cameras(other, FOV), depth[:, None], Cameras(pose, FOV))
+        found, _, inside = reprojected(
+            values, Cameras(other, FOV), depth[:, None], Cameras(pose, FOV)
+        )
         assert bool(inside[0, 0, 31:33, 31:33].all()) is expected
         assert bool(inside.any()) is expected
         assert found.isfinite().all()
@@ -75,7 +77,7 @@ def test_depths_are_tried_one_by_one():
     tried = np.stack([depth - 0.1, depth, depth + 0.2])
     other = batched(np.moveaxis(seen(POSES[1])[0], -1, 0))
     cameras = [Cameras(batched(camera.world_from_camera), FOV) for camera in POSES]
-    found, inside = reprojected(other, cameras[1], batched(tried), cameras[0])
+    found, _, inside = reprojected(other, cameras[1], batched(tried), cameras[0])
     for k, one in enumerate(tried):
         alone, where = reprojection(one)
         np.testing.assert_allclose(np.moveaxis(found[0, :, k].numpy(), 0, -1), alone, atol=1e-12)
