@@ -59,6 +59,7 @@ CUT_OUTS = (
 # what they are. A new one is a line here.
 HOMES = {
     "cnn": ("resnets.cnn", "questions: ResNets and a softmax over the answers"),
+    "depth-completed": ("relief.depth_completed", "rooms: a network that completes the first view"),
     "depth-supervised": (
         "relief.depth_supervised",
         "rooms: a network trained with true depth",

@@ -1,4 +1,4 @@
-"""`depth-supervised`: relief networks that learn from true depth and object ids."""
+"""`depth-supervised`: a relief network that learns from true depth and object ids."""
 
 from functools import partial
 from pathlib import Path
@@ -9,19 +9,17 @@ from torch import Tensor
 
 from baselines.pix2shape.network.empty_rooms import empty_rooms
 from baselines.relief import predict, training
-from baselines.relief.network import Settings
+from baselines.relief.network import Card, Settings, relief_network
 from baselines.relief.training import Lessons
+from baselines.training.checkpoint import Method
 from baselines.training.rooms import Rooms
 
-METHOD = "depth-supervised"
+METHOD = Method("depth-supervised", Card, relief_network)
 __all__ = ["Settings", "train", "write_submission"]
 
 
 def lessons_of(rooms: Rooms, settings: Settings, _folder: Path, _progress: Any) -> Lessons:
-    """Return the relief that the depth tells, where there is a surface, and the objects.
-
-    The network "sweep" learns to predict each scene's other views, too, if there are any.
-    """
+    """Return the relief that the depth tells, where there is a surface, and the objects."""
     assert rooms.depth is not None, "train asks for it"
     depths = rooms.depth
 
@@ -31,19 +29,7 @@ def lessons_of(rooms: Rooms, settings: Settings, _folder: Path, _progress: Any) 
         surface = depth.isfinite()
         return torch.where(surface, walls - depth, 0), surface.float()
 
-    views = views_of_scenes(rooms) if settings.network == "sweep" else None
-    return Lessons(torch.arange(len(rooms)), target, views, rooms.inside)
-
-
-def views_of_scenes(rooms: Rooms) -> list[Tensor]:
-    """Return for each row the rows that show its scene, itself among them."""
-    order = torch.argsort(rooms.scene, stable=True)
-    counts = torch.unique_consecutive(rooms.scene[order], return_counts=True)[1]
-    views: list[Tensor] = [order] * len(rooms)
-    for rows in torch.split(order, counts.tolist()):
-        for row in rows.tolist():
-            views[row] = rows
-    return views
+    return Lessons(torch.arange(len(rooms)), target, inside=rooms.inside)
 
 
 train = partial(training.train, METHOD, lessons_of, True)

@@ -1,7 +1,7 @@
-"""The networks that give the relief of a room from one image and its camera.
+"""The network that gives the relief of a room from one image and its camera.
 
 Relief is how far a surface lies before the empty room, along the viewing axis, in scene units:
-depth = depth of the empty room - relief. So both networks are told where floor and walls are, as
+depth = depth of the empty room - relief. So networks are told where floor and walls are, as
 the baseline empty-room is.
 """
 
@@ -12,34 +12,22 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from baselines.pix2shape.matching.reprojection import reprojected
-from baselines.pix2shape.matching.search import STEPS, reliefs
 from baselines.pix2shape.network.architecture import RAY_PLANES, contrast
-from baselines.pix2shape.network.empty_rooms import (
-    FLAT,
-    NEAREST,
-    Cameras,
-    empty_rooms,
-    planes_of,
-)
+from baselines.pix2shape.network.empty_rooms import FLAT, Cameras, empty_rooms, planes_of
 from baselines.training.checkpoint import Card as BaseCard
 from baselines.training.checkpoint import check_numbers
 from scenegen.common.records import LARGEST, check
 
-KINDS = ("unet", "sweep")
 SIZES = (32, 64, 128, 256)  # pixels a side
 LEVELS = (32, 64, 96, 128)  # channels at 1/2, 1/4, 1/8 and 1/16 of the image size
 FINE = 16  # channels at full size
-THICK = 0.2  # scene units; how far behind a surface is told, at most
 
 
 @dataclass(frozen=True)
 class Settings:
-    """Which network, how large, and how it is trained.
+    """How large a network is, and how it is trained.
 
     Attributes:
-        network: "unet" has skip connections and gives the relief at the input's own camera alone;
-            "sweep" completes what a trained one sees, and gives the relief at any camera.
         size: image size, pixels a side.
         width: multiplies the channels.
         seed: of the first weights and of every random choice of training.
@@ -47,7 +35,6 @@ class Settings:
         learning_rate: of Adam; it rises over WARM_UP iterations and falls to 0 along a cosine.
     """
 
-    network: str = "unet"
     size: int = 64
     width: float = 1.0
     seed: int = 0
@@ -56,7 +43,6 @@ class Settings:
     learning_rate: float = 0.003
 
     def __post_init__(self) -> None:
-        check(self.network in KINDS, "network", self.network, " or ".join(KINDS))
         check(self.size in SIZES, "size", self.size, f"one of {', '.join(map(str, SIZES))}")
         ranges = {
             "width": (0.05, 4), "seed": (0, LARGEST), "iterations": (1, LARGEST),
@@ -72,10 +58,9 @@ class Card(BaseCard):
     settings: Settings
 
 
-def relief_network(card: Card) -> "Relief":
-    """Return an untrained network."""
-    settings = card.settings
-    return Sweep(settings) if settings.network == "sweep" else UNet(settings)
+def relief_network(card: Card) -> "UNet":
+    """Return an untrained network that sees with the input's own camera."""
+    return UNet(card.settings)
 
 
 def predicted_depth(
@@ -108,7 +93,12 @@ class Relief(nn.Module):
 
     Relief may be below 0. It is made of channels that each pixel is told, so that training can show
     windows of them.
+
+    Attributes:
+        from_first_view: whether a scene is predicted from one image, or each view from its own.
     """
+
+    from_first_view = False
 
     def forward(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
         """As the class says."""
@@ -162,38 +152,3 @@ class UNet(Relief):
         values = functional.relu(self.join(torch.cat([values, full], dim=1)))
         last: Tensor = self.last(values)
         return last[:, 0]
-
-
-class Sweep(Relief):
-    """A unet that gives the input's own surface, and one that completes it for other cameras.
-
-    The second one is told of each ray how far the points at a list of reliefs lie behind the first
-    one's surface, as the input's camera sees them: below 0 is empty space, and what lies behind an
-    object may be part of it.
-    """
-
-    def __init__(self, settings: Settings) -> None:
-        super().__init__()
-        self.seen = UNet(settings).requires_grad_(False)
-        self.completed = UNet(settings, STEPS + RAY_PLANES)
-
-    def train(self, mode: bool = True) -> "Sweep":
-        """As `nn.Module.train`; the first network stays as it is."""
-        super().train(mode)
-        self.seen.eval()
-        return self
-
-    def channels(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
-        """As `Relief` says."""
-        size = image.shape[-1]
-        with torch.no_grad():
-            surface = predicted_depth(self.seen, image, cameras, cameras)
-        walls = empty_rooms(targets.world_from_camera, targets.fov_y_degrees, size)[0][:, None]
-        depth = (walls - reliefs(walls)[:, None, None]).clamp(min=NEAREST)
-        there, away, _ = reprojected(surface[:, None], cameras, depth, targets)
-        behind = ((away - there[:, 0]) / THICK).clamp(-1, 1)
-        return torch.cat([behind, planes_of(targets, size)], dim=1)
-
-    def relief(self, channels: Tensor) -> Tensor:
-        """As `Relief` says."""
-        return self.completed.relief(channels)

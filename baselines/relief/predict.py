@@ -1,6 +1,7 @@
 """Submissions of relief networks. Of the rooms only images and cameras are read."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import torch
@@ -8,7 +9,7 @@ from torch import Tensor
 
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.use.predict import Progress, write_depths
-from baselines.relief.network import Card, predicted_depth, relief_network
+from baselines.relief.network import Card, predicted_depth
 from baselines.training.checkpoint import Method, load_weights
 from baselines.training.images import Array, check_reducible
 from baselines.training.rooms import camera_poses, input_views, room_images
@@ -17,15 +18,18 @@ from scenegen.files.new_file import check_writable
 
 FILES = Path(__file__).with_name("files")
 TOLD = "told: the camera, and where the empty room's floor and walls are"
-FROM = {
-    "unet": "each view is predicted from its own image",
-    "sweep": "each view is predicted from the image of the scene's first one",
-}
+FROM = "each view is predicted from its own image"
+FROM_FIRST = "each view is predicted from the image of the scene's first one"
+
+
+def bundled(method: Method[Card, Any]) -> Path:
+    """Return the weights that come with the package."""
+    return FILES / f"{method.name}.safetensors"
 
 
 @torch.inference_mode()
 def write_submission(
-    name: str,
+    method: Method[Card, Any],
     data: str | Path,
     out: str | Path,
     weights: str | Path | None = None,
@@ -35,33 +39,28 @@ def write_submission(
 ) -> None:
     """Write depth and normals of every view of a file of rooms, as `baselines.training` says.
 
-    A network "unet" predicts each view from its own image; one of "sweep" each scene from one image
-    alone, view 0 or the first that the file holds, under the name "NAME-sweep". The submission's
-    notes say it, too.
-
-    Args:
-        name: of the method.
+    A network may predict each view from its own image, or each scene from one image alone, view 0
+    or the first that the file holds. The submission's notes say it, too.
     """
     check_writable(Path(out), overwrite)
-    method = Method(name, Card, relief_network)
-    network, card = load_weights(weights or FILES / f"{name}.safetensors", method)
-    kind, size = card.settings.network, card.settings.size
+    network, card = load_weights(weights or bundled(method), method)
+    size, from_first = card.settings.size, network.from_first_view
     with open_rooms(data) as rooms:
         check_reducible(data, rooms.spec.height, rooms.spec.width, size)
         poses = torch.from_numpy(camera_poses(rooms).astype(np.float32))
         fov, source = rooms.spec.fov_y_degrees, np.arange(len(rooms))
-        if kind == "sweep":
+        if from_first:
             inputs, place = input_views(rooms)
             source = inputs[place]
 
         def depth(rows: Array) -> Tensor:
             image = room_images(rooms, source[rows], size)
             cameras = target_cameras = Cameras(poses[source[rows]], fov)
-            if kind == "sweep":
+            if from_first:
                 target_cameras = Cameras(poses[rows], fov)
             return predicted_depth(network, image, cameras, target_cameras)
 
-        full_name = name if kind == "unet" else f"{name}-{kind}"
-        how = {"method": full_name, "notes": f"{FROM[kind]}; {TOLD}", "overwrite": overwrite}
-        shown = "scored_view" if kind == "unet" else "first_view"
+        notes = f"{FROM_FIRST if from_first else FROM}; {TOLD}"
+        how = {"method": method.name, "notes": notes, "overwrite": overwrite}
+        shown = "first_view" if from_first else "scored_view"
         write_depths(rooms, out, data, depth, progress, shown=shown, **how)

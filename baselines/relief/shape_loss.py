@@ -7,7 +7,7 @@ SLOPE = 2.0  # weight of differences between neighbours
 
 
 def shape_loss(errors: Tensor, inside: Tensor) -> Tensor:
-    """Return the mean |e - mean of its object's e| plus SLOPE times the mean |e - its neighbour's e|.
+    """Return mean |e - its object's mean e| + SLOPE * mean |e - its neighbour's e|.
 
     The first is what `shape_error` scores (with medians); the second teaches normals. Neighbours
     are the pixels below and to the right, where they lie inside the same object.
@@ -19,7 +19,8 @@ def shape_loss(errors: Tensor, inside: Tensor) -> Tensor:
     image = torch.arange(len(inside), device=inside.device)[:, None, None]
     place = inside > 0
     own = errors[place]
-    objects = (inside + image * (1 + int(inside.max())))[place].unique(return_inverse=True)[1]
+    objects = (inside + image * (1 + int(inside.max())))[place]
+    objects = torch.unique(objects, return_inverse=True)[1]
     pixels = torch.bincount(objects)
     means = own.new_zeros(len(pixels)).index_add(0, objects, own) / pixels
     slopes = []

@@ -4,22 +4,22 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import torch
 from numpy.random import Generator
 from torch import Tensor
 
 from baselines.pix2shape.network.empty_rooms import Cameras
-from baselines.relief.network import Card, Relief, Settings, Sweep, relief_network
+from baselines.relief.network import Card, Relief, Settings
 from baselines.relief.shape_loss import shape_loss
-from baselines.training.checkpoint import WEIGHTS, Method, load_weights
+from baselines.training.checkpoint import WEIGHTS, Method
 from baselines.training.fit import Loss, Progress, fit
 from baselines.training.images import Draws
 from baselines.training.rooms import Rooms, read_rooms
 from baselines.training.run_folder import alone_in, begun, earlier_state
 from scenegen import open_rooms
 from scenegen.common.random.seeding import Purpose, item_rng
-from scenegen.common.records import check
 
 EVERY = 100  # iterations between checkpoints
 WARM_UP = 200  # iterations
@@ -48,14 +48,14 @@ Teach = Callable[[Rooms, Settings, Path, Callable[[int, int], None]], Lessons]
 
 
 def train(
-    name: str,
+    method: Method[Card, Any],
     teach: Teach,
     with_depth: bool,
     data: str | Path,
     run_folder: str | Path,
     settings: Settings = Settings(),  # noqa: B008 (it is frozen)
     *,
-    networks: str | None = None,
+    begin: Callable[[Any], Any] = lambda network: None,
     resume: bool = False,
     progress: Progress = lambda done, total, losses: None,
 ) -> Path:
@@ -66,21 +66,20 @@ def train(
     where objects are told.
 
     Args:
-        name: of the method.
         teach: finds the relief to learn; it gets the rooms, the settings, the run's folder and a
             function to call with the images done and in all.
         with_depth: whether the rooms' depth and objects are read.
-        networks: weights of a unet, which a new "sweep" begins with.
+        begin: is given the network of a new run.
     """
-    folder, method = Path(run_folder), Method(name, Card, relief_network)
+    folder = Path(run_folder)
     with alone_in(folder), open_rooms(data) as file:
         earlier = earlier_state(folder, method, resume)
         settings = settings if earlier is None else earlier.card.settings
         rooms = read_rooms(file, settings.size, depth=with_depth)
-        card = Card(name, settings, data=rooms.data, fingerprint=rooms.fingerprint)
+        card = Card(method.name, settings, data=rooms.data, fingerprint=rooms.fingerprint)
         state = begun(method, card, earlier, data)
-        if earlier is None and isinstance(state.network, Sweep):
-            _begin_with(state.network, networks, method, settings)
+        if earlier is None:
+            begin(state.network)
         at, last = state.card.iteration, settings.iterations
         lessons = teach(
             rooms,
@@ -88,7 +87,7 @@ def train(
             folder,
             lambda done, total: progress(at, last, {"share of images matched": done / total}),
         )
-        state.network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]  # faster
+        state.network.to(memory_format=torch.channels_last)  # faster
         draws = iter(Draws(len(lessons.rows), settings.batch, settings.seed, at))
 
         def losses(number: int) -> Iterator[Loss]:
@@ -98,17 +97,6 @@ def train(
 
         fit(folder, method, state, losses, learning_rate, every=EVERY, progress=progress)
     return folder / WEIGHTS
-
-
-def _begin_with(
-    network: Sweep, path: str | None, method: Method[Card, Relief], settings: Settings
-) -> None:
-    """Give a new network the unet that sees. Raises SpecError, OSError, FileFormatError."""
-    check(path is not None, "networks", path, "weights of a unet, which network=sweep begins with")
-    seen, card = load_weights(str(path), method)
-    pair = [(s.network, s.size, s.width) for s in (card.settings, settings)]
-    check(pair[0] == ("unet", *pair[1][1:]), "networks", pair[0], f"a unet of {pair[1][1:]}")
-    network.seen.load_state_dict(seen.state_dict())
 
 
 def learning_rate(settings: Settings, iteration: int) -> float:

@@ -15,20 +15,19 @@ from torch import Tensor
 
 from baselines.pix2shape.matching.labels import labels, matched_rows
 from baselines.relief import predict, training
-from baselines.relief.network import Settings
+from baselines.relief.network import Card, Settings, relief_network
 from baselines.relief.training import Lessons
+from baselines.training.checkpoint import Method
 from baselines.training.rooms import Rooms
-from scenegen.common.records import check
 
-METHOD = "view-pairs"
+METHOD = Method("view-pairs", Card, relief_network)
 __all__ = ["Settings", "train", "write_submission"]
 
 
 def lessons_of(
-    rooms: Rooms, settings: Settings, folder: Path, progress: Callable[[int, int], Any]
+    rooms: Rooms, _settings: Settings, folder: Path, progress: Callable[[int, int], Any]
 ) -> Lessons:
     """Return the relief that matching finds, of the rows that have a partner."""
-    check(settings.network == "unet", "network", settings.network, "unet")
     relief = labels(rooms, folder, progress)
 
     def target(rows: Tensor) -> tuple[Tensor, Tensor]:

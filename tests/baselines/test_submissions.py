@@ -23,13 +23,13 @@ TRUTH = (
     "light/attenuation", "material/reflectance", "view_angle_degrees",
 )  # fmt: skip
 OWN_IMAGE = ("depth-supervised",)  # the others see a scene's view 0 alone
-ROOMS = ("pix2shape", "pix2shape-rays", "ptn", "depth-supervised", "depth-supervised-sweep")
+ROOMS = ("pix2shape", "pix2shape-rays", "ptn", "depth-supervised", "depth-completed")
 QUESTIONS = (
     "pix2shape", "cnn", "siamese", "ptn", "rezende, 0 labels", "rezende, 5 labels"
 )  # fmt: skip
 of_rooms = pytest.mark.parametrize("name", ROOMS)
 of_questions = pytest.mark.parametrize("name", QUESTIONS)
-VARIANTS = ("pix2shape-rays", "depth-supervised-code", "siamese", "rezende, 5 labels")
+VARIANTS = ("pix2shape-rays", "depth-completed", "siamese", "rezende, 5 labels")
 
 
 def but_variants(names: tuple[str, ...]) -> Any:

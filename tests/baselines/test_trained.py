@@ -30,14 +30,14 @@ CASES: dict[str, tuple[str, str, dict[str, Any], dict[str, Any]]] = {
     "cnn": ("cnn", "questions", RESNET, {}),
     "siamese": ("siamese", "questions", RESNET, {"labels": 2}),
     "unet": ("depth-supervised", "rooms", RELIEF, {}),
-    "sweep": ("depth-supervised", "rooms", {**RELIEF, "network": "sweep"}, {}),
+    "completed": ("depth-completed", "rooms", RELIEF, {}),
     "view-pairs": ("view-pairs", "rooms", RELIEF, {}),
     "ptn, rooms": ("ptn", "rooms", PTN, {}),
     "ptn, ids": ("ptn", "rooms", {**PTN, "silhouettes": "ids"}, {}),
     "ptn, questions": ("ptn", "questions", PTN, {"labels": 2}),
     "rezende": ("rezende", "questions", REZENDE, {"labels": 2}),
 }
-VARIANTS = ("siamese", "code", "ptn, ids")  # which share most of their code with another case
+VARIANTS = ("siamese", "completed", "ptn, ids")  # which share most of their code with another case
 each = pytest.mark.parametrize(
     "case", [pytest.param(c, marks=[pytest.mark.slow] * (c in VARIANTS)) for c in CASES]
 )
@@ -60,8 +60,8 @@ def unet(data: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Pat
 def train(case: str, data: dict[str, Path], unet: Path, tmp_path: Path, monkeypatch: Any) -> Train:
     """Train a case into a folder; settings are those of the case unless it goes on."""
     name, kind, settings, how = CASES[case]
-    if case == "sweep":
-        how = {"networks": str(unet)}
+    if case == "completed":
+        how = {"start": str(unet)}
     module = import_module(f"baselines.{HOMES[name][0]}")
     package = HOMES[name][0].partition(".")[0]
     monkeypatch.setattr(f"baselines.{package}.training.EVERY", 2)
@@ -189,7 +189,7 @@ def test_labels_alone_are_learned_from_weights_of_another_run(
 
 IMPOSSIBLE = {
     "depth-supervised": {
-        "network": "mlp", "size": 48, "width": 100.0, "iterations": 0, "batch": 1,
+        "size": 48, "width": 100.0, "iterations": 0, "batch": 1,
         "learning_rate": -1.0, "seed": -1,
     },
     "ptn": {

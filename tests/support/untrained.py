@@ -14,16 +14,15 @@ from baselines import ptn, rezende
 from baselines.pix2shape.use.predict import predict_file
 from baselines.pix2shape.weights import METHOD as REFERENCE
 from baselines.ptn.network import METHOD as PTN
-from baselines.relief import depth_supervised
+from baselines.relief import depth_completed, depth_supervised
 from baselines.relief.network import Card as ReliefCard
 from baselines.relief.network import Settings as ReliefSettings
-from baselines.relief.network import relief_network
 from baselines.resnets import cnn, siamese
 from baselines.resnets.card import Card as ResnetCard
 from baselines.rezende.network import METHOD as REZENDE
 from baselines.rezende.network import Card as RezendeCard
 from baselines.rezende.network import Settings as RezendeSettings
-from baselines.training.checkpoint import Method, new_state, save_weights
+from baselines.training.checkpoint import new_state, save_weights
 
 Write = Callable[..., None]  # (data, out, **how)
 
@@ -59,7 +58,6 @@ def of_module(module: Any, weights: Path) -> Write:
 
 def room_writers(folder: Path) -> dict[str, Write]:
     """Return writers of submissions for rooms of 32x32 pixels or a multiple, by method."""
-    relief = Method("depth-supervised", ReliefCard, relief_network)
     writers = {
         "pix2shape": of_reference(written(folder / "p.safetensors", tiny())),
         "pix2shape-rays": of_reference(
@@ -67,10 +65,10 @@ def room_writers(folder: Path) -> dict[str, Write]:
         ),
         "ptn": of_module(ptn, stored(folder, PTN, card_of(), stand_out)),
     }
-    for name, kind in (("depth-supervised", "unet"), ("depth-supervised-sweep", "sweep")):
-        (folder / kind).mkdir()
-        card = ReliefCard("depth-supervised", ReliefSettings(kind, 32, 0.1))
-        writers[name] = of_module(depth_supervised, stored(folder / kind, relief, card, stand_out))
+    for module in (depth_supervised, depth_completed):
+        method = module.METHOD
+        card = ReliefCard(method.name, ReliefSettings(32, 0.1))
+        writers[method.name] = of_module(module, stored(folder, method, card, stand_out))
     return writers
 
 

@@ -3,10 +3,11 @@
 import pytest
 import torch
 
+from baselines.pix2shape.matching.search import reliefs
 from baselines.pix2shape.network.architecture import contrast
 from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
-from baselines.pix2shape.matching.search import reliefs
-from baselines.relief.network import THICK, Card, Settings, predicted_depth, relief_network
+from baselines.relief.depth_completed import THICK, Completion
+from baselines.relief.network import Card, Settings, UNet, predicted_depth, relief_network
 
 
 def cameras(*positions: tuple[float, float, float]) -> Cameras:
@@ -15,23 +16,23 @@ def cameras(*positions: tuple[float, float, float]) -> Cameras:
     return Cameras(pose, 30.0)
 
 
-def network_of(kind: str, size: int) -> torch.nn.Module:
-    return relief_network(Card("depth-supervised", Settings(kind, size, 0.1)))
+def small(size: int) -> Settings:
+    return Settings(size, 0.1)
 
 
 OWN, OTHER = cameras((0.5, 0.5, 2.0), (0.4, 0.6, 2.2)), cameras((0.6, 0.5, 2.1), (0.3, 0.5, 2.0))
 
 
 @pytest.mark.parametrize("size", [32, 64])
-@pytest.mark.parametrize("kind", ["unet", "sweep"])
+@pytest.mark.parametrize("kind", [relief_network, Completion])
 def test_depth_lies_between_the_walls_and_the_open_sides(kind, size):
     torch.manual_seed(0)
-    network = network_of(kind, size).eval()
+    network = kind(Card("x", small(size))).eval()
     image = torch.rand(2, 3, size, size)
     walls, entry, _ = empty_rooms(OWN.world_from_camera, 30.0, size)
     with torch.no_grad():
         relief = network(image, OWN, OWN)
-        last = (network if kind == "unet" else network.completed).last
+        last = getattr(network, "completed", network).last
         for factor in (1.0, 1e4):
             last.weight.mul_(factor)
             depth = predicted_depth(network, image, OWN, OWN)
@@ -43,14 +44,14 @@ def test_depth_lies_between_the_walls_and_the_open_sides(kind, size):
 
 
 def test_a_unet_sees_with_the_images_own_camera_alone():
-    network = network_of("unet", 32)
+    network = UNet(small(32))
     with pytest.raises(ValueError, match="own camera"):
         network(torch.rand(2, 3, 32, 32), OWN, OTHER)
 
 
-def test_a_sweep_tells_how_far_points_lie_behind_what_is_seen(monkeypatch):
+def test_a_completion_is_told_how_far_points_lie_behind_what_is_seen(monkeypatch):
     """Seen from its own camera, the surface lies at the relief that the first network gives."""
-    network, told = network_of("sweep", 32).eval(), []
+    network, told = Completion(Card("x", small(32))).eval(), []
     monkeypatch.setattr(network.seen, "forward", lambda *_: torch.full((2, 32, 32), 0.1))
     monkeypatch.setattr(network.completed, "relief", told.append)
     for targets in (OWN, OTHER):

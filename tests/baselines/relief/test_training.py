@@ -13,10 +13,10 @@ from safetensors.torch import load_file
 from baselines.pix2shape.matching.labels import FOLDER
 from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
 from baselines.relief import depth_supervised, training, view_pairs
-from baselines.relief.depth_supervised import views_of_scenes
-from baselines.relief.network import Card, Settings, predicted_depth, relief_network
-from baselines.relief.training import learning_rate
-from baselines.training.checkpoint import Method, load_weights
+from baselines.relief.depth_completed import views_of_scenes
+from baselines.relief.network import Settings, predicted_depth
+from baselines.relief.training import learning_rate, windows
+from baselines.training.checkpoint import load_weights
 from scenegen.common.errors import FileFormatError, SpecError
 
 SMALL = Settings(size=32, width=0.25, iterations=2, batch=4)
@@ -34,9 +34,10 @@ def same(one, other):
 
 def test_a_unet_learns_nine_images_by_heart(turned_path, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "WARM_UP", 10)
-    settings = replace(SMALL, iterations=80, batch=9, learning_rate=0.01)
+    monkeypatch.setattr(training, "WHOLE", 0.5)
+    settings = replace(SMALL, iterations=320, batch=9, learning_rate=0.01)
     path = depth_supervised.train(turned_path, tmp_path, settings)
-    network, card = load_weights(path, Method("depth-supervised", Card, relief_network))
+    network, card = load_weights(path, depth_supervised.METHOD)
     rooms = in_memory(turned_path, 32, depth=True)
     cameras = Cameras(rooms.world_from_camera, rooms.fov_y_degrees)
     with torch.no_grad():
@@ -44,7 +45,7 @@ def test_a_unet_learns_nine_images_by_heart(turned_path, tmp_path, monkeypatch):
     walls = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, 32)[0]
     error, before = ((guess - rooms.depth).abs().mean() for guess in (depth, walls))
     assert error < before / 2, "the empty room is left far behind"
-    assert (card.iteration, card.fingerprint) == (80, rooms.fingerprint)
+    assert (card.iteration, card.fingerprint) == (320, rooms.fingerprint)
     assert card.seconds > 0
 
 
@@ -75,8 +76,6 @@ def test_view_pairs_reads_nothing_but_images_and_cameras(near_path, tmp_path):
     assert same(view_pairs.train(blank, tmp_path / "two", SMALL), expected)
     other = edited(near_path, tmp_path / "other.h5", put("image", 1, np.float16(0.5)))
     assert not same(view_pairs.train(other, tmp_path / "three", SMALL), expected)
-    with refused(SpecError, "network", "sweep"):
-        view_pairs.train(near_path, tmp_path / "four", replace(SMALL, network="sweep"))
 
 
 def test_each_row_is_seen_from_the_cameras_of_its_own_scene(turned_path):
@@ -96,3 +95,15 @@ def test_the_learning_rate_rises_and_falls_to_nothing():
     assert 0.085 < max(rates) == rates[199] < 0.1
     assert rates[199:] == sorted(rates[199:], reverse=True)
     assert rates[-1] < 1e-5
+
+
+def test_a_window_is_the_same_of_all_maps_and_shows_an_object():
+    rng = np.random.default_rng(0)
+    places = torch.arange(2 * 64).view(2, 1, 8, 8)
+    shown = torch.zeros(2, 8, 8, dtype=torch.bool)
+    shown[0, 7, 0] = True  # in a corner; the second image shows nothing
+    for _ in range(20):
+        one, other, seen = windows((places, places[:, 0], shown), shown, 4, rng)
+        assert torch.equal(one[:, 0], other)
+        assert (one[..., 1:] - one[..., :-1] == 1).all()
+        assert seen.flatten(1).any(dim=1).tolist() == [True, False]

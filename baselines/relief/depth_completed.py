@@ -1,0 +1,118 @@
+"""`depth-completed`: what the first view sees, completed for other cameras, from true depth.
+
+A trained network of `depth-supervised` gives the surface that the first view sees, and stays as it
+is. A second one learns what another camera sees, of rays through that surface.
+"""
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from baselines.pix2shape.matching.reprojection import reprojected
+from baselines.pix2shape.matching.search import STEPS, reliefs
+from baselines.pix2shape.network.architecture import RAY_PLANES
+from baselines.pix2shape.network.empty_rooms import NEAREST, Cameras, empty_rooms, planes_of
+from baselines.relief import depth_supervised, predict, training
+from baselines.relief.network import Card, Relief, Settings, UNet, predicted_depth
+from baselines.relief.training import Lessons
+from baselines.training.checkpoint import Method, load_weights
+from baselines.training.fit import Progress
+from baselines.training.rooms import Rooms
+from scenegen.common.records import check
+
+THICK = 0.2  # scene units; how far before or behind a surface is told, at most
+__all__ = ["Settings", "train", "write_submission"]
+
+
+class Completion(Relief):
+    """A unet that gives the input's own surface, and one that completes it for other cameras.
+
+    The second one is told of each ray how far the points at a list of reliefs lie behind the first
+    one's surface, as the input's camera sees them. Below 0 is empty space, and what lies behind an
+    object may be part of it.
+    """
+
+    from_first_view = True
+
+    def __init__(self, card: Card) -> None:
+        super().__init__()
+        self.seen = UNet(card.settings).requires_grad_(False)
+        self.completed = UNet(card.settings, STEPS + RAY_PLANES)
+
+    def train(self, mode: bool = True) -> "Completion":
+        """As `nn.Module.train`; the first network stays as it is."""
+        super().train(mode)
+        self.seen.eval()
+        return self
+
+    def channels(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
+        """As `Relief` says."""
+        size = image.shape[-1]
+        with torch.no_grad():
+            surface = predicted_depth(self.seen, image, cameras, cameras)
+        walls = empty_rooms(targets.world_from_camera, targets.fov_y_degrees, size)[0][:, None]
+        depth = (walls - reliefs(walls)[:, None, None]).clamp(min=NEAREST)
+        there, away, _ = reprojected(surface[:, None], cameras, depth, targets)
+        behind = ((away - there[:, 0]) / THICK).clamp(-1, 1)
+        return torch.cat([behind, planes_of(targets, size)], dim=1)
+
+    def relief(self, channels: Tensor) -> Tensor:
+        """As `Relief` says."""
+        return self.completed.relief(channels)
+
+
+METHOD = Method("depth-completed", Card, Completion)
+
+
+def lessons_of(rooms: Rooms, settings: Settings, folder: Path, progress: Any) -> Lessons:
+    """Return the lessons of `depth-supervised`, for any view of the scene of each image."""
+    lessons = depth_supervised.lessons_of(rooms, settings, folder, progress)
+    return Lessons(lessons.rows, lessons.target, views_of_scenes(rooms), lessons.inside)
+
+
+def views_of_scenes(rooms: Rooms) -> list[Tensor]:
+    """Return for each row the rows that show its scene, itself among them."""
+    order = torch.argsort(rooms.scene, stable=True)
+    counts = torch.unique_consecutive(rooms.scene[order], return_counts=True)[1]
+    views: list[Tensor] = [order] * len(rooms)
+    for rows in torch.split(order, counts.tolist()):
+        for row in rows.tolist():
+            views[row] = rows
+    return views
+
+
+def train(
+    data: str | Path,
+    run_folder: str | Path,
+    settings: Settings = Settings(),  # noqa: B008 (it is frozen)
+    *,
+    start: str | None = None,
+    resume: bool = False,
+    progress: Progress = lambda done, total, losses: None,
+) -> Path:
+    """Train the network that completes on a file of rooms, as `baselines.training` says.
+
+    Args:
+        start: weights of `depth-supervised`, whose network sees; those of the package by default.
+
+    Raises SpecError where its size or width is another one, too.
+    """
+    check(start is None or not resume, "start", start, "none, as --resume goes on with a run")
+
+    def begin(network: Completion) -> None:
+        path = start or predict.bundled(depth_supervised.METHOD)
+        seen, card = load_weights(path, depth_supervised.METHOD)
+        sizes = [(s.size, s.width) for s in (card.settings, settings)]
+        check(sizes[0] == sizes[1], "start", f"size and width {sizes[0]}", f"{sizes[1]}")
+        network.seen.load_state_dict(seen.state_dict())
+
+    return training.train(
+        METHOD, lessons_of, True, data, run_folder, settings,
+        begin=begin, resume=resume, progress=progress,
+    )  # fmt: skip
+
+
+write_submission = partial(predict.write_submission, METHOD)
