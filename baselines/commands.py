@@ -60,6 +60,7 @@ CUT_OUTS = (
 HOMES = {
     "cnn": ("resnets.cnn", "questions: ResNets and a softmax over the answers"),
     "depth-completed": ("relief.depth_completed", "rooms: a network that completes the first view"),
+    "depth-match": ("depth_match", "questions: depth from a network, turned until views agree"),
     "depth-supervised": (
         "relief.depth_supervised",
         "rooms: a network trained with true depth",

@@ -5,17 +5,14 @@ are searched from a grid over SO(3) to finer and finer turns of the best ones; t
 correlation of occupancies within the ball that all rotations keep.
 """
 
-import math
 from dataclasses import dataclass
 
-import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
 
 from baselines.ptn.network import VOXELS, Ptn
-from baselines.training.rotations import rotation_grid
-from scenegen.common.rotations import rotation_matrix
+from baselines.training.rotations import rotation_grid, small_turns
 
 COARSE, FINE = 8, 16  # voxels a side of the volumes that are compared, at first and at last
 GRID = 1200  # rotations that are tried first, some 20 degrees apart
@@ -25,18 +22,6 @@ CHUNK = 256  # rotations at a time
 FEATURES = ("fit of volumes", "nearness of codes")
 FINELY = 4
 RIDGE = 1e-3  # keeps the head's weights finite where labels are few
-
-
-def small_turns(count: int, angle: float) -> Tensor:
-    """Return turns by an angle about axes spread evenly over the sphere, (count, 3, 3)."""
-    i = np.arange(count) + 0.5
-    z, turn = 1 - 2 * i / count, i * math.pi * (3 - math.sqrt(5))
-    flat = np.sqrt(1 - z * z)
-    axis = np.stack([flat * np.cos(turn), flat * np.sin(turn), z])
-    quaternion = np.concatenate(
-        [np.full((1, count), math.cos(angle / 2)), math.sin(angle / 2) * axis]
-    )
-    return torch.from_numpy(rotation_matrix(quaternion)).float()
 
 
 @torch.inference_mode()

@@ -3,6 +3,8 @@
 import math
 
 import numpy as np
+import torch
+from torch import Tensor
 
 from baselines.training.images import Array
 from scenegen.common.rotations import rotation_matrix
@@ -21,3 +23,15 @@ def rotation_grid(count: int) -> Array:
     a, b = 2 * math.pi * s / math.sqrt(2), 2 * math.pi * s / PSI
     quaternions = np.stack([near * np.sin(a), near * np.cos(a), far * np.sin(b), far * np.cos(b)])
     return rotation_matrix(quaternions).astype(np.float32)
+
+
+def small_turns(count: int, angle: float) -> Tensor:
+    """Return turns by an angle about axes spread evenly over the sphere, (count, 3, 3)."""
+    i = np.arange(count) + 0.5
+    z, turn = 1 - 2 * i / count, i * math.pi * (3 - math.sqrt(5))
+    flat = np.sqrt(1 - z * z)
+    axis = np.stack([flat * np.cos(turn), flat * np.sin(turn), z])
+    quaternion = np.concatenate(
+        [np.full((1, count), math.cos(angle / 2)), math.sin(angle / 2) * axis]
+    )
+    return torch.from_numpy(rotation_matrix(quaternion)).float()

@@ -25,7 +25,7 @@ TRUTH = (
 OWN_IMAGE = ("depth-supervised",)  # the others see a scene's view 0 alone
 ROOMS = ("pix2shape", "pix2shape-rays", "ptn", "depth-supervised", "depth-completed")
 QUESTIONS = (
-    "pix2shape", "cnn", "siamese", "ptn", "rezende, 0 labels", "rezende, 5 labels"
+    "pix2shape", "cnn", "siamese", "depth-match", "ptn", "rezende, 0 labels", "rezende, 5 labels"
 )  # fmt: skip
 of_rooms = pytest.mark.parametrize("name", ROOMS)
 of_questions = pytest.mark.parametrize("name", QUESTIONS)

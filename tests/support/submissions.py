@@ -44,7 +44,7 @@ def make_truths(folder: Path) -> Truths:
     make_dataset(folder / "rooms.h5", spec, 8, command="tests")
     split = SplitSpec(
         seed=5, train=6, labeled=3, val=6, test=6, cubes=(8, 9), height=32, width=32,
-        min_cube_pixels=2,
+        min_cube_pixels=2, with_depth=True,
     )  # fmt: skip
     make_split(folder / "iqtt", split, command="tests")
     return Truths(folder / "rooms.h5", folder / "iqtt" / "iqtt-test.h5")

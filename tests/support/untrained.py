@@ -10,7 +10,9 @@ from pix2shape_models import card_of as reference_card
 from pix2shape_models import of_questions, tiny, written
 from ptn_models import card_of
 
-from baselines import ptn, rezende
+from baselines import depth_match, ptn, rezende
+from baselines.depth_match.network import METHOD as DEPTH
+from baselines.depth_match.network import Card as DepthCard
 from baselines.pix2shape.use.predict import predict_file
 from baselines.pix2shape.weights import METHOD as REFERENCE
 from baselines.ptn.network import METHOD as PTN
@@ -79,6 +81,8 @@ def answer_writers(folder: Path, train: Path) -> dict[str, Write]:
         card = ResnetCard(method.name, module.Settings(width=4, size=16), labels=1)
         writers[method.name] = of_module(module, stored(folder, method, card))
     writers["ptn"] = of_module(ptn, stored(folder, PTN, card_of("questions")))
+    small = DepthCard("depth-match", depth_match.Settings(size=32, width=0.1))
+    writers["depth-match"] = of_module(depth_match, stored(folder, DEPTH, small, stand_out))
     for labels in (0, 5):
         place = folder / str(labels)
         place.mkdir()

@@ -1,0 +1,80 @@
+"""True depth answers questions of mirror images; the geometry is that of our cameras."""
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+import torch
+
+from baselines.depth_match.matching import denials, least_denials, surface_points
+from baselines.depth_match.network import symmetric
+from baselines.depth_match.training import read_pictures
+from iqtt import QuestionsFile, SplitSpec, make_split, open_questions
+from scenegen.camera import back_project
+
+KINDS = ("mirror-pair", "matched")
+SIZE = 64
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def questions(request, tmp_path_factory) -> Iterator[QuestionsFile]:
+    folder = tmp_path_factory.mktemp("split")
+    spec = SplitSpec(
+        seed=3, train=8, labeled=8, val=0, test=0, distractors=request.param, height=SIZE,
+        width=SIZE, min_cube_pixels=8, with_depth=True,
+    )  # fmt: skip
+    make_split(folder, spec)
+    with open_questions(folder / "iqtt-train.h5", "labeled") as file:
+        yield file
+
+
+def true_depth(questions: QuestionsFile) -> torch.Tensor:
+    """Return the depth of all pictures in camera distances, (Q, 1 + K, S, S)."""
+    height = read_pictures(questions, SIZE).height.float()
+    depth = torch.where(height.isfinite(), 1 - height, torch.inf)
+    return depth.view(len(questions), -1, SIZE, SIZE)
+
+
+def test_true_depth_answers_hard_questions(questions):
+    costs = [least_denials(depth, 28.0) for depth in true_depth(questions)]
+    right = torch.from_numpy(questions.read("answers", slice(None)).astype(int))
+    assert int((torch.stack(costs).argmin(dim=1) == right).sum()) >= 7  # of 8
+
+
+def test_surfaces_lie_where_the_camera_sees_them(questions):
+    """The true rotation of a picture takes its points onto faces of cubes, in cube edges."""
+    half = float(np.tan(np.radians(14.0)))
+    for row, depth in enumerate(true_depth(questions)[:3]):
+        distance = float(questions.read("camera_distance", row))
+        count = int(questions.read("cube_count", row))
+        points = surface_points(depth[0], half).numpy() * distance
+        cubes = questions.read("cubes", row)[0, :count]
+        middle = (cubes.min(axis=0) + cubes.max(axis=0) + 1) / 2
+        own = points @ questions.read("world_from_shape", row)[0] + middle
+        off = np.abs(own - np.round(own)).min(axis=1)
+        assert np.median(off) < 0.01
+        assert (off < 0.1).mean() > 0.9
+        assert denials(torch.from_numpy(points).float() / distance, torch.eye(3)[None],
+                       depth[0], half) < 2e-3  # fmt: skip
+
+
+def test_points_are_those_of_the_camera():
+    depth = torch.full((8, 8), 2.0)
+    depth[0, 3], depth[5, 6] = torch.inf, 0.7
+    expected = back_project(depth.numpy(), 40.0)[np.isfinite(depth.numpy())] + [0, 0, 1]
+    points = surface_points(depth, float(np.tan(np.radians(20.0)))).numpy()
+    off = np.linalg.norm(points[:, None] - expected[None], axis=2)
+    assert off.min(axis=1).max() < 1e-5
+    assert off.min(axis=0).max() < 1e-5
+    assert surface_points(depth + torch.inf, 1.0).abs().max() == 0
+
+
+@pytest.mark.parametrize("form", range(8))
+def test_each_form_is_undone(form):
+    maps = torch.rand(2, 3, 4, 4)
+    torch.testing.assert_close(symmetric(symmetric(maps, form), -form), maps)
+
+
+def test_the_forms_are_all_different():
+    maps = torch.arange(9).view(1, 3, 3)
+    assert len({tuple(symmetric(maps, form).flatten().tolist()) for form in range(8)}) == 8
