@@ -44,6 +44,7 @@ UNTRAINED = {
     "chance": "questions: random answers",
     "cubes": "questions: pictures decoded to cubes in 3D; nothing is learned",
     "outline": "questions: the nearest outline, without labels or 3D",
+    "features": "questions: features of a frozen encoder, from --features",
     "outline-trees": "questions: trees on outline features, from --train",
     "pix2shape": "the reference model, trained by the paper's losses",
     "pix2shape-compact": "the same, trained by other losses",
@@ -92,12 +93,20 @@ def _listed(baselines: Mapping[str, str]) -> str:
     "--train",
     type=InputPath(),
     help="What is learned from: rooms for constant, mean-depth, nearest, outline-regression and"
-    " outline-relief; questions for outline-trees.",
+    " outline-relief; questions for outline-trees and features.",
 )
 @click.option(
     "--labels",
     type=click.IntRange(1, LARGEST),
-    help="Labelled questions of --train that outline-trees learns from  [all].",
+    help="Labelled questions of --train that outline-trees and features learn from  [all].",
+)
+@click.option(
+    "--features",
+    type=InputPath(),
+    help="For features: a .npy file of (Q, 1 + K, D) numbers, for each picture of --data.",
+)
+@click.option(
+    "--train-features", type=InputPath(), help="The same for the labelled questions of --train."
 )
 @SUBMISSION
 @click.option(
@@ -119,6 +128,8 @@ def baseline(
     data: str,
     train: str | None,
     labels: int | None,
+    features: str | None,
+    train_features: str | None,
     out: str,
     seed: int,
     weights: str | None,
@@ -126,13 +137,7 @@ def baseline(
 ) -> None:
     """Write the submission of a baseline for rooms or questions."""
     _check_task(name, data)
-    if weights is not None and name not in (*REFERENCE, *TRAINED):
-        raise click.UsageError(f"--weights: {name} has none")
-    if train is not None and name in (*REFERENCE, *TRAINED):
-        command = "pix2shape train" if name in REFERENCE else f"bench train {name}"
-        raise click.UsageError(f"--train: {name} is trained already; see {command}")
-    if labels is not None and name != "outline-trees":
-        raise click.UsageError(f"--labels: {name} learns from none")
+    _check_options(name, weights, train, labels, features or train_features)
     method = name
     if name in REFERENCE:
         used = predict_to(out, weights, data, method=name, overwrite=overwrite)
@@ -152,6 +157,11 @@ def baseline(
                 write_cut_outs(name, data, out, train=train, **how)
             elif name == "cubes":
                 _answer_by_cubes(data, out, how)
+            elif features is not None:
+                from baselines.features import write_features
+
+                how = {"train": train, "train_features": train_features, "labels": labels}
+                write_features(data, out, features, **how, overwrite=overwrite)
             elif name in ("outline", "outline-trees"):
                 _answer_by_outline(name, data, out, train, labels, how)
             else:
@@ -159,6 +169,22 @@ def baseline(
 
                 write_room_baseline(name, data, out, train=train, **how)
     print_line(f"{out}: {method} on {data}; {score_it(out, data)}")
+
+
+def _check_options(
+    name: str, weights: str | None, train: str | None, labels: int | None, features: str | None
+) -> None:
+    """Raise UsageError for an option that a baseline does not have, or lacks."""
+    if weights is not None and name not in (*REFERENCE, *TRAINED):
+        raise click.UsageError(f"--weights: {name} has none")
+    if train is not None and name in (*REFERENCE, *TRAINED):
+        command = "pix2shape train" if name in REFERENCE else f"bench train {name}"
+        raise click.UsageError(f"--train: {name} is trained already; see {command}")
+    if labels is not None and name not in ("outline-trees", "features"):
+        raise click.UsageError(f"--labels: {name} learns from none")
+    if (features is None) == (name == "features"):
+        how = "needs features of the pictures" if features is None else "takes none"
+        raise click.UsageError(f"--features: {name} {how}")
 
 
 def _check_task(name: str, data: str) -> None:

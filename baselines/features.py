@@ -1,0 +1,120 @@
+"""Answers by features of a frozen encoder, anyone's: the nearest one, or a probe of labels.
+
+The encoder runs elsewhere. Its features come as .npy files of (Q, 1 + K, D) numbers, the reference
+first, in the order of the file's questions.
+"""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from iqtt.files.reader import QuestionsFile, open_questions, parts
+from metrics.prediction_writer import write_answers
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.records import check
+
+Array = NDArray[Any]
+FOLDS = 5  # of the choice of how strongly weights are held near 0
+STRENGTHS = (1e-3, 1e-2, 1e-1, 1.0, 10.0)
+
+
+def write_features(
+    data: str | Path,
+    out: str | Path,
+    features: str | Path,
+    *,
+    train: str | Path | None = None,
+    train_features: str | Path | None = None,
+    labels: int | None = None,
+    overwrite: bool = False,
+) -> None:
+    """Answer the questions of a file by features of their pictures.
+
+    Without labels the answer of the greatest cosine with the reference wins. With labels a Siamese
+    probe weighs the squared differences of each dimension by logistic regression.
+
+    Args:
+        features: .npy of the questions of `data`; train_features: of the labelled ones of `train`,
+            or of its first ones.
+        labels: how many of the labelled questions to learn from, the first ones; all by default.
+
+    Raises SpecError where training data and features do not belong together, or labels are too
+    few; FileFormatError where features do not fit or are not finite; else as `open_questions` and
+    `write_answers`.
+    """
+    with open_questions(data) as questions:
+        seen = read_features(features, len(questions), questions)
+    if train is None or train_features is None:
+        check(train is train_features, "train", train, "features of it, too, or neither")
+        scores, notes = nearest(seen), "cosine of features; no labels"
+    else:
+        names = parts(train)
+        with open_questions(train, "labeled" if "labeled" in names else names[0]) as labelled:
+            check(labelled.has_answers, "train", train, "a file with answers")
+            count = len(labelled) if labels is None else labels
+            expected = f"{2 * FOLDS} to {len(labelled)}"
+            check(2 * FOLDS <= count <= len(labelled), "labels", count, expected)
+            if labelled.fingerprint is not None and labelled.fingerprint == questions.fingerprint:
+                raise SpecError("train", train, "another file than the one to answer")
+            learned = read_features(train_features, count, labelled)
+            right = labelled.read("answers", slice(0, count)).astype(int)
+        scores, notes = probed(learned, right, seen), f"a probe of {count} labels of {train}"
+    write_answers(out, data, method="features", scores=scores, notes=notes, overwrite=overwrite)
+
+
+def read_features(path: str | Path, count: int, questions: QuestionsFile) -> Array:
+    """Return the features of the first questions, (count, 1 + K, D) float64 of length 1.
+
+    Raises OSError; FileFormatError where there are none of so many questions, or not finite ones.
+    """
+    shape = (count, 1 + questions.answers)
+    try:
+        values = np.lib.format.open_memmap(path, mode="r")
+    except (ValueError, EOFError) as error:
+        raise FileFormatError(path, f"no array ({error})", "a .npy file of numbers") from error
+    expected = f"numbers of the shape {shape} and a last axis of at least 1"
+    fits = values.ndim == 3 and values.shape[1] == shape[1] and values.size
+    if not fits or not count <= len(values) <= len(questions):
+        raise FileFormatError(path, f"the shape {values.shape}", expected)
+    if values.dtype.kind not in "fiu":
+        raise FileFormatError(path, f"values of {values.dtype}", expected)
+    read = np.asarray(values[:count], np.float64)
+    if not np.isfinite(read).all():
+        row = int(np.flatnonzero(~np.isfinite(read).all(axis=(1, 2)))[0])
+        raise FileFormatError(f"{path}: row {row}", "features that are not finite", "numbers")
+    length = np.linalg.norm(read, axis=2, keepdims=True)
+    return np.asarray(read / np.where(length > 0, length, 1))
+
+
+def nearest(features: Array) -> Array:
+    """Return the cosine of each answer with the reference, (Q, K)."""
+    cosines: Array = np.einsum("qd,qkd->qk", features[:, 0], features[:, 1:])
+    return cosines
+
+
+def probed(learned: Array, right: Array, seen: Array) -> Array:
+    """Return scores of answers, (Q, K), by weights of dimensions that labelled questions teach.
+
+    Args:
+        learned, seen: features of length 1, (N, 1 + K, D) and (Q, 1 + K, D).
+        right: the right answers of the N questions.
+    """
+    from sklearn.linear_model import LogisticRegression
+    from sklearn.model_selection import GroupKFold, cross_val_score
+
+    columns, asked = (np.square(f[:, 1:] - f[:, :1]) for f in (learned, seen))
+    spread = columns.std(axis=(0, 1))
+    scale = np.where(spread > 0, spread, 1)
+    count, answers, width = columns.shape
+    flat = (columns / scale).reshape(-1, width)
+    is_right = (np.arange(answers) == right[:, None]).reshape(-1)
+    folds = list(GroupKFold(FOLDS).split(flat, groups=np.repeat(np.arange(count), answers)))
+    probes = [LogisticRegression(C=strength, max_iter=1000) for strength in STRENGTHS]
+    merits = [
+        cross_val_score(probe, flat, is_right, cv=folds, scoring="neg_log_loss").mean()
+        for probe in probes
+    ]
+    weights = probes[int(np.argmax(merits))].fit(flat, is_right).coef_[0] / scale
+    return np.asarray(asked @ weights)

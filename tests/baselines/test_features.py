@@ -1,0 +1,82 @@
+"""Features answer by the nearest; labels teach which dimensions count; misfits are refused."""
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from refusals import refused
+
+from baselines.features import nearest, probed, read_features, write_features
+from cli import bench
+from iqtt import open_questions
+from scenegen.common.errors import FileFormatError, SpecError
+
+
+def told_by_one(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return features whose dimension 3 tells the answer, beside louder noise, and the answers."""
+    rng = np.random.default_rng(seed)
+    features, right = rng.normal(size=(count, 4, 12)), rng.integers(0, 3, count)
+    features[..., 3] = rng.normal(size=(count, 4))
+    features[np.arange(count), 1 + right, 3] = features[:, 0, 3]
+    return features, right
+
+
+def test_the_greatest_cosine_is_the_nearest():
+    rng = np.random.default_rng(0)
+    features, right = rng.normal(size=(20, 4, 6)), rng.integers(0, 3, 20)
+    features[np.arange(20), 1 + right] = features[:, 0] * rng.uniform(0.1, 9, (20, 1))
+    unit = features / np.linalg.norm(features, axis=2, keepdims=True)
+    assert (nearest(unit).argmax(axis=1) == right).all()
+
+
+def test_labels_teach_which_dimension_counts():
+    (learned, answers), (seen, right) = told_by_one(300, 1), told_by_one(200, 2)
+    assert (nearest(seen).argmax(axis=1) == right).mean() < 0.6
+    assert (probed(learned, answers, seen).argmax(axis=1) == right).mean() > 0.85
+
+
+def test_a_submission_holds_the_answers_of_the_features(truths, train_questions, tmp_path):
+    with open_questions(truths.iqtt) as file:
+        count = len(file)
+    rng = np.random.default_rng(0)
+    np.save(tmp_path / "f.npy", rng.normal(size=(count, 4, 5)).astype("f4"))
+    arguments = ["baseline", "features", "--data", truths.iqtt, "--out", tmp_path / "a.h5"]
+    arguments += ["--features", tmp_path / "f.npy"]
+    assert CliRunner().invoke(bench, list(map(str, arguments))).exit_code == 0
+    with h5py.File(tmp_path / "a.h5") as file, open_questions(truths.iqtt) as questions:
+        expected = nearest(read_features(tmp_path / "f.npy", count, questions))
+        np.testing.assert_allclose(file["scores"][()], expected)
+    assert CliRunner().invoke(bench, list(map(str, arguments[:-2]))).exit_code == 2
+    with refused(SpecError, "labels", "3"):
+        how = {"train": train_questions, "train_features": tmp_path / "f.npy"}
+        write_features(truths.iqtt, tmp_path / "b.h5", tmp_path / "f.npy", **how)
+    with refused(SpecError, "train"):
+        write_features(truths.iqtt, tmp_path / "b.h5", tmp_path / "f.npy", train=train_questions)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        np.zeros((5, 4, 3)),  # one question too few
+        np.zeros((6, 3, 3)),
+        np.zeros((6, 4, 0)),
+        np.zeros(24),
+        np.full((6, 4, 3), np.nan),
+        np.full((6, 4, 3), "a"),
+    ],
+)
+def test_features_that_do_not_fit_are_refused(values: np.ndarray, truths, tmp_path: Path):
+    np.save(tmp_path / "f.npy", values)
+    with open_questions(truths.iqtt) as questions, pytest.raises(FileFormatError):
+        read_features(tmp_path / "f.npy", 6, questions)
+
+
+def test_a_file_that_is_no_array_is_refused(truths, tmp_path):
+    np.savez(tmp_path / "f.npz", a=np.zeros(3))
+    for name, data in {"f.npy": b"nothing", "p.npy": b"\x80\x04N."}.items():
+        (tmp_path / name).write_bytes(data)
+    for name in ("f.npy", "p.npy", "f.npz"):
+        with open_questions(truths.iqtt) as questions, refused(FileFormatError, name):
+            read_features(tmp_path / name, 6, questions)
