@@ -1,0 +1,124 @@
+"""How robust explicit 3D is: `cubes` and `depth-match` on pictures that are disturbed in one way.
+
+    iqtt make-split --distractors mirror-pair --train 0 --labeled 0 --val 0 --test 50 --seed 9101 \
+        --out pairs
+    python -m benchmarks.experiments.robustness --data pairs/iqtt-test.h5 --count 50
+
+It prints the accuracy of each method on the first questions with a Wilson interval, as Markdown.
+"""
+
+import argparse
+import io
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from PIL import Image
+from scipy import ndimage, stats
+
+from baselines.cubes.answer import answer_scores
+from baselines.depth_match.answers import FILES
+from baselines.depth_match.matching import least_denials
+from baselines.depth_match.network import METHOD, seen_depth
+from baselines.training.checkpoint import load_weights
+from baselines.training.images import channels_first
+from benchmarks.markdown import table
+from iqtt import QuestionsFile, SplitSpec, open_questions
+from iqtt.files.reader import answers_beside
+from scenegen.rendering.ground_truth import decode_image
+
+Array = NDArray[Any]
+Disturb = Callable[[Array, np.random.Generator], Array]  # a picture (H, W, 3) uint8 to another
+
+
+def noise(level: float) -> Disturb:
+    """Return Gaussian noise of this standard deviation, of 255."""
+    return lambda picture, rng: _rounded(picture + rng.normal(0, level, picture.shape))
+
+
+def blur(sigma: float) -> Disturb:
+    """Return a Gaussian blur of this standard deviation, pixels."""
+    return lambda picture, _: _rounded(
+        ndimage.gaussian_filter(picture.astype(float), (sigma, sigma, 0))
+    )
+
+
+def jpeg(quality: int) -> Disturb:
+    """Return compression to JPEG and back."""
+
+    def disturb(picture: Array, _: np.random.Generator) -> Array:
+        file = io.BytesIO()
+        Image.fromarray(picture).save(file, "JPEG", quality=quality)
+        return np.asarray(Image.open(file))
+
+    return disturb
+
+
+def halved(picture: Array, _: np.random.Generator) -> Array:
+    """Return a picture of half the width."""
+    height, width = picture.shape[:2]
+    return _rounded(picture.reshape(height // 2, 2, width // 2, 2, 3).mean(axis=(1, 3)))
+
+
+def _rounded(values: Array) -> Array:
+    return np.clip(np.rint(values), 0, 255).astype(np.uint8)
+
+
+DISTURBED: Mapping[str, Disturb] = {
+    "as made": lambda picture, _: picture,
+    "noise 1 of 255": noise(1), "noise 4 of 255": noise(4),
+    "blur 0.5 pixels": blur(0.5), "blur 1 pixel": blur(1),
+    "JPEG 95": jpeg(95), "JPEG 75": jpeg(75),
+    "half the size": halved,
+}  # fmt: skip
+
+
+def by_cubes(pictures: Array, spec: SplitSpec) -> int:
+    """Return the answer of `cubes` to pictures, (1 + K, H, W, 3) uint8."""
+    return int(answer_scores(pictures, spec).argmax())
+
+
+def by_depth(pictures: Array, spec: SplitSpec) -> int:
+    """Return the answer of `depth-match`."""
+    network, card = load_weights(FILES / "depth-match.safetensors", METHOD)
+    images = [channels_first(decode_image(one), card.settings.size) for one in pictures]
+    with torch.inference_mode():
+        depth = seen_depth(network, torch.from_numpy(np.stack(images)))
+        return int(least_denials(depth, spec.fov_y_degrees).argmin())
+
+
+def accuracy(
+    method: Callable[[Array, SplitSpec], int], disturb: Disturb, file: QuestionsFile, count: int
+) -> str:
+    """Return the share of right answers with its 95% Wilson interval."""
+    assert file.spec is not None, "files of ours have settings"
+    right = 0
+    for row in range(count):
+        rng = np.random.default_rng(row)
+        pictures = [disturb(picture, rng) for picture in file.read("questions", row)]
+        right += method(np.stack(pictures), file.spec) == int(file.read("answers", row))
+    low, high = stats.binomtest(right, count).proportion_ci(method="wilson")
+    return f"{right / count:.2f} [{low:.2f}, {high:.2f}]"
+
+
+def main() -> None:
+    """Read the options and print a row for each way to disturb."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, required=True)
+    parser.add_argument("--count", type=int, default=50)
+    parser.add_argument("--ways", nargs="+", default=list(DISTURBED), choices=DISTURBED)
+    options = parser.parse_args()
+    methods = {"`cubes`": by_cubes, "`depth-match`": by_depth}
+    with open_questions(options.data, answers=answers_beside(options.data)) as file:
+        lines = [
+            [way, *(accuracy(m, DISTURBED[way], file, options.count) for m in methods.values())]
+            for way in options.ways
+        ]
+    print(table(["pictures", *methods], lines))
+
+
+if __name__ == "__main__":
+    main()
