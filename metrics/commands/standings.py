@@ -162,8 +162,9 @@ def leaderboard(
 ) -> None:
     """Rank score files in one table for each test set.
 
-    The headline ranks: relief for rooms, skill for questions. Floors, and what the paper reported
-    on its own data, stand below the methods, without a rank.
+    The headline ranks: shape for rooms, or what is behind for methods that see the first view
+    alone, and skill for questions. Floors, and what the paper reported on its own data, stand below
+    the methods, without a rank.
     """
     from metrics.score_file import read_scores
     from metrics.views.leaderboard.cards import read_cards
