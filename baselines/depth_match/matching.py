@@ -17,7 +17,7 @@ POINTS = 300  # of each surface
 GRID = 4608  # rotations that are tried first
 KEPT, TURNS = 12, 24  # how many of the best are turned further, and in how many ways each
 FINER = (0.12, 0.07, 0.04, 0.02)  # radians of these turns, in each round
-MOST = 0.1  # camera distances; a point is denied by no more
+MOST = 0.2  # camera distances; a point is denied by no more
 
 
 @torch.inference_mode()
