@@ -87,7 +87,7 @@ def _listed(baselines: Mapping[str, str]) -> str:
 @click.command(
     epilog=f"{_listed(ALL)}{EXAMPLE}bench baseline empty-room --data rooms.h5 --out empty-room.h5"
 )
-@click.argument("name", type=click.Choice(list(ALL)))
+@click.argument("name", type=click.Choice(list(ALL)), metavar="NAME")
 @click.option("--data", type=InputPath(), required=True, help="Rooms or questions to predict.")
 @click.option(
     "--train",
@@ -228,7 +228,7 @@ def _answer_by_outline(
     name="train",
     epilog=f"{_listed(TRAINED)}{EXAMPLE}bench train cnn --data iqtt-split/iqtt-train.h5 --out run",
 )
-@click.argument("name", type=click.Choice(list(TRAINED)))
+@click.argument("name", type=click.Choice(list(TRAINED)), metavar="NAME")
 @click.option("--data", type=InputPath(), required=True, help="Rooms or questions to train on.")
 @click.option("--out", type=OutputFolder(), required=True, help="Folder of the run.")
 @click.option(

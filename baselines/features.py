@@ -47,7 +47,8 @@ def write_features(
     with open_questions(data) as questions:
         seen = read_features(features, len(questions), questions)
     if train is None or train_features is None:
-        check(train is train_features, "train", train, "features of it, too, or neither")
+        name, given = ("train_features", train) if train else ("train", train_features)
+        check(given is None, name, "none", f"one that belongs to {given}")
         scores, notes = nearest(seen), "cosine of features; no labels"
     else:
         names = parts(train)

@@ -52,7 +52,7 @@ def test_a_submission_holds_the_answers_of_the_features(truths, train_questions,
     with refused(SpecError, "labels", "3"):
         how = {"train": train_questions, "train_features": tmp_path / "f.npy"}
         write_features(truths.iqtt, tmp_path / "b.h5", tmp_path / "f.npy", **how)
-    with refused(SpecError, "train"):
+    with refused(SpecError, "train_features"):
         write_features(truths.iqtt, tmp_path / "b.h5", tmp_path / "f.npy", train=train_questions)
 
 

@@ -43,7 +43,7 @@ def test_true_depth_answers_hard_questions(questions):
 
 
 def test_the_bundled_network_answers_half_of_them(questions):
-    """docs/results.md has DMR of 500 each; chance is 1/3."""
+    """docs/results.md has 0.67 and 0.60 of 500; chance is 1/3."""
     network, _ = load_weights(FILES / "depth-match.safetensors", METHOD)
     with torch.inference_mode():
         images = (torch.from_numpy(question_images(questions, row, SIZE)) for row in range(8))
