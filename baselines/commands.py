@@ -137,7 +137,9 @@ def baseline(
 ) -> None:
     """Write the submission of a baseline for rooms or questions."""
     _check_task(name, data)
-    _check_options(name, weights, train, labels, features or train_features)
+    _check_options(name, weights, train, labels, features)
+    if train_features is not None and name != "features":
+        raise click.UsageError(f"--train-features: {name} takes none")
     method = name
     if name in REFERENCE:
         used = predict_to(out, weights, data, method=name, overwrite=overwrite)

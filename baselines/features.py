@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.files.reader import QuestionsFile, open_questions, parts
+from metrics.intake.array_files import read_array
 from metrics.prediction_writer import write_answers
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
+from scenegen.files.new_file import check_writable
 
 Array = NDArray[Any]
 FOLDS = 5  # of the choice of how strongly weights are held near 0
@@ -41,14 +43,16 @@ def write_features(
         labels: how many of the labelled questions to learn from, the first ones; all by default.
 
     Raises SpecError where training data and features do not belong together, or labels are too
-    few; FileFormatError where features do not fit or are not finite; else as `open_questions` and
-    `write_answers`.
+    few; FileFormatError where features do not fit or are not finite; else as `open_questions`,
+    `read_array` and `write_answers`.
     """
+    check_writable(Path(out), overwrite)
     with open_questions(data) as questions:
         seen = read_features(features, len(questions), questions)
     if train is None or train_features is None:
         name, given = ("train_features", train) if train else ("train", train_features)
         check(given is None, name, "none", f"one that belongs to {given}")
+        check(labels is None, "labels", labels, "none, as nothing is learned without --train")
         scores, notes = nearest(seen), "cosine of features; no labels"
     else:
         names = parts(train)
@@ -57,9 +61,13 @@ def write_features(
             count = len(labelled) if labels is None else labels
             expected = f"{2 * FOLDS} to {len(labelled)}"
             check(2 * FOLDS <= count <= len(labelled), "labels", count, expected)
-            if labelled.fingerprint is not None and labelled.fingerprint == questions.fingerprint:
+            mark = labelled.fingerprint
+            if (mark and mark == questions.fingerprint) or Path(train).samefile(data):
                 raise SpecError("train", train, "another file than the one to answer")
             learned = read_features(train_features, count, labelled)
+            if learned.shape[2] != seen.shape[2]:
+                found, expected = (f"{one.shape[2]} numbers a picture" for one in (learned, seen))
+                raise FileFormatError(train_features, found, f"{expected}, as {features} has")
             right = labelled.read("answers", slice(0, count)).astype(int)
         scores, notes = probed(learned, right, seen), f"a probe of {count} labels of {train}"
     write_answers(out, data, method="features", scores=scores, notes=notes, overwrite=overwrite)
@@ -68,15 +76,12 @@ def write_features(
 def read_features(path: str | Path, count: int, questions: QuestionsFile) -> Array:
     """Return the features of the first questions, (count, 1 + K, D) float64 of length 1.
 
-    Raises OSError; FileFormatError where there are none of so many questions, or not finite ones.
+    Raises as `read_array`; FileFormatError where there are none of so many questions, or not finite
+    ones.
     """
-    shape = (count, 1 + questions.answers)
-    try:
-        values = np.lib.format.open_memmap(path, mode="r")
-    except (ValueError, EOFError) as error:
-        raise FileFormatError(path, f"no array ({error})", "a .npy file of numbers") from error
-    expected = f"numbers of the shape {shape} and a last axis of at least 1"
-    fits = values.ndim == 3 and values.shape[1] == shape[1] and values.size
+    values, pictures = read_array(Path(path)), 1 + questions.answers
+    expected = f"numbers of the shape ({count}, {pictures}, D)"
+    fits = values.ndim == 3 and values.shape[1] == pictures and values.size
     if not fits or not count <= len(values) <= len(questions):
         raise FileFormatError(path, f"the shape {values.shape}", expected)
     if values.dtype.kind not in "fiu":
@@ -85,8 +90,10 @@ def read_features(path: str | Path, count: int, questions: QuestionsFile) -> Arr
     if not np.isfinite(read).all():
         row = int(np.flatnonzero(~np.isfinite(read).all(axis=(1, 2)))[0])
         raise FileFormatError(f"{path}: row {row}", "features that are not finite", "numbers")
-    length = np.linalg.norm(read, axis=2, keepdims=True)
-    return np.asarray(read / np.where(length > 0, length, 1))
+    for norm in (np.inf, 2):  # the first, so that no square overflows
+        length = np.linalg.norm(read, norm, axis=2, keepdims=True)
+        read = read / np.where(length > 0, length, 1)
+    return read
 
 
 def nearest(features: Array) -> Array:

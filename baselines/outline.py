@@ -126,7 +126,8 @@ def _check_training(questions: QuestionsFile, labelled: QuestionsFile, labels: i
     if labels is not None:
         expected = f"from 1 to {count:,}, the labelled questions of {path}"
         check(1 <= labels <= count, "labels", labels, expected)
-    if labelled.fingerprint is not None and labelled.fingerprint == questions.fingerprint:
+    same = labelled.fingerprint is not None and labelled.fingerprint == questions.fingerprint
+    if same or path.samefile(questions.path):
         raise SpecError("train", path, "another file than the one to answer")
     answers, expected = labelled.answers, f"{questions.answers}"
     check(labelled.answers == questions.answers, "train", f"{answers} answers a question", expected)

@@ -14,8 +14,10 @@ from metrics.prediction_writer import write_answers
 from scenegen.files.new_file import check_writable
 
 FILES = Path(__file__).with_name("files")
-BATCH = 4  # questions at a time
-NOTES = "told: the field of view, and that the pictures of a question have one camera distance"
+NOTES = (
+    "told: in training, true depth and camera distances; the field of view, and that pictures of a"
+    " question have one camera distance and the shape's centre on their axis"
+)
 
 
 @torch.inference_mode()
@@ -28,8 +30,8 @@ def write_submission(
     progress: Progress = lambda done, total: None,
 ) -> None:
     """Write answers to the questions of a file, and their scores, as `baselines.training` says."""
-    network, card = load_weights(weights or FILES / "depth-match.safetensors", METHOD)
     check_writable(Path(out), overwrite)
+    network, card = load_weights(weights or FILES / "depth-match.safetensors", METHOD)
     with open_test(data, card.settings.size) as questions:
         fov = (questions.spec or SplitSpec()).fov_y_degrees
 
@@ -37,6 +39,6 @@ def write_submission(
             depth = [seen_depth(network, pictures) for pictures in images]
             return -torch.stack([least_denials(one, fov) for one in depth])
 
-        values = each_question(questions, card.settings.size, scores, BATCH, progress=progress)
+        values = each_question(questions, card.settings.size, scores, 1, progress=progress)
     numbers = values.double().numpy()
     write_answers(out, data, method="depth-match", scores=numbers, notes=NOTES, overwrite=overwrite)

@@ -75,7 +75,7 @@ def denials(points: Tensor, turns: Tensor, shown: Tensor, half: float) -> Tensor
     """
     size = len(shown)
     turned = points @ turns.transpose(1, 2)
-    away = 1 - turned[..., 2]
+    away = (1 - turned[..., 2]).clamp(min=0.1)  # nothing comes so near to the camera
     column = ((turned[..., 0] / (away * half) + 1) * size / 2).long().clamp(0, size - 1)
     row = ((1 - turned[..., 1] / (away * half)) * size / 2).long().clamp(0, size - 1)
     before = shown.flatten()[row * size + column] - away

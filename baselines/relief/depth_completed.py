@@ -115,4 +115,4 @@ def train(
     )  # fmt: skip
 
 
-write_submission = partial(predict.write_submission, METHOD)
+write_submission = partial(predict.write_submission, METHOD, told_in_training=depth_supervised.TOLD)

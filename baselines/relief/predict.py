@@ -34,6 +34,7 @@ def write_submission(
     out: str | Path,
     weights: str | Path | None = None,
     *,
+    told_in_training: str = "",
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
@@ -60,7 +61,7 @@ def write_submission(
                 target_cameras = Cameras(poses[rows], fov)
             return predicted_depth(network, image, cameras, target_cameras)
 
-        notes = f"{FROM_FIRST if from_first else FROM}; {TOLD}"
+        notes = f"{FROM_FIRST if from_first else FROM}; {TOLD}{told_in_training}"
         how = {"method": method.name, "notes": notes, "overwrite": overwrite}
         shown = "first_view" if from_first else "scored_view"
         write_depths(rooms, out, data, depth, progress, shown=shown, **how)

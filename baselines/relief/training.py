@@ -23,7 +23,7 @@ from scenegen.common.random.seeding import Purpose, item_rng
 
 EVERY = 100  # iterations between checkpoints
 WARM_UP = 200  # iterations
-WHOLE = 0.2  # of training, its end: whole images are shown, and before it windows of objects
+WHOLE = 0.2  # of training, its end: whole images are shown; before that, windows around objects
 
 
 @dataclass(frozen=True, eq=False)

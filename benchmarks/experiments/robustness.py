@@ -10,6 +10,7 @@ It prints the accuracy of each method on the first questions with a Wilson inter
 import argparse
 import io
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,7 @@ def jpeg(quality: int) -> Disturb:
 
 
 def halved(picture: Array, _: np.random.Generator) -> Array:
-    """Return a picture of half the width."""
+    """Return a picture of half the width and height."""
     height, width = picture.shape[:2]
     return _rounded(picture.reshape(height // 2, 2, width // 2, 2, 3).mean(axis=(1, 3)))
 
@@ -83,11 +84,16 @@ def by_cubes(pictures: Array, spec: SplitSpec) -> int:
 
 def by_depth(pictures: Array, spec: SplitSpec) -> int:
     """Return the answer of `depth-match`."""
-    network, card = load_weights(FILES / "depth-match.safetensors", METHOD)
+    network, card = _depth_match()
     images = [channels_first(decode_image(one), card.settings.size) for one in pictures]
     with torch.inference_mode():
         depth = seen_depth(network, torch.from_numpy(np.stack(images)))
         return int(least_denials(depth, spec.fov_y_degrees).argmin())
+
+
+@cache
+def _depth_match() -> tuple[Any, Any]:
+    return load_weights(FILES / "depth-match.safetensors", METHOD)
 
 
 def accuracy(
@@ -113,8 +119,9 @@ def main() -> None:
     options = parser.parse_args()
     methods = {"`cubes`": by_cubes, "`depth-match`": by_depth}
     with open_questions(options.data, answers=answers_beside(options.data)) as file:
+        count = min(options.count, len(file))
         lines = [
-            [way, *(accuracy(m, DISTURBED[way], file, options.count) for m in methods.values())]
+            [way, *(accuracy(m, DISTURBED[way], file, count) for m in methods.values())]
             for way in options.ways
         ]
     print(table(["pictures", *methods], lines))

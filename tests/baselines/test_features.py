@@ -11,7 +11,7 @@ from refusals import refused
 from baselines.features import nearest, probed, read_features, write_features
 from cli import bench
 from iqtt import open_questions
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 
 
 def told_by_one(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -69,7 +69,7 @@ def test_a_submission_holds_the_answers_of_the_features(truths, train_questions,
 )
 def test_features_that_do_not_fit_are_refused(values: np.ndarray, truths, tmp_path: Path):
     np.save(tmp_path / "f.npy", values)
-    with open_questions(truths.iqtt) as questions, pytest.raises(FileFormatError):
+    with open_questions(truths.iqtt) as questions, pytest.raises(SceneGenError):
         read_features(tmp_path / "f.npy", 6, questions)
 
 
@@ -78,5 +78,38 @@ def test_a_file_that_is_no_array_is_refused(truths, tmp_path):
     for name, data in {"f.npy": b"nothing", "p.npy": b"\x80\x04N."}.items():
         (tmp_path / name).write_bytes(data)
     for name in ("f.npy", "p.npy", "f.npz"):
-        with open_questions(truths.iqtt) as questions, refused(FileFormatError, name):
+        with open_questions(truths.iqtt) as questions, pytest.raises(SceneGenError):
             read_features(tmp_path / name, 6, questions)
+
+
+def test_a_probe_needs_features_of_its_own_data(truths, train_questions, tmp_path, monkeypatch):
+    monkeypatch.setattr("baselines.features.FOLDS", 1)
+    for name, width in {"f.npy": 5, "g.npy": 6}.items():
+        np.save(tmp_path / name, np.ones((6 if width == 5 else 3, 4, width)))
+    data, out = (truths.iqtt, tmp_path / "b.h5"), (tmp_path / "f.npy",)
+    how = {"train": train_questions, "train_features": tmp_path / "g.npy"}
+    with refused(FileFormatError, "g.npy", "6 numbers a picture"):
+        write_features(*data, *out, **how)
+    with refused(SpecError, "labels", "7"):
+        write_features(*data, *out, labels=7)
+
+
+@pytest.mark.parametrize(
+    "head", ["((((", "{[]: 1}", "{'descr': '<f8', 'fortran_order': False, 'shape': (10**23,)}"]
+)
+def test_hostile_heads_are_refused(head: str, truths, tmp_path):
+    head = head.ljust(117) + "\n"
+    content = b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head.encode()
+    (tmp_path / "f.npy").write_bytes(content)
+    with open_questions(truths.iqtt) as questions, pytest.raises(SceneGenError):
+        read_features(tmp_path / "f.npy", 6, questions)
+
+
+def test_huge_features_keep_their_direction(truths, tmp_path):
+    values = np.random.default_rng(0).normal(size=(6, 4, 3))
+    with open_questions(truths.iqtt) as questions:
+        read = []
+        for scale in (1, 1e300):
+            np.save(tmp_path / "f.npy", scale * values)
+            read.append(read_features(tmp_path / "f.npy", 6, questions))
+    np.testing.assert_allclose(*read)

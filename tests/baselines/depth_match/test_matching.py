@@ -1,4 +1,4 @@
-"""True depth answers hard questions, the network's half of them; cameras are ours."""
+"""True depth answers hard questions, and the network's half of them; axes are scenegen's."""
 
 from collections.abc import Iterable, Iterator
 
