@@ -8,6 +8,7 @@ import csv
 import json
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -227,7 +228,8 @@ def _sheet_rows(path: Path) -> Iterator[Mapping[str, Any]]:
     if path.suffix == ".xlsx":
         from openpyxl import load_workbook
 
-        heading, *rows = load_workbook(path, read_only=True).active.values
+        with closing(load_workbook(path, read_only=True)) as book:
+            heading, *rows = book.active.values
         yield from (dict(zip(heading, row, strict=True)) for row in rows)
         return
     csv.field_size_limit(1 << 30)  # pictures in base64
