@@ -215,11 +215,13 @@ def make_split(
 @options.OVERWRITE
 def merge(file: str, out: str, overwrite: bool) -> None:
     """Make one file of questions that were written to several."""
-    from iqtt.audit.table import find_tables
     from iqtt.files.make import merge_questions
+    from iqtt.files.reader import open_tables
 
-    with progress_bar(sum(one.count for one in find_tables([file])), "question") as bar:
-        count = merge_questions(file, out, overwrite, bar.update)
+    tables = open_tables(file)
+    count = sum(map(len, tables))
+    with tables[0], progress_bar(count, "question") as bar:
+        merge_questions(tables, out, overwrite, bar.update)
     print_line(f"{out}: {count} questions, {Path(out).stat().st_size / 1e6:.1f} MB")
 
 

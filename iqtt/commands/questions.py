@@ -47,13 +47,12 @@ def show(
 ) -> None:
     """Draw questions of FILE: the reference on the left, its answers beside it."""
     from iqtt.files.preview import question_sheet
-    from iqtt.files.reader import answers_beside, open_questions, parts
+    from iqtt.files.reader import QuestionsFile, answers_beside, open_tables
     from scenegen.common.errors import SpecError
     from scenegen.files.pictures import pick_rows, save_picture
 
-    chosen = part or parts(file)[0]
-    beside = answers_beside(file) if answers else None
-    with open_questions(file, chosen or None, beside) as questions:
+    beside, first = answers_beside(file) if answers else None, open_tables(file)[0]
+    with first, QuestionsFile(first.opened, part or first.part, beside) as questions:
         if answers and not (questions.has_answers or questions.has_truth):
             raise SpecError(file, "no answers, and no file of answers beside it", "answers")
         rows = pick_rows(len(questions), items, default=SHOWN)
@@ -179,12 +178,11 @@ def verify(
     With a manifest the SHA-256 of every file is checked, and that every question is there once.
     Exits with 1 if a check fails. `iqtt audit` proves that the answers are right.
     """
-    from iqtt.audit.table import find_tables
     from iqtt.files.verify import verify_split
     from iqtt.questions.specs import secret_seed as read_seed
 
     seed = None if secret_seed is None else read_seed(secret_seed)
-    with progress_bar(sum(one.count for one in find_tables([folder])), "question") as bar:
+    with progress_bar(None, "question") as bar:
         checks = verify_split(folder, items, device, seed, bar.update)
     ctx.exit(print_checks(folder, checks))
 

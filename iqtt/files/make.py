@@ -1,14 +1,13 @@
 """Make the files of a split of questions, or of a suite of splits; merge shards to one file."""
 
 import errno
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from iqtt.files.layout import FORMAT
-from iqtt.files.reader import QuestionsFile, open_tables
+from iqtt.files.reader import QuestionsFile
 from iqtt.files.split import MANIFEST, split_part, split_plan
 from iqtt.files.work import QuestionsWork
 from iqtt.questions.distractors import make_pools
@@ -135,24 +134,25 @@ def _folder(folder: Path) -> Iterator[Path]:
 
 
 def merge_questions(
-    path: str | Path,
+    tables: Sequence[QuestionsFile],
     out: str | Path,
     overwrite: bool = False,
     progress: Callable[[int], Any] = lambda done: None,
-) -> int:
+) -> None:
     """Write the tables of a question file, or of a set of shards, to one file.
 
-    Returns the number of questions; `progress` is called with the number written since the last
-    call. Raises as `QuestionsFile` and `sets.merge_file`, and FileFormatError for a released file.
+    Args:
+        tables: all of the file, as `open_tables` gives them.
+        progress: called with the number of questions written since the last call.
+
+    Raises as `sets.merge_file`, and FileFormatError for a released file.
     """
-    tables = open_tables(path)
-    with tables[0] as first:
-        if first.spec is None or first.split is None:
-            raise FileFormatError(path, "a released file", "one that iqtt make-split wrote")
-        parts = [_stored_part(table, first.spec, first.split) for table in tables]
-        compression = max(tables, key=len).compression()  # a table without rows has none
-        merge_file(Path(path), out, FORMAT.kind, parts, compression, overwrite, progress)
-        return sum(map(len, tables))
+    first = tables[0]
+    if first.spec is None or first.split is None:
+        raise FileFormatError(first.path, "a released file", "one that iqtt make-split wrote")
+    parts = [_stored_part(table, first.spec, first.split) for table in tables]
+    compression = max(tables, key=len).compression()  # a table without rows has none
+    merge_file(first.opened, out, parts, compression, overwrite, progress)
 
 
 def _stored_part(table: QuestionsFile, spec: SplitSpec, split: str) -> Part:

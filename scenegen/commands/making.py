@@ -244,10 +244,9 @@ def merge(file: str, out: str, overwrite: bool) -> None:
     from scenegen.rooms.make import merge_rooms
     from scenegen.rooms.reader import RoomsFile
 
-    with RoomsFile(file) as rooms:
+    with RoomsFile(file) as rooms, progress_bar(len(rooms), "image") as bar:
         count = len(rooms)
-    with progress_bar(count, "image") as bar:
-        merge_rooms(file, out, overwrite, bar.update)
+        merge_rooms(rooms, out, overwrite, bar.update)
     print_line(f"{out}: {count} images, {Path(out).stat().st_size / 1e6:.1f} MB")
 
 

@@ -154,9 +154,8 @@ def _show(group: h5py.Group, column: Column, path: str, shards: Sequence[Shard])
 
 
 def merge_file(
-    path: Path,
+    source: OpenFile,
     out: str | Path,
-    kind: str,
     parts: Sequence[Part],
     compression: str,
     overwrite: bool = False,
@@ -167,15 +166,15 @@ def merge_file(
     It has the bytes that the command which made the set would have written to one file.
 
     Args:
-        path: a file of this kind (`schema.Format.kind`) that a reader has checked.
+        source: that a reader has checked.
         parts: what it holds, without marks, which are copied.
 
-    Raises as `OpenFile` and `new_file`, and FileFormatError where a value is not the one that was
+    Raises as `new_file`, and FileFormatError where a value is not the one that was
     written to its shard. Nothing is then left.
     """
-    with OpenFile(path, kind) as source, new_file(out, overwrite) as file:
+    with new_file(out, overwrite) as file:
         attributes = {k: v for k, v in source.file.attrs.items() if k != CONTENT_DIGEST}
-        whole = Bundle({path.name: attributes}, parts).whole()
+        whole = Bundle({source.path.name: attributes}, parts).whole()
         sheets = [sheet for part in parts for sheet in part.sheets]
         stored = {name: source.array(name) for sheet in sheets for name in sheet.paths}
 
@@ -194,7 +193,7 @@ def merge_file(
         for name, array in stored.items():
             if file[name].attrs[SHA256] != array.attrs[SHA256]:
                 problem = "values are not those that were written"
-                raise FileFormatError(f"{path}: {name}: {problem}", hint="verify says which")
+                raise FileFormatError(f"{source.path}: {name}: {problem}", hint="verify says which")
 
 
 def _copied(stored: Mapping[str, Any], sheet: Sheet, rows: range, compression: str) -> PackedRows:

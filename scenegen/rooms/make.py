@@ -16,7 +16,6 @@ from scenegen.files.row_file import writer_name
 from scenegen.files.sets import merge_file
 from scenegen.layout import (
     CONVENTIONS,
-    FORMAT,
     FORMAT_NAME,
     FORMAT_VERSION,
     SCORED,
@@ -129,16 +128,14 @@ def rooms_part(spec: DatasetSpec, count: int, marks: tuple[Mark, ...] = ()) -> P
 
 
 def merge_rooms(
-    path: str | Path,
+    rooms: RoomsFile,
     out: str | Path,
     overwrite: bool = False,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> None:
     """Write the rows of a file of rooms, or of a set of shards, to one file.
 
-    Raises as `RoomsFile` and `sets.merge_file`.
+    Raises as `sets.merge_file`.
     """
-    with RoomsFile(path) as rooms:
-        part = rooms_part(rooms.spec, len(rooms) // len(rooms.spec.views))
-        compression = rooms.compression()
-        merge_file(Path(path), out, FORMAT.kind, [part], compression, overwrite, progress)
+    part = rooms_part(rooms.spec, len(rooms) // len(rooms.spec.views))
+    merge_file(rooms.opened, out, [part], rooms.compression(), overwrite, progress)

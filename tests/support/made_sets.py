@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 
 from iqtt.files.make import make_split, merge_questions
+from iqtt.files.reader import open_tables
 from iqtt.files.split import ALL_FILES, MANIFEST
 from iqtt.files.verify import verify_split
 from iqtt.questions.specs import SplitSpec
@@ -74,8 +75,12 @@ def rooms(**settings: Any) -> SetTask:
             manifest = read_manifest(folder / "rooms.manifest.json")
             return verify_set(file, manifest, 2)
 
+    def merge(path: Path, out: Path) -> None:
+        with RoomsFile(path) as file:
+            merge_rooms(file, out)
+
     rows = 11 * len(spec.views)
-    return SetTask(spec, ("rooms.h5",), "rooms.manifest.json", rows, 4, run, merge_rooms, verify)
+    return SetTask(spec, ("rooms.h5",), "rooms.manifest.json", rows, 4, run, merge, verify)
 
 
 def questions(**settings: Any) -> SetTask:
@@ -85,8 +90,14 @@ def questions(**settings: Any) -> SetTask:
         min_cube_pixels=1, lights=(1, 2), with_depth=True,
     )  # fmt: skip
     spec = replace(spec, **settings)
+
+    def merge(path: Path, out: Path) -> None:
+        tables = open_tables(path)
+        with tables[0]:
+            merge_questions(tables, out)
+
     rows = spec.train + spec.val + spec.test
-    return SetTask(spec, ALL_FILES, MANIFEST, rows, 4, make_split, merge_questions, verify_split)
+    return SetTask(spec, ALL_FILES, MANIFEST, rows, 4, make_split, merge, verify_split)
 
 
 def contents(folder: Path) -> dict[str, bytes]:

@@ -37,7 +37,8 @@ def full(make_rooms, tmp_path_factory):
 def merged(full):
     """The same in one file."""
     path = full.with_name("one.h5")
-    merge_rooms(full, path)
+    with open_rooms(full) as rooms:
+        merge_rooms(rooms, path)
     return path
 
 
