@@ -16,7 +16,7 @@ PRESETS = {
 FILES = {"test": "--n 300 --views 0,5,35,55,80 --seed 1000", "train": "--n 20000 --seed 1"}
 ANGLES = ("0", "5", "35", "55", "80")
 METHODS = (
-    "oracle", "depth-supervised", "view-pairs", "pix2shape-rays", "pix2shape",
+    "oracle", "depth-supervised", "depth-completed", "view-pairs", "pix2shape-rays", "pix2shape",
     "pix2shape-compact", "ptn", "empty-room", "mean-depth", "constant",
 )  # fmt: skip
 NOT_FOR = {"pix2shape-rays": "shapes-single", "pix2shape": "shapenet"}
