@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.files.reader import QuestionsFile, open_questions, parts
+from baselines.outline import check_training, open_labelled
+from iqtt.files.reader import QuestionsFile, open_questions
 from metrics.intake.array_files import read_array
 from metrics.prediction_writer import write_answers
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
 from scenegen.files.new_file import check_writable
 
@@ -42,8 +43,8 @@ def write_features(
             or of its first ones.
         labels: how many of the labelled questions to learn from, the first ones; all by default.
 
-    Raises SpecError where training data and features do not belong together, or labels are too
-    few; FileFormatError where features do not fit or are not finite; else as `open_questions`,
+    Raises SpecError as `check_training`, and where features of training are missing or not used;
+    FileFormatError where features do not fit or are not finite; else as `open_questions`,
     `read_array` and `write_answers`.
     """
     check_writable(Path(out), overwrite)
@@ -55,15 +56,8 @@ def write_features(
         check(labels is None, "labels", labels, "none, as nothing is learned without --train")
         scores, notes = nearest(seen), "cosine of features; no labels"
     else:
-        names = parts(train)
-        with open_questions(train, "labeled" if "labeled" in names else names[0]) as labelled:
-            check(labelled.has_answers, "train", train, "a file with answers")
-            count = len(labelled) if labels is None else labels
-            expected = f"{2 * FOLDS} to {len(labelled)}"
-            check(2 * FOLDS <= count <= len(labelled), "labels", count, expected)
-            mark = labelled.fingerprint
-            if (mark and mark == questions.fingerprint) or Path(train).samefile(data):
-                raise SpecError("train", train, "another file than the one to answer")
+        with open_labelled(train) as labelled:
+            count = check_training(questions, labelled, labels, least=2 * FOLDS)
             learned = read_features(train_features, count, labelled)
             if learned.shape[2] != seen.shape[2]:
                 found, expected = (f"{one.shape[2]} numbers a picture" for one in (learned, seen))

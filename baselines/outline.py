@@ -64,9 +64,8 @@ def write_outline_trees(
     with another number of answers, or is the file to answer; else as `open_questions` and
     `write_answers`.
     """
-    with open_questions(data) as questions, _open_labelled(train) as labelled:
-        _check_training(questions, labelled, labels)
-        count = len(labelled) if labels is None else labels
+    with open_questions(data) as questions, open_labelled(train) as labelled:
+        count = check_training(questions, labelled, labels)
         learned = read_outlines(labelled, count, progress)
         right = labelled.read("answers", slice(0, count)).astype(np.int64)
         seen = read_outlines(questions, len(questions), progress)
@@ -115,19 +114,28 @@ def tree_scores(learned: Outlines, right: Array, seen: Outlines) -> Array:
     return AnswerTrees(ENSEMBLE).fit(columns, right).scores(questions)
 
 
-def _open_labelled(train: str | Path) -> QuestionsFile:
+def open_labelled(train: str | Path) -> QuestionsFile:
+    """Open the questions of a training file that baselines may learn from."""
     names = parts(train)
     return open_questions(train, "labeled" if "labeled" in names else names[0])
 
 
-def _check_training(questions: QuestionsFile, labelled: QuestionsFile, labels: int | None) -> None:
+def check_training(
+    questions: QuestionsFile, labelled: QuestionsFile, labels: int | None, least: int = 1
+) -> int:
+    """Return how many labelled questions to learn from, all where `labels` is None.
+
+    Raises SpecError where there are fewer than `least` or `labels`, or no answers, where the file
+    is the one to answer, and where it asks questions with another number of answers.
+    """
     count, path = len(labelled), labelled.path
     check(labelled.has_answers and count > 0, "train", path, "a file with answers")
-    if labels is not None:
-        expected = f"from 1 to {count:,}, the labelled questions of {path}"
-        check(1 <= labels <= count, "labels", labels, expected)
+    chosen = count if labels is None else labels
+    expected = f"from {least} to {count:,}, the labelled questions of {path}"
+    check(least <= chosen <= count, "labels", chosen, expected)
     same = labelled.fingerprint is not None and labelled.fingerprint == questions.fingerprint
     if same or path.samefile(questions.path):
         raise SpecError("train", path, "another file than the one to answer")
     answers, expected = labelled.answers, f"{questions.answers}"
     check(labelled.answers == questions.answers, "train", f"{answers} answers a question", expected)
+    return chosen

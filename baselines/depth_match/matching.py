@@ -11,7 +11,7 @@ import math
 import torch
 from torch import Tensor
 
-from baselines.training.rotations import rotation_grid, small_turns
+from baselines.training.rotations import finer, rotation_grid
 
 POINTS = 300  # of each surface
 GRID = 4608  # rotations that are tried first
@@ -39,9 +39,7 @@ def least_denials(depth: Tensor, fov_y_degrees: float) -> Tensor:
 
         turns, costs = start, denied(start)
         for angle in FINER:
-            top = turns[costs.topk(KEPT, largest=False).indices]
-            finer = (small_turns(TURNS, angle)[None] @ top[:, None]).flatten(0, 1)
-            turns = torch.cat([top, finer])
+            turns = finer(turns, -costs, KEPT, TURNS, angle)
             costs = denied(turns)
         least.append(costs.amin())
     return torch.stack(least)

@@ -12,7 +12,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from baselines.ptn.network import VOXELS, Ptn
-from baselines.training.rotations import rotation_grid, small_turns
+from baselines.training.rotations import finer, rotation_grid
 
 COARSE, FINE = 8, 16  # voxels a side of the volumes that are compared, at first and at last
 GRID = 1200  # rotations that are tried first, some 20 degrees apart
@@ -39,9 +39,7 @@ def best_fits(reference: Tensor, answers: Tensor) -> Tensor:
     for answer, first in zip(answers, coarse.unbind(dim=1), strict=True):
         turns, fits = start, first
         for angle, side in FINER:
-            top = turns[fits.topk(KEPT).indices]
-            finer = (small_turns(TURNS, angle)[None] @ top[:, None]).flatten(0, 1)
-            turns = torch.cat([top, finer])
+            turns = finer(turns, fits, KEPT, TURNS, angle)
             fits = _level(reference, answer[None], side).fits(turns)[:, 0]
         best.append(fits.amax())
     return torch.stack(best)

@@ -25,6 +25,17 @@ def rotation_grid(count: int) -> Array:
     return rotation_matrix(quaternions).astype(np.float32)
 
 
+def finer(turns: Tensor, merit: Tensor, kept: int, count: int, angle: float) -> Tensor:
+    """Return the rotations of most merit, (kept, 3, 3), and each turned further in `count` ways.
+
+    Args:
+        turns: (R, 3, 3); merit: of each, (R,).
+        angle: by which they are turned, radians.
+    """
+    top = turns[merit.topk(kept).indices]
+    return torch.cat([top, (small_turns(count, angle)[None] @ top[:, None]).flatten(0, 1)])
+
+
 def small_turns(count: int, angle: float) -> Tensor:
     """Return turns by an angle about axes spread evenly over the sphere, (count, 3, 3)."""
     i = np.arange(count) + 0.5

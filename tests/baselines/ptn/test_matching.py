@@ -9,9 +9,9 @@ from baselines.ptn.matching import (
     best_fits,
     features,
     fitted_head,
-    small_turns,
 )
 from baselines.ptn.questions import uniform_rotation
+from baselines.training.rotations import small_turns
 from iqtt.shapes.polycube import mirror
 
 CHAIN = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 2, 0], [2, 2, 1], [2, 2, 2]])
