@@ -1,5 +1,6 @@
 """Answers by explicit 3D: decode each picture to cubes, then render those."""
 
+import dataclasses
 import itertools
 import math
 from collections.abc import Callable
@@ -10,9 +11,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.cubes.filling import SIDE, explained, fill, misfit, refine, shown_cells
+from baselines.cubes.filling import (
+    SIDE,
+    explained,
+    fill,
+    misfit,
+    pixel_counts,
+    refine,
+    shown_pixels,
+)
 from baselines.cubes.poses import likely_poses, outline_pixels
-from baselines.cubes.segmentation import face_labels
+from baselines.cubes.segmentation import labelings
 from iqtt.audit.features.statistics import border_color
 from iqtt.files.reader import open_questions
 from iqtt.questions.specs import SplitSpec
@@ -25,25 +34,41 @@ Progress = Callable[[int, int], Any]
 POSES = 8  # rotations of a picture that are tried
 # Squared radii of shapes are quarters of integers; shapes of at least 8 cubes are no smaller.
 QUARTERS = range(16, 50)
-COARSE = 16  # hypotheses of parities, distance and rotation that are filled
-ENOUGH = 0.03  # misfit of a decoded picture
+# Hypotheses of rotation, parities and distance: the best so many are filled by so many moves.
+STAGES = ((96, 300), (10, 3000))
+FINAL = (4, 8000)  # those that are filled and refined at full resolution
+ROUNDS = (1, 3)  # times as many hypotheses; the second round is of what the first leaves
+GOOD, ENOUGH = 0.01, 0.03  # misfits of a decoded picture that end a search, and all searches
+SHOWN = 0.6  # of the pixels that the split demands of a cube: poses are not exact
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """A way to see a picture.
+
+    Attributes:
+        pixels, fine, coarse: x, y and label of pixels, of fewer and of few, (P, 3).
+        poses: likely ones, the best first.
+        least: pixels that show any cube.
+    """
+
+    pixels: Array
+    fine: Array
+    coarse: Array
+    poses: list[Array]
+    least: float
 
 
 @dataclass(frozen=True, eq=False)
 class Decoded:
-    """Cubes of a picture: (n, 3) integers, the camera's distance, and the share of wrong pixels."""
+    """Cubes of a picture: (n, 3) integers, the camera's distance, the share of wrong pixels, and
+    the readings that may hold: the one that gave the cubes, or all where none did well.
+    """
 
     cubes: Array
     distance: float
     misfit: float
-
-
-@dataclass(frozen=True, eq=False)
-class Picture:
-    """A picture's face labels, (H, W), and its likely poses."""
-
-    labels: Array
-    poses: list[Array]
+    readings: list[Reading]
 
 
 def write_cubes(
@@ -79,56 +104,76 @@ def answer_scores(images: Array, spec: SplitSpec, seed: int = 0) -> Array:
         spec: the settings of which the field of view, numbers of cubes and radius are used.
         seed: of the random choices.
     """
-    half = math.tan(math.radians(spec.fov_y_degrees) / 2)
-    pictures = [picture(image, half, (seed, i)) for i, image in enumerate(images)]
-    decoded = [decode(shown, spec, (seed, i)) for i, shown in enumerate(pictures)]
-    reference, shape = pictures[0], decoded[0]
+    reference, *answers = (decode(image, spec, (seed, i)) for i, image in enumerate(images))
     costs = []
-    for seen, own in zip(pictures[1:], decoded[1:], strict=True):
-        by_reference = max(shape.misfit, explain(shape, seen, half))
-        by_answer = max(own.misfit, explain(own, reference, half))
+    for answer in answers:
+        by_reference = max(reference.misfit, explain(reference, answer))
+        by_answer = max(answer.misfit, explain(answer, reference))
         costs.append(min(by_reference, by_answer))
     return -np.array(costs)
 
 
-def picture(image: Array, half: float, seed: tuple[int, ...]) -> Picture:
-    """Return the labels and likely poses of an image, (H, W, 3) of 0..255."""
-    background = border_color(image[None, None]).reshape(-1, 3)[0]
-    labels = face_labels(image, background)
-    rng = np.random.default_rng((*seed, 1))
-    return Picture(labels, likely_poses(outline_pixels(labels, half), POSES, rng))
-
-
-def decode(shown: Picture, spec: SplitSpec, seed: tuple[int, ...] = (0,)) -> Decoded:
-    """Return the cubes that a picture shows; none where no shape of the split's rule fits."""
+def decode(image: Array, spec: SplitSpec, seed: tuple[int, ...] = (0,)) -> Decoded:
+    """Return the cubes that an image, (H, W, 3) of 0..255, shows; none where no shape of the
+    split's rule fits.
+    """
     half = math.tan(math.radians(spec.fov_y_degrees) / 2)
-    labels, step = shown.labels, max(1, min(shown.labels.shape) // 64)
+    height, width = image.shape[:2]
+    step = max(1, min(height, width) // 64)
+    least = max(1, SHOWN * spec.min_cube_pixels * height * width / (spec.height * spec.width))
+    background = border_color(image[None, None]).reshape(-1, 3)[0]
+    best = Decoded(np.zeros((0, 3), np.int64), 0.0, 1.0, [])
+    rng = np.random.default_rng(seed)
+    readings: list[Reading] = []
+    ways = list(labelings(image, background))
+    for times in ROUNDS:
+        for i, labels in enumerate(ways):
+            if i == len(readings):
+                poses = likely_poses(outline_pixels(labels, half), POSES, rng)
+                grids = (shown_pixels(labels, half, s) for s in (1, step, 2 * step))
+                readings.append(Reading(*grids, poses, least))
+            decoded = decode_reading(readings[i], spec, times, rng)
+            if decoded.misfit < best.misfit:
+                best = decoded
+            if best.misfit < GOOD:
+                return best
+        if best.misfit < ENOUGH:
+            return best
+    return dataclasses.replace(best, readings=readings)
+
+
+def decode_reading(
+    reading: Reading, spec: SplitSpec, times: int, rng: np.random.Generator
+) -> Decoded:
+    """Return the cubes of the split's rule that a reading shows best."""
     radii = [math.sqrt(q) / 2 for q in QUARTERS if math.sqrt(q) / 2 <= spec.max_radius]
     distances = [spec.framing_distance(r) for r in radii or [spec.max_radius]]
-    hypotheses: list[tuple[float, int, Array, float, Array]] = []
-    for pose in shown.poses:
+    ranked: list[tuple[float, int, Array, float, Array]] = []
+    for pose in reading.poses:
         for parity in itertools.product((0.0, 0.5), repeat=3):
             low = -SIDE / 2 - np.array(parity)
-            for distance in distances[::2]:
-                value = explained(pose, distance, low, labels, half, 2 * step)
-                hypotheses.append((value, len(hypotheses), pose, distance, low))
-    hypotheses.sort(key=lambda h: (-h[0], h[1]))
-    best = Decoded(np.zeros((0, 3), np.int64), 0.0, 1.0)
-    ranked: list[tuple[float, int, Array, float, Array]] = []
-    rng = np.random.default_rng((*seed, 2))
-    for _, i, pose, distance, low in hypotheses[:COARSE]:
-        energy = fill(pose, distance, low, labels, half, 2 * step, *spec.cubes, 4000, rng)[1]
-        ranked.append((energy, i, pose, distance, low))
-    ranked.sort(key=lambda r: r[:2])
-    for _, _, turn, away, low in ranked[:4]:
+            for distance in distances[::3]:
+                value = explained(pose, distance, low, reading.coarse)
+                ranked.append((-value, len(ranked), pose, distance, low))
+    best = Decoded(np.zeros((0, 3), np.int64), 0.0, 1.0, [reading])
+    for count, moves in STAGES:
+        kept = sorted(ranked, key=lambda r: r[:2])[: count * times]
+        ranked = [
+            (fill(p, d, low, reading.coarse, *spec.cubes, moves, rng)[1], i, p, d, low)
+            for _, i, p, d, low in kept
+        ]
+    count, moves = FINAL
+    ranked = sorted(ranked, key=lambda r: r[:2])[: count * times]
+    for _, _, turn, away, low in ranked:
         pose, distance = turn, away
         for _ in range(2):
-            filled, _ = fill(pose, distance, low, labels, half, step, *spec.cubes, 12000, rng)
-            pose, distance, value = refine(pose, distance, low, filled, labels, half, step)
-            filled &= shown_cells(pose, distance, low, filled, labels, half)
+            filled, _ = fill(pose, distance, low, reading.fine, *spec.cubes, moves, rng)
+            pose, distance, value = refine(pose, distance, low, filled, reading.fine)
+            counts = pixel_counts(pose, distance, low, filled, reading.pixels)
+            filled &= counts >= reading.least
             if value < best.misfit and obeys_rules(filled, low, spec):
-                best = Decoded(_cubes(filled, pose), distance, value)
-        if best.misfit < ENOUGH:
+                best = Decoded(_cubes(filled, pose), distance, value, [reading])
+        if best.misfit < GOOD:
             break
     return best
 
@@ -147,24 +192,21 @@ def obeys_rules(filled: Array, low: Array, spec: SplitSpec) -> bool:
     return bool(linked[0] and centred and bounding_radius(shape)[0] <= spec.max_radius)
 
 
-def explain(decoded: Decoded, shown: Picture, half: float) -> float:
-    """Return the least misfit of a shape, turned in any way, with a picture."""
-    if not len(decoded.cubes) or not shown.labels.any():
-        return 1.0
-    step = max(1, min(shown.labels.shape) // 64)
-    tries: list[tuple[float, int, Array, Array, Array]] = []
-    for pose in shown.poses:
-        for rotation in ROTATIONS:
-            filled, low = _lattice(decoded.cubes @ rotation.T, pose)
-            if filled is None:
-                continue
-            value = misfit(pose, decoded.distance, low, filled, shown.labels, half, 2 * step)
-            tries.append((value, len(tries), pose, filled, low))
-    tries.sort(key=lambda t: t[:2])
+def explain(shape: Decoded, seen: Decoded) -> float:
+    """Return the least misfit of a shape, turned in any way, with the readings of a picture."""
     least = 1.0
-    for _, _, pose, filled, low in tries[:3]:
-        value = refine(pose, decoded.distance, low, filled, shown.labels, half, step)[2]
-        least = min(least, value)
+    for reading in seen.readings if len(shape.cubes) else []:
+        tries: list[tuple[float, int, Array, Array, Array]] = []
+        for pose in reading.poses:
+            for rotation in ROTATIONS:
+                filled, low = _lattice(shape.cubes @ rotation.T, pose)
+                if filled is not None:
+                    value = misfit(pose, shape.distance, low, filled, reading.coarse)
+                    tries.append((value, len(tries), pose, filled, low))
+        tries.sort(key=lambda t: t[:2])
+        for _, _, pose, filled, low in tries[:3]:
+            value = refine(pose, shape.distance, low, filled, reading.fine)[2]
+            least = min(least, value)
     return least
 
 

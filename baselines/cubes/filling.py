@@ -9,123 +9,174 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 SIDE = 10  # cells of the lattice along each axis
 MOST = 30  # cells that a ray crosses
+MARGIN = 0.1  # of the height, about the silhouette: rays there deny cells
+
+
+def shown_pixels(labels: Array, half: float, step: int) -> Array:
+    """Return x, y (at depth 1) and label of every step-th pixel about the silhouette, (P, 3).
+
+    Args:
+        labels: face labels, (H, W); some are not 0.
+        half: tangent of half the vertical field of view.
+    """
+    height, width = labels.shape
+    rows, columns = (np.flatnonzero(labels.any(axis=a)) for a in (1, 0))
+    margin = round(MARGIN * height)
+    start = step // 2
+    inside = [
+        at[(at >= shown[0] - margin) & (at <= shown[-1] + margin)]
+        for at, shown in (
+            (np.arange(start, height, step), rows),
+            (np.arange(start, width, step), columns),
+        )
+    ]
+    i, j = (grid.ravel() for grid in np.meshgrid(*inside, indexing="ij"))
+    x, y = (2 * j + 1 - width) / height * half, -(2 * i + 1 - height) / height * half
+    return np.stack([x, y, labels[i, j]], axis=1)
 
 
 @njit(cache=True)
-def trace(
-    pose: Array, distance: float, low: Array, x: float, y: float, cells: Array, faces: Array
+def _view(pose: Array, distance: float, low: Array) -> Array:
+    """Return the rows of a pose and the camera's place in the lattice, (4, 3)."""
+    view = np.empty((4, 3))
+    view[:3] = pose
+    view[3] = pose[2] * distance - low
+    return view
+
+
+@njit(cache=True)
+def _trace(
+    view: Array,
+    box: Array,
+    filled: Array,
+    x: float,
+    y: float,
+    work: Array,
+    cells: Array,
+    faces: Array,
 ) -> int:
-    """Fill in the cells that a ray crosses, in order, and the label of the face it enters by; 4
-    where that face points away from the pose's normal. Returns their number.
+    """Fill in the cells of a box that a ray crosses, in order, up to the first filled one, and the
+    label of the face it enters by; 4 where that face points away from the pose's normal.
+
+    Returns their number. `work` is (6, 3).
     """
-    origin, ray, near, far = np.empty(3), np.empty(3), -1e9, 1e9
+    near, far = -1e9, 1e9
     axis = 0
     for a in range(3):
-        origin[a] = pose[2, a] * distance - low[a]
-        ray[a] = pose[0, a] * x + pose[1, a] * y - pose[2, a]
-        if abs(ray[a]) < 1e-9:
-            ray[a] = 1e-9
-        s, t = -origin[a] / ray[a], (SIDE - origin[a]) / ray[a]
-        if s > t:
+        ray = view[0, a] * x + view[1, a] * y - view[2, a]
+        if abs(ray) < 1e-9:
+            ray = 1e-9
+        inverse = 1 / ray
+        s, t = (box[0, a] - view[3, a]) * inverse, (box[1, a] - view[3, a]) * inverse
+        if ray < 0:
             s, t = t, s
         if s > near:
             near, axis = s, a
         far = min(far, t)
+        work[0, a], work[1, a] = ray, inverse
     if near >= far:
         return 0
-    cell, step = np.empty(3, np.int64), np.empty(3, np.int64)
-    following, width = np.empty(3), np.empty(3)
+    place = 0
     for a in range(3):
-        cell[a] = min(SIDE - 1, max(0, int(np.floor(origin[a] + near * ray[a]))))
-        step[a] = 1 if ray[a] > 0 else -1
+        ray, inverse = work[0, a], work[1, a]
+        cell = np.floor(view[3, a] + near * ray)
         if a == axis:
-            cell[a] = 0 if ray[a] > 0 else SIDE - 1
-        following[a] = (cell[a] + (ray[a] > 0) - origin[a]) / ray[a]
-        width[a] = 1 / abs(ray[a])
-    count = 0
-    while count < MOST:
-        cells[count] = (cell[0] * SIDE + cell[1]) * SIDE + cell[2]
-        faces[count] = axis + 1 if ray[axis] < 0 else 4
-        count += 1
+            cell = box[0, a] if ray > 0 else box[1, a] - 1
+        cell = min(box[1, a] - 1, max(box[0, a], cell))
+        work[2, a] = (cell + (ray > 0) - view[3, a]) * inverse  # where it leaves the cell
+        work[3, a] = abs(inverse)
+        stride = SIDE * SIDE if a == 0 else (SIDE if a == 1 else 1)
+        place += int(cell) * stride
+        work[4, a] = stride if ray > 0 else -stride
+        work[5, a] = box[1, a] - 1 - cell if ray > 0 else cell - box[0, a]  # cells to come
+    for count in range(MOST):
+        cells[count] = place
+        faces[count] = axis + 1 if work[0, axis] < 0 else 4
+        if filled[place]:
+            return count + 1
         axis = 0
-        if following[1] < following[axis]:
+        if work[2, 1] < work[2, axis]:
             axis = 1
-        if following[2] < following[axis]:
+        if work[2, 2] < work[2, axis]:
             axis = 2
-        cell[axis] += step[axis]
-        if cell[axis] < 0 or cell[axis] >= SIDE:
-            break
-        following[axis] += width[axis]
-    return count
+        if work[5, axis] == 0:
+            return count + 1
+        work[5, axis] -= 1
+        place += int(work[4, axis])
+        work[2, axis] += work[3, axis]
+    return MOST
+
+
+@njit(cache=True)
+def _box(filled: Array) -> Array:
+    """Return the lowest filled cell along each axis and one above the highest, (2, 3)."""
+    box = np.zeros((2, 3))
+    box[0] = SIDE
+    for c in np.flatnonzero(filled):
+        for a, v in enumerate((c // SIDE**2, c // SIDE % SIDE, c % SIDE)):
+            box[0, a], box[1, a] = min(box[0, a], v), max(box[1, a], v + 1)
+    return box
 
 
 @njit(cache=True)
 def misfit(
-    pose: Array, distance: float, low: Array, filled: Array, labels: Array, half: float, step: int
+    pose: Array, distance: float, low: Array, filled: Array, pixels: Array, most: float = np.inf
 ) -> float:
-    """Return mismatched pixels, of every step-th, over those that the picture shows."""
-    height, width = labels.shape
-    cells, faces = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
-    wrong, shown = 0.0, 0
-    for i in range(step // 2, height, step):
-        for j in range(step // 2, width, step):
-            x, y = (2 * j + 1 - width) / height * half, -(2 * i + 1 - height) / height * half
-            seen = 0
-            for k in range(trace(pose, distance, low, x, y, cells, faces)):
-                if filled[cells[k]]:
-                    seen = faces[k]
-                    break
-            shown += labels[i, j] > 0
-            if seen != labels[i, j]:
-                wrong += 0.5 if seen == 4 and labels[i, j] else 1.0
-    return wrong / max(shown, 1)
+    """Return mismatched pixels over those that the picture shows; infinity where that is more than
+    `most`.
+    """
+    view, box = _view(pose, distance, low), _box(filled)
+    cells, faces, work = np.empty(MOST, np.int16), np.empty(MOST, np.int8), np.empty((6, 3))
+    shown = max(1, np.count_nonzero(pixels[:, 2]))
+    wrong = 0.0
+    for x, y, label in pixels:
+        count = _trace(view, box, filled, x, y, work, cells, faces)
+        seen = faces[count - 1] if count and filled[cells[count - 1]] else 0
+        if seen != label:
+            wrong += 0.5 if seen == 4 and label else 1.0
+            if wrong > most * shown:
+                return np.inf
+    return wrong / shown
 
 
 @njit(cache=True)
-def shown_cells(
-    pose: Array, distance: float, low: Array, filled: Array, labels: Array, half: float
-) -> Array:
-    """Return which filled cells show in the picture, (SIDE**3,) bool."""
-    height, width = labels.shape
-    cells, faces = np.empty(MOST, np.int64), np.empty(MOST, np.int64)
-    shown = np.zeros(SIDE**3, np.bool_)
-    for i in range(height):
-        for j in range(width):
-            x, y = (2 * j + 1 - width) / height * half, -(2 * i + 1 - height) / height * half
-            for k in range(trace(pose, distance, low, x, y, cells, faces)):
-                if filled[cells[k]]:
-                    shown[cells[k]] = True
-                    break
-    return shown
+def pixel_counts(pose: Array, distance: float, low: Array, filled: Array, pixels: Array) -> Array:
+    """Return how many of the pixels show each filled cell, (SIDE**3,) integers."""
+    view, box = _view(pose, distance, low), _box(filled)
+    cells, faces, work = np.empty(MOST, np.int16), np.empty(MOST, np.int8), np.empty((6, 3))
+    counts = np.zeros(SIDE**3, np.int64)
+    for x, y, _ in pixels:
+        count = _trace(view, box, filled, x, y, work, cells, faces)
+        if count and filled[cells[count - 1]]:
+            counts[cells[count - 1]] += 1
+    return counts
 
 
 @njit(cache=True)
-def _rays(pose: Array, distance: float, low: Array, labels: Array, half: float, step: int) -> Any:
-    height, width = labels.shape
-    rows = ((height - step // 2 + step - 1) // step) * ((width - step // 2 + step - 1) // step)
-    cells, faces = np.empty((rows, MOST), np.int64), np.empty((rows, MOST), np.int64)
-    counts, seen = np.empty(rows, np.int64), np.empty(rows, np.int64)
-    r = 0
-    for i in range(step // 2, height, step):
-        for j in range(step // 2, width, step):
-            x, y = (2 * j + 1 - width) / height * half, -(2 * i + 1 - height) / height * half
-            counts[r] = trace(pose, distance, low, x, y, cells[r], faces[r])
-            seen[r] = labels[i, j]
-            r += 1
+def _rays(pose: Array, distance: float, low: Array, pixels: Array) -> Any:
+    """Return the cells and faces of each pixel's ray, and how many; and for each cell how many rays
+    cross it, and how many of them show the background.
+    """
+    cells, faces = np.empty((len(pixels), MOST), np.int16), np.empty((len(pixels), MOST), np.int8)
+    counts = np.empty(len(pixels), np.int64)
+    view, box, work = _view(pose, distance, low), np.zeros((2, 3)), np.empty((6, 3))
+    box[1] = SIDE
+    filled = np.zeros(SIDE**3, np.bool_)
     bare, crossed = np.zeros(SIDE**3), np.zeros(SIDE**3)
-    for r in range(rows):
+    for r in range(len(pixels)):
+        x, y, label = pixels[r]
+        counts[r] = _trace(view, box, filled, x, y, work, cells[r], faces[r])
         for k in range(counts[r]):
             crossed[cells[r, k]] += 1
-            bare[cells[r, k]] += seen[r] == 0
-    return cells, faces, counts, seen, bare, crossed
+            bare[cells[r, k]] += label == 0
+    return cells, faces, counts, bare, crossed
 
 
 @njit(cache=True)
-def explained(
-    pose: Array, distance: float, low: Array, labels: Array, half: float, step: int
-) -> float:
+def explained(pose: Array, distance: float, low: Array, pixels: Array) -> float:
     """Return the share of shown rays that a cell within the silhouette can explain."""
-    cells, faces, counts, seen, bare, crossed = _rays(pose, distance, low, labels, half, step)
+    cells, faces, counts, bare, crossed = _rays(pose, distance, low, pixels)
+    seen = pixels[:, 2]
     good, shown = 0, 0
     for r in range(len(counts)):
         if seen[r] == 0:
@@ -144,9 +195,7 @@ def fill(  # noqa: PLR0912
     pose: Array,
     distance: float,
     low: Array,
-    labels: Array,
-    half: float,
-    step: int,
+    pixels: Array,
     fewest: int,
     most: int,
     moves: int,
@@ -157,7 +206,8 @@ def fill(  # noqa: PLR0912
     The energy is mismatched rays, and penalties of numbers of cubes out of bounds, of separate
     parts, and of a bounding box whose centre is not the origin.
     """
-    cells, faces, counts, seen, bare, crossed = _rays(pose, distance, low, labels, half, step)
+    cells, faces, counts, bare, crossed = _rays(pose, distance, low, pixels)
+    seen = pixels[:, 2]
     usable = np.flatnonzero((crossed >= 2) & (bare <= 0.3 * crossed))
     filled, best = np.zeros(SIDE**3, np.bool_), np.zeros(SIDE**3, np.bool_)
     if len(usable) == 0:
@@ -191,13 +241,17 @@ def fill(  # noqa: PLR0912
             changed[1] = usable[rng.integers(0, len(usable))]
             if filled[changed[0]] != filled[changed[1]]:
                 count = 2
+        # The energy is drawn that is still accepted; most moves are beyond it by their rays alone.
+        bound = now - heat * np.log(1 - rng.random())
         for i in range(count):
             filled[changed[i]] = not filled[changed[i]]
         after = total
         for i in range(count):
             after += _update(changed[i], filled, starts, rays, cells, faces, counts, seen, wrong)
-        energy = after + _penalty(filled, usable, low, fewest, most) * weight
-        if energy <= now or rng.random() < np.exp((now - energy) / heat):
+        energy = after
+        if after <= bound:
+            energy += _penalty(filled, usable, low, fewest, most) * weight
+        if energy <= bound:
             now, total = energy, after
             if now < least:
                 least = now
@@ -282,10 +336,10 @@ def _penalty(filled: Array, usable: Array, low: Array, fewest: int, most: int) -
 
 
 def refine(
-    pose: Array, distance: float, low: Array, filled: Array, labels: Array, half: float, fine: int
+    pose: Array, distance: float, low: Array, filled: Array, pixels: Array
 ) -> tuple[Array, float, float]:
     """Return the pose, distance and misfit after a pattern search over small turns."""
-    best = misfit(pose, distance, low, filled, labels, half, fine)
+    best = misfit(pose, distance, low, filled, pixels)
     for angle in (0.02, 0.01, 0.005, 0.0025):
         for _ in range(2):
             before = best
@@ -296,7 +350,7 @@ def refine(
                         away = distance * (1 + sign)
                     else:
                         turned = _turn(axis, sign) @ pose
-                    value = misfit(turned, away, low, filled, labels, half, fine)
+                    value = misfit(turned, away, low, filled, pixels, best)
                     if value < best:
                         pose, distance, best = turned, away, value
                         break
