@@ -26,7 +26,7 @@ from iqtt.audit.features.statistics import border_color
 from iqtt.files.reader import open_questions
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.near import is_chain, is_connected
-from iqtt.shapes.polycube import ROTATIONS, bounding_radius, box_centre
+from iqtt.shapes.polycube import ROTATIONS, bounding_radius, box_centre, canonical
 from metrics.prediction_writer import write_answers
 
 Array = NDArray[Any]
@@ -38,7 +38,7 @@ QUARTERS = range(16, 50)
 STAGES = ((96, 300), (10, 3000))
 FINAL = (4, 8000)  # those that are filled and refined at full resolution
 ROUNDS = (1, 3)  # times as many hypotheses; the second round is of what the first leaves
-GOOD, ENOUGH = 0.01, 0.03  # misfits of a decoded picture that end a search, and all searches
+GOOD, ENOUGH = 0.015, 0.03  # misfits of a decoded picture that end a search, and all searches
 SHOWN = 0.6  # of the pixels that the split demands of a cube: poses are not exact
 
 
@@ -96,8 +96,9 @@ def write_cubes(
 
 
 def answer_scores(images: Array, spec: SplitSpec, seed: int = 0) -> Array:
-    """Return a score of each answer of a question, (K,): minus the least misfit of a shape that
-    explains both the reference and the answer.
+    """Return a score of each answer of a question, (K,): minus the misfit where reference and
+    answer were decoded to one shape; where no answer was, minus the least misfit of a shape that
+    explains both.
 
     Args:
         images: (1 + K, H, W, 3), 0..255.
@@ -105,12 +106,23 @@ def answer_scores(images: Array, spec: SplitSpec, seed: int = 0) -> Array:
         seed: of the random choices.
     """
     reference, *answers = (decode(image, spec, (seed, i)) for i, image in enumerate(images))
-    costs = []
-    for answer in answers:
-        by_reference = max(reference.misfit, explain(reference, answer))
-        by_answer = max(answer.misfit, explain(answer, reference))
-        costs.append(min(by_reference, by_answer))
+    costs = [
+        max(reference.misfit, answer.misfit) if same_shape(reference, answer) else 1.0
+        for answer in answers
+    ]
+    if min(costs) > ENOUGH:
+        for i, answer in enumerate(answers):
+            by_reference = max(reference.misfit, explain(reference, answer))
+            by_answer = max(answer.misfit, explain(answer, reference))
+            costs[i] = min(costs[i], by_reference, by_answer)
     return -np.array(costs)
+
+
+def same_shape(first: Decoded, second: Decoded) -> bool:
+    """Return whether two pictures were decoded to one shape, up to a rotation."""
+    if len(first.cubes) != len(second.cubes) or not len(first.cubes):
+        return False
+    return bool((canonical(first.cubes[None]) == canonical(second.cubes[None])).all())
 
 
 def decode(image: Array, spec: SplitSpec, seed: tuple[int, ...] = (0,)) -> Decoded:
@@ -173,8 +185,8 @@ def decode_reading(
             filled &= counts >= reading.least
             if value < best.misfit and obeys_rules(filled, low, spec):
                 best = Decoded(_cubes(filled, pose), distance, value, [reading])
-        if best.misfit < GOOD:
-            break
+            if best.misfit < GOOD:
+                return best
     return best
 
 

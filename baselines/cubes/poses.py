@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 Array = NDArray[Any]
 ROTATIONS = 24_000  # of the first grid
 COARSE = 200  # pixels of outlines that they are judged by
-KEPT = 60  # rotations that are refined
+KEPT = 60  # rotations that are refined, with their twins
+REFINED = 40  # of them that are refined to the end
 CAP = 0.04  # squared sine beyond which an error counts no more
 KERNEL = (0.0625, 0.25, 0.375, 0.25, 0.0625)  # smooths labels
 TANGENT = 0.15  # cosine below which either face of an axis may show
@@ -68,6 +69,8 @@ def likely_poses(outlines: Array, most: int, rng: np.random.Generator) -> list[A
     twins[:, 2] *= -1  # depth reversed
     chosen = np.concatenate([chosen, twins])
     for angle in (0.06, 0.03, 0.015, 0.008, 0.004, 0.002):
+        if angle < 0.01:
+            chosen = chosen[np.argsort(_costs(chosen, outlines), kind="stable")[:REFINED]]
         for _ in range(4):
             turns = _rotations(
                 np.concatenate([np.ones((12, 1)), rng.standard_normal((12, 3)) * angle / 2], axis=1)

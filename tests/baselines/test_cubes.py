@@ -1,20 +1,16 @@
 """Cubes: a picture of a chiral shape gives that shape, and bad pictures give answers as well."""
 
+import itertools
+
 import h5py
 import numpy as np
 import pytest
 
 pytest.importorskip("numba")
 
-from baselines.cubes.answer import (
-    answer_scores,
-    decode,
-    explain,
-    obeys_rules,
-    picture,
-    write_cubes,
-)
+from baselines.cubes.answer import answer_scores, decode, explain, obeys_rules, write_cubes
 from baselines.cubes.filling import SIDE
+from baselines.cubes.segmentation import labelings
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.polycube import ROTATIONS, canonical, is_chiral, mirror
 
@@ -55,14 +51,23 @@ def drawn(cubes, turn):
 def test_a_picture_gives_its_shape_and_not_the_mirror_image():
     assert is_chiral(CHAIN[None])[0]
     image = drawn(CHAIN, rotation(0.5, 0.7))
-    seen = picture(image, HALF, (0, 0))
-    found = decode(seen, SPEC)
-    assert (canonical(found.cubes[None]) == canonical(CHAIN[None])).all()
-    assert found.misfit < 0.03
-    assert (decode(picture(image, HALF, (0, 0)), SPEC).cubes == found.cubes).all()
-    other = picture(drawn(CHAIN @ ROTATIONS[7].T, rotation(-0.6, 0.4)), HALF, (0, 1))
-    wrong = picture(drawn(mirror(CHAIN), rotation(-0.6, 0.4)), HALF, (0, 2))
-    assert explain(found, other, HALF) < 0.05 < explain(found, wrong, HALF)
+    shape = decode(image, SPEC)
+    assert (canonical(shape.cubes[None]) == canonical(CHAIN[None])).all()
+    assert shape.misfit < 0.03
+    assert (decode(image, SPEC).cubes == shape.cubes).all()
+    other = decode(drawn(CHAIN @ ROTATIONS[7].T, rotation(-0.6, 0.4)), SPEC)
+    wrong = decode(drawn(mirror(CHAIN), rotation(-0.6, 0.4)), SPEC)
+    assert explain(shape, other) < 0.05 < explain(shape, wrong)
+
+
+@pytest.mark.parametrize("sigma", [0, 4])
+def test_a_noisy_picture_has_the_labels_of_its_faces(sigma):
+    image = drawn(CHAIN, rotation(0.5, 0.7))
+    truth = (image[..., None, :] == COLORS).all(axis=-1) @ np.array([1, 2, 3])
+    noise = np.random.default_rng(0).normal(0, sigma, image.shape)
+    labels = next(labelings(np.clip(image + noise, 0, 255).round(), np.full(3, 255.0)))
+    orders = [np.array((0, *order)) for order in itertools.permutations((1, 2, 3))]
+    assert max((order[labels] == truth).mean() for order in orders) > 0.999
 
 
 @pytest.mark.parametrize(
