@@ -1,4 +1,5 @@
-"""How robust explicit 3D is: `cubes` and `depth-match` on pictures that are disturbed in one way.
+"""How robust explicit 3D is: `cubes` and `depth-match` on pictures that are disturbed in one way,
+or drawn by a path tracer.
 
     iqtt make-split --distractors mirror-pair --train 0 --labeled 0 --val 0 --test 50 --seed 9101 \
         --out pairs
@@ -10,6 +11,7 @@ It prints the accuracy of each method on the first questions with a Wilson inter
 import argparse
 import io
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ import torch
 from numpy.typing import NDArray
 from PIL import Image
 from scipy import ndimage, stats
+from tqdm import tqdm
 
 from baselines.cubes.answer import answer_scores
 from baselines.depth_match.answers import FILES
@@ -29,10 +32,15 @@ from baselines.training.images import channels_first
 from benchmarks.markdown import table
 from iqtt import QuestionsFile, SplitSpec, open_questions
 from iqtt.files.reader import answers_beside
+from iqtt.questions.packing import pack_questions
+from iqtt.vlm.pictures import stored_question
 from scenegen.rendering.ground_truth import decode_image
+from scenegen.rendering.renderer import launch_fields
 
 Array = NDArray[Any]
 Disturb = Callable[[Array, np.random.Generator], Array]  # a picture (H, W, 3) uint8 to another
+Pictures = Callable[[QuestionsFile, int], Array]  # of a row: (1 + K, H, W, 3) uint8
+RAYS = 64  # of a pixel that is path-traced
 
 
 def noise(level: float) -> Disturb:
@@ -68,12 +76,33 @@ def _rounded(values: Array) -> Array:
     return np.clip(np.rint(values), 0, 255).astype(np.uint8)
 
 
-DISTURBED: Mapping[str, Disturb] = {
-    "as made": lambda picture, _: picture,
-    "noise 1 of 255": noise(1), "noise 4 of 255": noise(4),
-    "blur 0.5 pixels": blur(0.5), "blur 1 pixel": blur(1),
-    "JPEG 95": jpeg(95), "JPEG 75": jpeg(75),
-    "half the size": halved,
+def disturbed(disturb: Disturb) -> Pictures:
+    """Return a way to read a question's pictures, each disturbed."""
+
+    def pictures(file: QuestionsFile, row: int) -> Array:
+        rng = np.random.default_rng(row)
+        return np.stack([disturb(picture, rng) for picture in file.read("questions", row)])
+
+    return pictures
+
+
+def path_traced(file: QuestionsFile, row: int) -> Array:
+    """Return a question's pictures with shadows and light that bounces, `RAYS` a pixel."""
+    spec, truth = file.spec, file.truth(row)
+    assert spec is not None, "files of ours have settings"
+    assert truth is not None, "answers hold the truth"
+    batch = pack_questions(spec, [stored_question(spec, truth)])
+    traced = replace(batch, spec=replace(batch.spec, shading="path", spp=RAYS))
+    return np.asarray(launch_fields(traced, ("image",))()["image"])
+
+
+WAYS: Mapping[str, Pictures] = {
+    "as made": disturbed(lambda picture, _: picture),
+    "noise of 1 of 255": disturbed(noise(1)), "noise of 4 of 255": disturbed(noise(4)),
+    "blur of 0.5 pixels": disturbed(blur(0.5)), "blur of 1 pixel": disturbed(blur(1)),
+    "JPEG, quality 95": disturbed(jpeg(95)), "JPEG, quality 75": disturbed(jpeg(75)),
+    "half the size": disturbed(halved),
+    "path-traced": path_traced,
 }  # fmt: skip
 
 
@@ -97,15 +126,14 @@ def _depth_match() -> tuple[Any, Any]:
 
 
 def accuracy(
-    method: Callable[[Array, SplitSpec], int], disturb: Disturb, file: QuestionsFile, count: int
+    method: Callable[[Array, SplitSpec], int], pictures: Pictures, file: QuestionsFile, count: int
 ) -> str:
     """Return the share of right answers with its 95% Wilson interval."""
     assert file.spec is not None, "files of ours have settings"
-    right = 0
-    for row in range(count):
-        rng = np.random.default_rng(row)
-        pictures = [disturb(picture, rng) for picture in file.read("questions", row)]
-        right += method(np.stack(pictures), file.spec) == int(file.read("answers", row))
+    right = sum(
+        method(pictures(file, row), file.spec) == int(file.read("answers", row))
+        for row in range(count)
+    )
     low, high = stats.binomtest(right, count).proportion_ci(method="wilson")
     return f"{right / count:.2f} [{low:.2f}, {high:.2f}]"
 
@@ -115,14 +143,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, required=True)
     parser.add_argument("--count", type=int, default=50)
-    parser.add_argument("--ways", nargs="+", default=list(DISTURBED), choices=DISTURBED)
+    parser.add_argument("--ways", nargs="+", default=list(WAYS), choices=WAYS)
     options = parser.parse_args()
     methods = {"`cubes`": by_cubes, "`depth-match`": by_depth}
     with open_questions(options.data, answers=answers_beside(options.data)) as file:
         count = min(options.count, len(file))
         lines = [
-            [way, *(accuracy(m, DISTURBED[way], file, count) for m in methods.values())]
-            for way in options.ways
+            [way, *(accuracy(m, WAYS[way], file, count) for m in methods.values())]
+            for way in tqdm(options.ways)
         ]
     print(table(["pictures", *methods], lines))
 
