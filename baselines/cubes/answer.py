@@ -142,8 +142,8 @@ def decode(image: Array, spec: SplitSpec, seed: tuple[int, ...] = (0,)) -> Decod
         for i, labels in enumerate(ways):
             if i == len(readings):
                 poses = likely_poses(outline_pixels(labels, half), POSES, rng)
-                grids = (shown_pixels(labels, half, s) for s in (1, step, 2 * step))
-                readings.append(Reading(*grids, poses, least))
+                every, fine, coarse = (shown_pixels(labels, half, s) for s in (1, step, 2 * step))
+                readings.append(Reading(every, fine, coarse, poses, least))
             decoded = decode_reading(readings[i], spec, times, rng)
             if decoded.misfit < best.misfit:
                 best = decoded

@@ -127,7 +127,7 @@ def misfit(
     """
     view, box = _view(pose, distance, low), _box(filled)
     cells, faces, work = np.empty(MOST, np.int16), np.empty(MOST, np.int8), np.empty((6, 3))
-    shown = max(1, np.count_nonzero(pixels[:, 2]))
+    shown = max(1, int(np.count_nonzero(pixels[:, 2])))
     wrong = 0.0
     for x, y, label in pixels:
         count = _trace(view, box, filled, x, y, work, cells, faces)
