@@ -32,8 +32,7 @@ from metrics.prediction_writer import write_answers
 Array = NDArray[Any]
 Progress = Callable[[int, int], Any]
 POSES = 8  # rotations of a picture that are tried
-# Squared radii of shapes are quarters of integers; shapes of at least 8 cubes are no smaller.
-QUARTERS = range(16, 50)
+SMALLEST = 2.0  # radius of shapes of 8 or more cubes that all show
 # Hypotheses of rotation, parities and distance: the best so many are filled by so many moves.
 STAGES = ((96, 300), (10, 3000))
 FINAL = (4, 8000)  # those that are filled and refined at full resolution
@@ -158,13 +157,16 @@ def decode_reading(
     reading: Reading, spec: SplitSpec, times: int, rng: np.random.Generator
 ) -> Decoded:
     """Return the cubes of the split's rule that a reading shows best."""
-    radii = [math.sqrt(q) / 2 for q in QUARTERS if math.sqrt(q) / 2 <= spec.max_radius]
-    distances = [spec.framing_distance(r) for r in radii or [spec.max_radius]]
+    smallest = min(SMALLEST if spec.cubes[0] >= 8 else 1.0, spec.max_radius)
+    # Squared radii of shapes are quarters of integers.
+    quarters = range(int(4 * smallest**2), int(4 * spec.max_radius**2) + 1)
+    distances = [spec.framing_distance(math.sqrt(q) / 2) for q in quarters]
+    tried = distances[:: max(3, len(distances) // 12)]
     ranked: list[tuple[float, int, Array, float, Array]] = []
     for pose in reading.poses:
         for parity in itertools.product((0.0, 0.5), repeat=3):
             low = -SIDE / 2 - np.array(parity)
-            for distance in distances[::3]:
+            for distance in tried:
                 value = explained(pose, distance, low, reading.coarse)
                 ranked.append((-value, len(ranked), pose, distance, low))
     best = Decoded(np.zeros((0, 3), np.int64), 0.0, 1.0, [reading])
