@@ -83,11 +83,12 @@ MISSING = click.option(
 @RUN
 @NOTES
 @OVERWRITE
+@click.argument("expanded", nargs=-1, metavar="")
 def import_(
     pattern: str | None, kind: Any, unit: str | None, scale: float | None,
     alignment: Any, invalid: tuple[float, ...], missing: Any, normals: str | None, frame: Any,
     array: str | None, match: Any, shown: Any, answers: str | None, truth: str, out: str,
-    method: str | None, run_name: str, notes: str, overwrite: bool,
+    method: str | None, run_name: str, notes: str, overwrite: bool, expanded: tuple[str, ...],
 ) -> None:
     """Make a submission of predictions that lie in files.
 
@@ -99,6 +100,9 @@ def import_(
     from scenegen.files.new_file import check_writable
 
     texts: dict[str, Any] = {"run": run_name, "notes": notes, "overwrite": overwrite}
+    if expanded:
+        found = f"{expanded[0]} beside the options, as where a shell expands a pattern"
+        raise click.UsageError(f"found {found}; put it in quotes: --depth 'out/*.png'")
     check_writable(Path(out), overwrite)
     if (pattern is None) == (answers is None):
         raise click.UsageError("give --depth for rooms, or --answers for questions")

@@ -61,6 +61,7 @@ def test_answers_are_imported(truths, tmp_path):
         (["--depth", "mine", "--scale", "x"], "x"),
         (["--depth", "mine", "--alignment", "scale", "--kind", "disparity", "--scale", "-1"], "-1"),
         (["--depth", "mine/*.png"], "mine/*.png"),
+        (["--depth", "mine/0.npy", "mine/1.npy"], "mine/1.npy"),
         (["--depth", "none"], "none"),
         (["--depth", "mine/[0-6].npy"], "7"),
         (["--depth", "mine", "--normals", "mine"], "normal"),
