@@ -2,5 +2,5 @@
 
 `segmentation.py` gives each pixel a face direction, `poses.py` finds rotations by the directions of
 outlines, `filling.py` fills the lattice of a rotation with cubes, `answer.py` compares the shapes.
-The pictures and the field of view are all that is used. Needs numba (the extra `cubes`).
+The pictures and the settings of a test file are all that is used. Needs numba (the extra `cubes`).
 """

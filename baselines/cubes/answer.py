@@ -22,7 +22,7 @@ from baselines.cubes.filling import (
 )
 from baselines.cubes.poses import likely_poses, outline_pixels
 from baselines.cubes.segmentation import labelings
-from iqtt.audit.features.statistics import border_color
+from iqtt.audit.features.statistics import border
 from iqtt.files.reader import open_questions
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.near import is_chain, is_connected
@@ -36,8 +36,9 @@ SMALLEST = 2.0  # radius of shapes of 8 or more cubes that all show
 # Hypotheses of rotation, parities and distance: the best so many are filled by so many moves.
 STAGES = ((96, 300), (10, 3000))
 FINAL = (4, 8000)  # those that are filled and refined at full resolution
-ROUNDS = (1, 3)  # times as many hypotheses; the second round is of what the first leaves
+ROUNDS = (1, 3)  # times as many hypotheses, where the first round decodes nothing
 GOOD, ENOUGH = 0.015, 0.03  # misfits of a decoded picture that end a search, and all searches
+LARGEST = 256  # pixels of a side; of larger pictures every n-th pixel is seen
 SHOWN = 0.6  # of the pixels that the split demands of a cube: poses are not exact
 
 
@@ -86,9 +87,9 @@ def write_cubes(
         spec = questions.spec or SplitSpec(height=height, width=width, min_cube_pixels=0)
         scores = np.zeros((len(questions), questions.answers))
         for row in range(len(questions)):
-            images = questions.read("questions", slice(row, row + 1))[0]
+            images = questions.read("questions", row)
             if images.dtype != np.uint8:
-                images = np.clip(255 * images.astype(np.float32), 0, 255)
+                images = np.clip(255 * np.nan_to_num(images.astype(np.float32)), 0, 255)
             scores[row] = answer_scores(images, spec, row)
             progress(1, len(questions))
     write_answers(out, data, method="cubes", scores=scores, overwrite=overwrite)
@@ -96,12 +97,13 @@ def write_cubes(
 
 def answer_scores(images: Array, spec: SplitSpec, seed: int = 0) -> Array:
     """Return a score of each answer of a question, (K,): minus the misfit where reference and
-    answer were decoded to one shape; where no answer was, minus the least misfit of a shape that
+    answer were decoded to one shape; where none fits well, minus the least misfit of a shape that
     explains both.
 
     Args:
         images: (1 + K, H, W, 3), 0..255.
-        spec: the settings of which the field of view, numbers of cubes and radius are used.
+        spec: the settings of which the field of view, the numbers of cubes, the rule and largest
+            radius of shapes and the pixels that show each cube are used.
         seed: of the random choices.
     """
     reference, *answers = (decode(image, spec, (seed, i)) for i, image in enumerate(images))
@@ -129,10 +131,12 @@ def decode(image: Array, spec: SplitSpec, seed: tuple[int, ...] = (0,)) -> Decod
     split's rule fits.
     """
     half = math.tan(math.radians(spec.fov_y_degrees) / 2)
+    stride = max(1, min(image.shape[:2]) // LARGEST)
+    image = image[stride // 2 :: stride, stride // 2 :: stride]
     height, width = image.shape[:2]
     step = max(1, min(height, width) // 64)
     least = max(1, SHOWN * spec.min_cube_pixels * height * width / (spec.height * spec.width))
-    background = border_color(image[None, None]).reshape(-1, 3)[0]
+    background = np.median(border(image[None, None]), axis=2)[0, 0]
     best = Decoded(np.zeros((0, 3), np.int64), 0.0, 1.0, [])
     rng = np.random.default_rng(seed)
     readings: list[Reading] = []
@@ -157,11 +161,12 @@ def decode_reading(
     reading: Reading, spec: SplitSpec, times: int, rng: np.random.Generator
 ) -> Decoded:
     """Return the cubes of the split's rule that a reading shows best."""
-    smallest = min(SMALLEST if spec.cubes[0] >= 8 else 1.0, spec.max_radius)
+    fewest, most = spec.cubes
+    radii = SMALLEST if fewest >= 8 else 1.5, math.sqrt(most**2 + 2) / 2
     # Squared radii of shapes are quarters of integers.
-    quarters = range(int(4 * smallest**2), int(4 * spec.max_radius**2) + 1)
-    distances = [spec.framing_distance(math.sqrt(q) / 2) for q in quarters]
-    tried = distances[:: max(3, len(distances) // 12)]
+    first, last = (int(4 * min(radius, spec.max_radius) ** 2) for radius in radii)
+    distances = [spec.framing_distance(math.sqrt(q) / 2) for q in range(first, last + 1)]
+    tried = distances[:: max(3, len(distances) // 24)]
     ranked: list[tuple[float, int, Array, float, Array]] = []
     for pose in reading.poses:
         for parity in itertools.product((0.0, 0.5), repeat=3):
@@ -173,7 +178,7 @@ def decode_reading(
     for count, moves in STAGES:
         kept = sorted(ranked, key=lambda r: r[:2])[: count * times]
         ranked = [
-            (fill(p, d, low, reading.coarse, *spec.cubes, moves, rng)[1], i, p, d, low)
+            (fill(p, d, low, reading.coarse, fewest, most, moves, rng)[1], i, p, d, low)
             for _, i, p, d, low in kept
         ]
     count, moves = FINAL
@@ -181,7 +186,7 @@ def decode_reading(
     for _, _, turn, away, low in ranked:
         pose, distance = turn, away
         for _ in range(2):
-            filled, _ = fill(pose, distance, low, reading.fine, *spec.cubes, moves, rng)
+            filled, _ = fill(pose, distance, low, reading.fine, fewest, most, moves, rng)
             pose, distance, value = refine(pose, distance, low, filled, reading.fine)
             counts = pixel_counts(pose, distance, low, filled, reading.pixels)
             filled &= counts >= reading.least
@@ -240,7 +245,7 @@ def _lattice(cubes: Array, pose: Array) -> tuple[Array | None, Array]:
     cubes = cubes - cubes.min(axis=0)
     extent = cubes.max(axis=0) + 1
     low = -SIDE / 2 - np.where(extent % 2 == 1, 0.5, 0.0)
-    if (extent > SIDE - 1).any():
+    if (extent > SIDE).any():
         return None, low
     placed = cubes + np.round(-extent / 2 - low).astype(np.int64)
     filled = np.zeros(SIDE**3, np.bool_)

@@ -56,12 +56,13 @@ def _trace(
     faces: Array,
 ) -> int:
     """Fill in the cells of a box that a ray crosses, in order, up to the first filled one, and the
-    label of the face it enters by; 4 where that face points away from the pose's normal.
+    label of the face it enters by; 4 where that face points away from the pose's normal, and where
+    the camera is in the cell.
 
     Returns their number. `work` is (6, 3).
     """
-    near, far = -1e9, 1e9
-    axis = 0
+    near, far = 0.0, 1e9
+    axis = -1
     for a in range(3):
         ray = view[0, a] * x + view[1, a] * y - view[2, a]
         if abs(ray) < 1e-9:
@@ -91,7 +92,7 @@ def _trace(
         work[5, a] = box[1, a] - 1 - cell if ray > 0 else cell - box[0, a]  # cells to come
     for count in range(MOST):
         cells[count] = place
-        faces[count] = axis + 1 if work[0, axis] < 0 else 4
+        faces[count] = axis + 1 if axis >= 0 and work[0, axis] < 0 else 4
         if filled[place]:
             return count + 1
         axis = 0

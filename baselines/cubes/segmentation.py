@@ -1,4 +1,4 @@
-"""Face directions of pixels: flat colours joined, then merged to three by Ward's rule."""
+"""Face directions of pixels: flat colours joined, then merged to three or two by Ward's rule."""
 
 from collections.abc import Iterator
 from typing import Any

@@ -106,12 +106,12 @@ WAYS: Mapping[str, Pictures] = {
 }  # fmt: skip
 
 
-def by_cubes(pictures: Array, spec: SplitSpec) -> int:
-    """Return the answer of `cubes` to pictures, (1 + K, H, W, 3) uint8."""
-    return int(answer_scores(pictures, spec).argmax())
+def by_cubes(pictures: Array, spec: SplitSpec, row: int) -> int:
+    """Return the answer of `cubes` to pictures, (1 + K, H, W, 3) uint8, as the command does."""
+    return int(answer_scores(pictures, spec, row).argmax())
 
 
-def by_depth(pictures: Array, spec: SplitSpec) -> int:
+def by_depth(pictures: Array, spec: SplitSpec, _: int) -> int:
     """Return the answer of `depth-match`."""
     network, card = _depth_match()
     images = [channels_first(decode_image(one), card.settings.size) for one in pictures]
@@ -125,17 +125,21 @@ def _depth_match() -> tuple[Any, Any]:
     return load_weights(FILES / "depth-match.safetensors", METHOD)
 
 
-def accuracy(
-    method: Callable[[Array, SplitSpec], int], pictures: Pictures, file: QuestionsFile, count: int
-) -> str:
-    """Return the share of right answers with its 95% Wilson interval."""
+METHODS = {"`cubes`": by_cubes, "`depth-match`": by_depth}
+
+
+def accuracies(pictures: Pictures, file: QuestionsFile, count: int) -> list[str]:
+    """Return each method's share of right answers with its 95% Wilson interval."""
     assert file.spec is not None, "files of ours have settings"
-    right = sum(
-        method(pictures(file, row), file.spec) == int(file.read("answers", row))
-        for row in range(count)
-    )
-    low, high = stats.binomtest(right, count).proportion_ci(method="wilson")
-    return f"{right / count:.2f} [{low:.2f}, {high:.2f}]"
+    right = np.zeros(len(METHODS), int)
+    for row in range(count):
+        seen, answer = pictures(file, row), int(file.read("answers", row))
+        right += [method(seen, file.spec, row) == answer for method in METHODS.values()]
+    cells = []
+    for n in right.tolist():
+        low, high = stats.binomtest(n, count).proportion_ci(method="wilson")
+        cells.append(f"{n / count:.2f} [{low:.2f}, {high:.2f}]")
+    return cells
 
 
 def main() -> None:
@@ -145,14 +149,10 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=50)
     parser.add_argument("--ways", nargs="+", default=list(WAYS), choices=WAYS)
     options = parser.parse_args()
-    methods = {"`cubes`": by_cubes, "`depth-match`": by_depth}
     with open_questions(options.data, answers=answers_beside(options.data)) as file:
         count = min(options.count, len(file))
-        lines = [
-            [way, *(accuracy(m, WAYS[way], file, count) for m in methods.values())]
-            for way in tqdm(options.ways)
-        ]
-    print(table(["pictures", *methods], lines))
+        lines = [[way, *accuracies(WAYS[way], file, count)] for way in tqdm(options.ways)]
+    print(table(["pictures", *METHODS], lines))
 
 
 if __name__ == "__main__":

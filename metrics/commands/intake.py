@@ -102,7 +102,7 @@ def import_(
     texts: dict[str, Any] = {"run": run_name, "notes": notes, "overwrite": overwrite}
     if expanded:
         found = f"{expanded[0]} beside the options, as where a shell expands a pattern"
-        raise click.UsageError(f"found {found}; put it in quotes: --depth 'out/*.png'")
+        raise click.UsageError(f"found {found}; put patterns in quotes, such as 'out/*.png'")
     check_writable(Path(out), overwrite)
     if (pattern is None) == (answers is None):
         raise click.UsageError("give --depth for rooms, or --answers for questions")

@@ -100,7 +100,9 @@ def test_only_shapes_of_the_split_count():
 
 def test_a_released_file_is_answered(tmp_path):
     with h5py.File(tmp_path / "test.h5", "w") as file:
-        file["questions"] = np.ones((2, 4, 32, 32, 3), np.float32)
+        images = np.ones((2, 4, 32, 32, 3), np.float32)
+        images[1, 0, 9, 9:12:2] = [[np.nan] * 3, [0.5] * 3]
+        file["questions"] = images
     write_cubes(tmp_path / "test.h5", tmp_path / "out.h5")
     with h5py.File(tmp_path / "out.h5") as file:
         assert file["scores"].shape == (2, 3)
