@@ -50,19 +50,19 @@ def hidden_from(
     return np.asarray(outside | away | (depth > farthest[at] + MARGIN))
 
 
-def behind_scores(errors: Array, nearest: Array) -> dict[str, float]:
+def behind_scores(errors: Array, nearest: Array | None = None) -> dict[str, float]:
     """Return the scores of hidden surfaces, NaN where fewer than LEAST_PIXELS show them.
 
-    - behind_depth_error: mean |p - t| of planar depth.
+    - behind_depth_error: mean of the errors.
     - behind_recall_0.05: fraction of the points nearer than RECALL_WITHIN to a predicted one.
 
     Args:
-        errors: absolute differences of predicted and true depth at the M hidden pixels, (M,).
-        nearest: distance of the true point there to the nearest predicted point, (M,).
+        errors: lengths of `points.departures` at the M hidden pixels, (M,).
+        nearest: distance of the true surface there to the prediction, (M,); None for no recall.
     """
     few = len(errors) < LEAST_PIXELS
-    recall = np.nan if few else float(np.mean(nearest < RECALL_WITHIN))
-    return {
-        "behind_depth_error": np.nan if few else float(errors.mean()),
-        f"behind_recall_{RECALL_WITHIN:g}": recall,
-    }
+    scores = {"behind_depth_error": np.nan if few else float(errors.mean())}
+    if nearest is not None:
+        recall = np.nan if few else float(np.mean(nearest < RECALL_WITHIN))
+        scores[f"behind_recall_{RECALL_WITHIN:g}"] = recall
+    return scores

@@ -22,10 +22,14 @@ def boundary_scores(depth: Array, true_depth: Array, mask: Array) -> dict[str, f
     """Return `boundary_f1` and `boundary_recall` of planar depth, (H, W) each.
 
     At each ratio, a pixel and a neighbour of at least so much larger depth are a boundary, in each
-    of four directions. Precision and recall are means over the directions, and F1 is their harmonic
-    mean. A direction without any boundary, true or predicted, is left out, and so is a ratio
-    without any direction; the published evaluation takes both for 0, so that the truth itself is
-    not perfect. Both scores are NaN where the truth has no boundary at the smallest ratio.
+    of four directions.
+
+    - boundary_f1: the published score. Precision and recall are means over the directions, F1 is
+      their harmonic mean, and all are 0 where nothing can be counted. So the truth scores below 1
+      where it has no boundary in a direction, or at a ratio.
+    - boundary_recall: the fraction of the true boundaries, of all directions together, that are
+      predicted as well; the mean over the ratios at which the truth has any, with the same weights.
+      NaN where it has none. (The published recall is of boundaries of masks.)
 
     Args:
         mask: the scored pixels, (H, W); pairs of two of them count.
@@ -37,17 +41,15 @@ def boundary_scores(depth: Array, true_depth: Array, mask: Array) -> dict[str, f
         p, t = (np.where(both[0] & both[1], d[1] / d[0], 0.0) for d in (near, truly))
         counts[i] = [_above(d) for d in (p, t, np.minimum(p, t))]
     predicted, true_count, common = counts.transpose(1, 0, 2)
-    if not true_count[:, 0].any():
-        return {"boundary_f1": np.nan, "boundary_recall": np.nan}
-    there = (predicted + true_count) > 0
-    directions = np.maximum(there.sum(axis=0), 1)
-    precision = (common / np.maximum(predicted, 1.0)).sum(axis=0) / directions
-    recall = (common / np.maximum(true_count, 1.0)).sum(axis=0) / directions
+    precision = (common / np.maximum(predicted, 1.0)).mean(axis=0)
+    recall = (common / np.maximum(true_count, 1.0)).mean(axis=0)
     f1 = 2.0 * precision * recall / np.maximum(precision + recall, np.finfo(float).tiny)
-    weights = WEIGHTS * there.any(axis=0)
+    in_all = true_count.sum(axis=0)
+    found = common.sum(axis=0) / np.maximum(in_all, 1.0)
+    weights = WEIGHTS * (in_all > 0)
     return {
-        "boundary_f1": float(f1 @ weights / weights.sum()),
-        "boundary_recall": float(recall @ weights / weights.sum()),
+        "boundary_f1": float(f1 @ WEIGHTS),
+        "boundary_recall": float(found @ weights / weights.sum()) if in_all[0] else np.nan,
     }
 
 

@@ -189,3 +189,12 @@ def point_scores(
     )
     named = {score.__name__: score(nearest) for score in scores}
     return named | {f"f_score_{t:g}": f_score(nearest, t) for t in f_score_thresholds}
+
+
+def paper_scores(nearest: NearestDistances) -> dict[str, float]:
+    """Return the paper's own scores, `paper_<name>`, from distances between points of pixels.
+
+    They depend on the number of pixels: the same surface, sampled elsewhere, does not score 0.
+    """
+    scores = (chamfer, hausdorff, hausdorff_forward, hausdorff_reverse)
+    return {f"paper_{score.__name__}": score(nearest) for score in scores}

@@ -22,10 +22,26 @@ def empty_room(
         world_from_camera: rigid transform of the camera, (4, 4).
         fov_y_degrees: vertical field of view.
     """
-    rays = pixel_directions(height, width, fov_y_degrees)
-    directions, origin = rays @ world_from_camera[:3, :3].T, world_from_camera[:3, 3]
+    reach = _reach(pixel_directions(height, width, fov_y_degrees), world_from_camera)
+    return _least(reach), np.eye(3)[reach.argmin(axis=-1)] @ world_from_camera[:3, :3]
+
+
+def depth_along(lines: Array, world_from_camera: Array) -> Array:
+    """Return planar depth (N,) of the same planes along lines (N, 3), camera frame, z = -1."""
+    return _least(_reach(lines, world_from_camera))
+
+
+def _reach(lines: Array, world_from_camera: Array) -> Array:
+    """Return planar depth of each of the three planes along lines, (..., 3)."""
+    directions, origin = lines @ world_from_camera[:3, :3].T, world_from_camera[:3, 3]
     with np.errstate(divide="ignore", over="ignore"):
-        reach = np.where((directions < 0) & (origin > 0), -origin / directions, np.inf)
+        reach: Array = np.where((directions < 0) & (origin > 0), -origin / directions, np.inf)
+    return reach
+
+
+def _least(reach: Array) -> Array:
+    """Return the nearest plane's depth; where a line meets none, the farthest that others meet."""
     depth = reach.min(axis=-1)
-    depth = np.where(np.isfinite(depth), depth, depth[np.isfinite(depth)].max(initial=1.0))
-    return depth, np.eye(3)[reach.argmin(axis=-1)] @ world_from_camera[:3, :3]
+    return np.asarray(
+        np.where(np.isfinite(depth), depth, depth[np.isfinite(depth)].max(initial=1.0))
+    )

@@ -18,7 +18,7 @@ from metrics.measures.checks import (
     require_mask,
     require_some,
 )
-from scenegen.camera import back_project
+from scenegen.camera import back_project, pixel_directions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -29,6 +29,7 @@ GRAZING_DEGREES = 10.0
 # Smallest ratio of the middle to the largest variance of a patch. A patch below it is a line; the
 # middle variance may then be rounding in single precision.
 _THINNEST = 1e-6
+_EDGE_ON = 1e-6  # cosine of normal and ray; rounding in single precision stays below it
 _NEIGHBOURS = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
 
 
@@ -91,11 +92,21 @@ def normal_scores(angles: Array) -> dict[str, float]:
 def normals_from_depth(
     depth: ArrayLike, fov_y_degrees: float, mask: Mask | None = None
 ) -> tuple[Array, Mask]:
-    """Return unit normals (H, W, 3) of planar depth (H, W), and where they are reliable (H, W).
+    """Return `normals_from_points` of planar depth (H, W), on the rays of its pixels."""
+    planar = as_float64(depth, "depth")
+    require(planar.ndim == 2, "depth", f"shape {planar.shape}", "(H, W)")
+    require_fov(fov_y_degrees)
+    inside = require_mask(np.isfinite(planar) if mask is None else mask, planar.shape)
+    require_finite(planar, "depth", inside)
+    return normals_from_points(back_project(planar, fov_y_degrees), fov_y_degrees, inside)
+
+
+def normals_from_points(points: ArrayLike, fov_y_degrees: float, mask: Mask) -> tuple[Array, Mask]:
+    """Return unit normals (H, W, 3) of points (H, W, 3), and where they are reliable (H, W).
 
     A normal is that of the plane that minimises the sum of squared distances to the points of the
     pixel and its 8 neighbours (total least squares, Hoppe et al. 1992), and faces the viewer. A
-    neighbour does not count if it is outside the image or the mask (default: finite depth), or
+    neighbour does not count if it is outside the image or the mask, or
     across a depth discontinuity: if the line to it is within 10 degrees of the viewing ray. Where
     fewer than 2 are left, or all lie on one line, every neighbour in the mask counts; if those do
     not span a plane either, the normal points at the viewer. Outside the mask normals are 0.
@@ -104,19 +115,17 @@ def normals_from_depth(
     truth. A prediction has a normal at every pixel of the mask, so that noisy depth takes no pixel
     out of the score.
     """
-    planar = as_float64(depth, "depth")
-    require(planar.ndim == 2, "depth", f"shape {planar.shape}", "(H, W)")
-    inside = require_mask(np.isfinite(planar) if mask is None else mask, planar.shape)
-    require_finite(planar, "depth", inside)
-    require_fov(fov_y_degrees)
-    rays = np.moveaxis(back_project(np.ones(planar.shape), fov_y_degrees), -1, 0)
+    inside = require_mask(mask, np.shape(points)[:2])
+    image = np.where(inside[..., None], as_float64(points, "points"), 0.0)
+    require_finite(image, "points")
+    height, width = inside.shape
+    rays = np.moveaxis(pixel_directions(height, width, fov_y_degrees), -1, 0)
     rays = rays / np.linalg.norm(rays, axis=0)
-    points = np.moveaxis(back_project(np.where(inside, planar, 1.0), fov_y_degrees), -1, 0)
-    steps, counted, near = _neighbours(points, rays, inside)
-    normals, on_surface = _fit_planes(steps, near)
+    steps, counted, near = _neighbours(np.moveaxis(image, -1, 0), rays, inside)
+    normals, on_surface = _fit_planes(steps, near, rays)
     on_surface &= inside
     rest = inside & ~on_surface
-    loose, spanned = _fit_planes(steps[:, :, rest], counted[:, rest])
+    loose, spanned = _fit_planes(steps[:, :, rest], counted[:, rest], rays[:, rest])
     normals[:, rest] = np.where(spanned, loose, -rays[:, rest])
     normals *= np.where(inside, -np.copysign(1.0, (normals * rays).sum(axis=0)), 0.0)
     return np.moveaxis(normals, 0, -1), on_surface
@@ -138,10 +147,12 @@ def _neighbours(points: Array, rays: Array, inside: Mask) -> tuple[Array, Mask, 
     return steps, counted, counted & (np.square(along) <= grazing * lengths)
 
 
-def _fit_planes(steps: Array, counted: Mask) -> tuple[Array, Mask]:
+def _fit_planes(steps: Array, counted: Mask, rays: Array) -> tuple[Array, Mask]:
     """Unit normals (3, ...) of the planes through a point and its counted steps (8, 3, ...).
 
-    The second array (...) is false where the points lie on one line or coincide.
+    The second array (...) is false where the points lie on one line or coincide, and where the
+    plane holds the pixel's ray (3, ...), as it does for pixels of one row or column: rounding would
+    choose which side of it faces the viewer.
     """
     number = 1.0 + counted.sum(axis=0)
     kept = steps * counted[:, None]
@@ -150,7 +161,8 @@ def _fit_planes(steps: Array, counted: Mask) -> tuple[Array, Mask]:
         (a, b): (kept[:, a] * kept[:, b]).sum(axis=0) / number - mean[a] * mean[b]
         for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
     }
-    return _least_axis(*scatter.values())
+    normals, clear = _least_axis(*scatter.values())
+    return normals, clear & (np.abs((normals * rays).sum(axis=0)) > _EDGE_ON)
 
 
 def _least_axis(

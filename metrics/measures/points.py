@@ -33,6 +33,20 @@ def point_map_scores(
     }
 
 
+def departures(points: Array, true_depth: Array, rays: Array, on_rays: bool) -> Array:
+    """Return how far points (N, 3) are from the true ones of their pixels, (N, K), scene units.
+
+    The first column is predicted minus true depth. Points that are not all on the rays (N, 3) of
+    their pixels, which have z = -1, have two more: x and y minus those of the ray at their depth.
+    So the length of a row is the error of depth where a point lies on its ray.
+    """
+    depth = -points[:, 2]
+    if on_rays:
+        return np.asarray((depth - true_depth)[:, None])
+    aside = points[:, :2] - depth[:, None] * rays[:, :2]
+    return np.concatenate([(depth - true_depth)[:, None], aside], axis=1)
+
+
 def local_point_scores(points: Array, true_points: Array, object_id: Array) -> dict[str, float]:
     """Return `local_points_rel` and `local_points_delta_1`: means over objects, each fitted alone.
 

@@ -45,11 +45,13 @@ def _each(inside: Array) -> Iterator[Array]:
         yield inside == number
 
 
-def shape_scores(points: Array, true_points: Array, inside: Array) -> dict[str, float]:
+def shape_scores(
+    errors: Array, points: Array, true_points: Array, inside: Array
+) -> dict[str, float]:
     """Return the scores of the shape inside objects, all NaN without any object.
 
-    - shape_error: mean |e - median(e)|, with e the error of depth at a pixel and the median over
-      the pixels of its object: what is left after each object's own shift.
+    - shape_error: mean |e - median(e)|, with e the departure at a pixel and the median, of each
+      column, over the pixels of its object: what is left after each object's own shift.
     - shape_recall_0.02: fraction of the objects whose own shape_error is below RECALL_WITHIN.
     - shape_correlation: correlation of what predicted and true depth have left after the plane of
       each object, the least-squares fit of depth to the points of its pixels. A predicted rest of a
@@ -57,19 +59,18 @@ def shape_scores(points: Array, true_points: Array, inside: Array) -> dict[str, 
       having that. NaN where the true rest is flat.
 
     Args:
-        points, true_points: predicted and true, camera frame, of the N pixels inside objects,
-            (N, 3), scene units.
+        errors: departures of the N pixels inside objects, (N, K), as from `points.departures`.
+        points, true_points: predicted and true, camera frame, (N, 3), scene units.
         inside: the object of each, (N,).
     """
     names = ("shape_error", f"shape_recall_{RECALL_WITHIN:g}", "shape_correlation")
     if not len(inside):
         return dict.fromkeys(names, np.nan)
-    errors = points[:, 2] - true_points[:, 2]
     left, found = np.empty(len(inside)), []
     rests = np.empty((2, len(inside)))
     for mask in _each(inside):
         own = errors[mask]
-        left[mask] = np.abs(own - np.median(own))
+        left[mask] = np.sqrt(np.square(own - np.median(own, axis=0)).sum(axis=-1))
         found.append(float(left[mask].mean()) < RECALL_WITHIN)
         for rest, cloud in zip(rests, (points, true_points), strict=True):
             rest[mask] = _beside_plane(cloud[mask])

@@ -16,7 +16,8 @@ from metrics.measures.statistics import (
     clustered_wilson_interval,
     linearised_means,
 )
-from metrics.scoring.metric_names import OBJECT_SCORES, SKILLED, metric
+from metrics.scoring.metric_names import BEHIND, OBJECT_SCORES, SHOWN_AS_MUCH, SKILLED, metric
+from metrics.submissions.layout import Shown
 
 Array = NDArray[Any]
 CONFIDENCE = 0.95  # of all intervals
@@ -135,19 +136,36 @@ def object_sizes(pixels: Array, image_pixels: int) -> Array:
     return np.array([size_range(share) for share in (pixels / image_pixels).tolist()], object)
 
 
-def skills(items: Mapping[str, Array], scene: Array, bootstrap: Bootstrap) -> dict[str, Skill]:
+def floor_column(items: Mapping[str, Array], name: str, shown: Shown = "scored_view") -> str | None:
+    """Return which column of items is the floor of a score's skill; None where there is none.
+
+    Of several that were shown as much as the method, it is the lowest on average.
+    """
+    begins = [
+        begin
+        for begin in SKILLED.get(name, ())
+        if begin + name in items and (name != BEHIND or begin in SHOWN_AS_MUCH[shown])
+    ]
+    columns = [begin + name for begin in begins if np.isfinite(items[begin + name]).any()]
+    return min(columns, key=lambda column: float(np.nanmean(items[column])), default=None)
+
+
+def skills(
+    items: Mapping[str, Array], scene: Array, bootstrap: Bootstrap, shown: Shown = "scored_view"
+) -> dict[str, Skill]:
     """Return the skills of rooms from columns of items, (N,) each, those of floors among them.
 
     There is none where no image shows an object that counts: the empty room is then the truth. A
     floor below 0, that of relief which goes against other scenes, counts as 0, the score of the
     empty room: so a bad floor wins nothing, and the skill of a relief never exceeds its score.
     """
-    names = [name for name in SKILLED if {name, SKILLED[name] + name} <= items.keys()]
+    column_of = {name: floor_column(items, name, shown) for name in SKILLED if name in items}
+    names = [name for name, column in column_of.items() if column is not None]
     of_objects = [name for name in names if name in OBJECT_SCORES]
     if not any(np.isfinite(items[name]).any() for name in of_objects):
         return {}
     skill_of: dict[str, Skill] = {}
-    pairs = {name: np.stack([items[name], items[SKILLED[name] + name]]) for name in names}
+    pairs = {name: np.stack([items[name], items[str(column_of[name])]]) for name in names}
     for group, there in by_presence(pairs):
         errors, floors = (
             cluster_means(np.stack([pairs[name][i, there] for name in group], -1), scene[there])
@@ -165,10 +183,9 @@ def skills(items: Mapping[str, Array], scene: Array, bootstrap: Bootstrap) -> di
         for k, low, high in zip(kept, *ends, strict=True):
             name, value = group[k], values[k]
             assert value is not None
-            column = SKILLED[name] + name
             # The ends belong to the value but for rounding; min and max keep what is not a number.
             span = finite(min(low, value)), finite(max(high, value))
-            skill_of[name] = Skill(value, *span, float(floor[k]), column)
+            skill_of[name] = Skill(value, *span, float(floor[k]), str(column_of[name]))
     return {name: skill_of[name] for name in names if name in skill_of}
 
 

@@ -1,11 +1,13 @@
-"""Planar depth of any kind of predicted geometry, as every score takes it."""
+"""Depth and points of any kind of predicted geometry, as every score takes them."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.alignment import Alignment, depth_of_disparity
-from metrics.measures.depth import align, compare_depth
+from metrics.measures.alignment import Alignment, align, align_points, depth_of_disparity
 from metrics.submissions.reader import PredictedView
+from scenegen.camera import pixel_directions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -14,41 +16,54 @@ WIDER: tuple[Alignment, ...] = (
 )  # fmt: skip
 
 
-def planar_depth(predicted: PredictedView, true_depth: Array) -> tuple[Array, Alignment]:
-    """Return planar depth (H, W) of a prediction, and the alignment that its scores need.
+@dataclass(frozen=True, eq=False)
+class Geometry:
+    """What is predicted for one image after the declared alignment, as scores take it.
 
-    Depth stays as it is, and that of points is their -z. Disparity is fitted here, over the pixels
-    where both are finite, by `measures.alignment.depth_of_disparity`; elsewhere depth is NaN.
-    `disparity_scale_shift` is the only alignment that is then made already.
+    Attributes:
+        depth: planar depth, (H, W), scene units: -z of the points; NaN outside of the mask.
+        points: camera frame, scene units, (N, 3), of the N pixels of the mask.
+        on_rays: whether the points lie on the rays of their pixels, as those of depth do.
     """
+
+    depth: Array
+    points: Array
+    on_rays: bool
+
+
+def fitted_geometry(
+    predicted: PredictedView, true_depth: Array, fov_y_degrees: float, mask: Mask
+) -> Geometry:
+    """Return a prediction after its declared alignment to the true depth (H, W) of the mask.
+
+    Points are fitted in space, by `measures.alignment.align_points`, and all else in depth. Where
+    nothing is left open, nothing changes. What is predicted must be finite inside the mask.
+    """
+    height, width = true_depth.shape
+    rays = pixel_directions(height, width, fov_y_degrees)[mask]
+    true = true_depth[mask].astype(np.float64)
+    depth = np.full(true_depth.shape, np.nan)
     if predicted.kind == "points":
-        return -predicted.geometry[..., 2], predicted.alignment
-    if predicted.kind == "depth":
-        return predicted.geometry, predicted.alignment
-    depth = np.full(predicted.geometry.shape, np.nan)
-    both = np.isfinite(predicted.geometry) & np.isfinite(true_depth)
-    if both.any():
-        true = true_depth[both].astype(np.float64)
-        depth[both] = depth_of_disparity(predicted.geometry[both], true)
-    return depth, scored_alignment(predicted.kind, predicted.alignment)
+        points = predicted.geometry[mask].astype(np.float64)
+        if len(true):
+            points = align_points(points, rays * true[:, None], predicted.alignment)
+        depth[mask] = -points[:, 2]
+        return Geometry(depth, points, False)
+    values = predicted.geometry[mask].astype(np.float64)
+    if predicted.kind == "disparity" and len(true):
+        values = depth_of_disparity(values, true)
+    elif len(true):
+        values = align(values, true, predicted.alignment)
+    depth[mask] = values
+    return Geometry(depth, rays * values[:, None], True)
 
 
-def fitted_depth(depth: Array, true_depth: Array, mask: Mask, alignment: Alignment) -> Array:
-    """Return depth (H, W) after the alignment that its scores need, NaN outside of the mask.
-
-    Where nothing is left to fit, it is `depth` itself.
-    """
-    if alignment in ("none", "disparity_scale_shift") or not mask.any():
-        return depth
-    fitted = np.full(depth.shape, np.nan)
-    fitted[mask] = align(compare_depth(depth, true_depth, mask), alignment).predicted
-    return fitted
-
-
-def depth_as_scored(predicted: PredictedView, true_depth: Array) -> Array:
+def depth_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees: float) -> Array:
     """Return planar depth (H, W) as scores see it, for pictures; no value needs to be finite."""
-    depth, alignment = planar_depth(predicted, true_depth)
-    return fitted_depth(depth, true_depth, np.isfinite(depth) & np.isfinite(true_depth), alignment)
+    known = np.isfinite(true_depth)
+    finite = np.isfinite(predicted.geometry)
+    known &= finite.all(axis=-1) if predicted.kind == "points" else finite
+    return fitted_geometry(predicted, true_depth, fov_y_degrees, known).depth
 
 
 def scored_alignment(kind: str, alignment: Alignment) -> Alignment:

@@ -1,13 +1,16 @@
-"""All scores of one image: predicted depth and normals against the true ones."""
+"""All scores of one image: predicted geometry and normals against the true ones.
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+Depth scores compare planar depth. Scores of surfaces compare points: those that are predicted, or
+those of the depth on the rays of its pixels. `metric_names` says which score takes which.
+"""
+
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.alignment import Alignment, align_points
+from metrics.measures.alignment import Alignment
 from metrics.measures.behind import behind_scores, hidden_from
 from metrics.measures.boundaries import boundary_scores
 from metrics.measures.chamfer_hausdorff import (
@@ -15,18 +18,36 @@ from metrics.measures.chamfer_hausdorff import (
     chamfer,
     hausdorff,
     nearest_distances,
+    paper_scores,
     point_scores,
 )
-from metrics.measures.depth import compare_depth, depth_scores, mse_depth
-from metrics.measures.empty_room import empty_room
+from metrics.measures.depth import DepthPair, compare_depth, depth_scores, mse_depth
+from metrics.measures.empty_room import depth_along, empty_room
+from metrics.measures.guesses import balls_and_blocks, depth_of_balls, depth_of_blocks
 from metrics.measures.image_search import nearest_distances_on_image
-from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
+from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_points
 from metrics.measures.objects import counted_objects, object_means, single_objects
-from metrics.measures.points import local_point_scores, point_map_scores
+from metrics.measures.points import departures, local_point_scores, point_map_scores
 from metrics.measures.relief import relief_scores
 from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores
-from metrics.scoring.geometry import alignments_scored, fitted_depth, planar_depth
-from metrics.scoring.metric_names import CUT_OUT, EMPTY_ROOM, OF_EMPTY_ROOM, OTHER_SCENE
+from metrics.measures.surface import Surface, surface_distances, surface_of
+from metrics.scoring.geometry import (
+    Geometry,
+    alignments_scored,
+    fitted_geometry,
+    scored_alignment,
+)
+from metrics.scoring.metric_names import (
+    BALLS,
+    BEHIND,
+    BLOCKS,
+    CUT_OUT,
+    EMPTY_ROOM,
+    OBJECT_SCORES,
+    OF_EMPTY_ROOM,
+    OTHER_SCENE,
+    metric,
+)
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import Against, broken_rules, refuse_pixels
@@ -34,6 +55,7 @@ from metrics.submissions.truths import TrueView
 from scenegen.camera import (
     back_project,
     pixel_directions,
+    pixel_size,
     transform_points,
     transform_vectors,
 )
@@ -58,9 +80,10 @@ class ImageScores:
 
 @dataclass(frozen=True)
 class FirstView:
-    """What the first view of a scene sees: depth (H, W), `world_from_camera` (4, 4)."""
+    """The first view of a scene: depth and ids (H, W), `world_from_camera` (4, 4)."""
 
     depth: Array
+    object_id: Array
     world_from_camera: Array
 
 
@@ -70,15 +93,19 @@ class Reference:
 
     Attributes:
         empty: planar depth of the empty room that its camera sees, (H, W), scene units.
+        surface: the true one.
         normals: derived from its depth, (H, W, 3), and where they are reliable, `smooth`, (H, W).
+        counted: pixels of objects that count, (H, W).
         inside: the object of each pixel inside one, (H, W), as `shape.inside_objects`.
         hidden: pixels of objects that count and that the first view does not see, (H, W).
-        floors: scores of the empty room and of cut-outs, by name; those of OF_TRUTH.
+        floors: scores of the empty room, of cut-outs and of guesses, by name; those of OF_TRUTH.
     """
 
     empty: Array
+    surface: Surface
     normals: Array
     smooth: Array
+    counted: Array
     inside: Array
     hidden: Array
     floors: dict[str, float]
@@ -86,18 +113,27 @@ class Reference:
 
 def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
     """Return the reference of a true view; `first` is None where it is the first one itself."""
-    height, width = truth.depth.shape
-    depth, _ = empty_room(truth.world_from_camera, truth.fov_y_degrees, height, width)
-    nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, truth.mask)
+    mask, fov = truth.mask, truth.fov_y_degrees
+    empty, _ = empty_room(truth.world_from_camera, fov, *truth.depth.shape)
+    pitch = pixel_size(len(mask), fov)
+    points = back_project(truth.depth, fov)[mask]
+    surface = surface_of(points, truth.normal[mask].astype(np.float64), pitch, mask)
+    room = Geometry(empty, back_project(empty, fov)[mask], True)
+    walls, _ = normals_from_points(_image(room.points, mask), fov, mask)
+    seen = surface_of(room.points, walls[mask], pitch, mask)
+    nearest = surface_distances(seen, surface, _nearest(room, truth, surface), True)
     scores = {"chamfer": chamfer(nearest), "hausdorff": hausdorff(nearest)}
-    scores["mse_depth"] = mse_depth(compare_depth(depth, truth.depth, truth.mask))
-    scores |= object_means(_single_objects(depth, truth, nearest))
-    hidden = _hidden(truth, first)
-    scores |= behind_scores(
-        np.abs(depth - truth.depth)[hidden], nearest.reverse[hidden[truth.mask]]
-    )
-    floors = {EMPTY_ROOM + name: scores[name] for name in OF_EMPTY_ROOM}
-    normals, smooth = normals_from_depth(truth.depth, truth.fov_y_degrees, truth.mask)
+    scores["mse_depth"] = mse_depth(compare_depth(empty, truth.depth, mask))
+    scores |= object_means(_single_objects(empty, truth, nearest))
+    counted = counted_objects(truth.object_id)
+    hidden = _hidden(truth, counted, first)
+    guesses = _guesses(truth, empty, hidden, first)
+    behind = {
+        guess + BEHIND: behind_scores(np.abs(depth - truth.depth)[hidden])[BEHIND]
+        for guess, depth in guesses.items()
+    }
+    floors = {EMPTY_ROOM + name: scores[name] for name in OF_EMPTY_ROOM if name in scores} | behind
+    normals, smooth = normals_from_points(_image(points, mask), fov, mask)
     inside = inside_objects(truth.object_id)
     at, derived_at = inside > 0, _smooth_pixels(inside, smooth)
     floors |= {
@@ -107,7 +143,47 @@ def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
             normals[derived_at], inside[derived_at]
         ),
     }
-    return Reference(depth, normals, smooth, inside, hidden, floors)
+    return Reference(empty, surface, normals, smooth, counted, inside, hidden, floors)
+
+
+def _guesses(
+    truth: TrueView, empty: Array, hidden: Array, first: FirstView | None
+) -> dict[str, Array]:
+    """Return depth (H, W) of the guesses at hidden pixels, by what begins their scores' names.
+
+    Where nothing is hidden they are not scored, and so not drawn.
+    """
+    if first is None or not hidden.any():
+        return dict.fromkeys((EMPTY_ROOM, CUT_OUT, BALLS, BLOCKS), empty)
+    flat = empty.copy()
+    for number in np.unique(truth.object_id[hidden]).tolist():
+        own = truth.object_id == number
+        flat[own] = np.median(truth.depth[own])
+    camera = truth.world_from_camera, truth.fov_y_degrees
+    seen = first.depth, first.object_id, first.world_from_camera, truth.fov_y_degrees
+    balls, blocks = balls_and_blocks(*seen)
+    return {
+        EMPTY_ROOM: empty,
+        CUT_OUT: flat,
+        BALLS: depth_of_balls(balls, *camera, empty),
+        BLOCKS: depth_of_blocks(blocks, *camera, empty),
+    }
+
+
+def _image(values: Array, mask: Array) -> Array:
+    """Return values (N, ...) of the pixels of a mask as an image (H, W, ...), NaN elsewhere."""
+    image = np.full((*mask.shape, *values.shape[1:]), np.nan)
+    image[mask] = values
+    return image
+
+
+def _nearest(geometry: Geometry, truth: TrueView, surface: Surface) -> NearestDistances:
+    """Return the distances both ways between predicted points and those of the true pixels."""
+    if not geometry.on_rays:
+        return nearest_distances(geometry.points, surface.points)
+    return nearest_distances_on_image(
+        geometry.depth, truth.depth, truth.fov_y_degrees, surface.mask
+    )
 
 
 def _smooth_pixels(inside: Array, smooth: Array) -> Array:
@@ -119,8 +195,7 @@ def _smooth_pixels(inside: Array, smooth: Array) -> Array:
     return at & smooth if (at & smooth).any() else at
 
 
-def _hidden(truth: TrueView, first: FirstView | None) -> Array:
-    counted = counted_objects(truth.object_id)
+def _hidden(truth: TrueView, counted: Array, first: FirstView | None) -> Array:
     if first is None or not counted.any():
         return np.zeros_like(counted)
     points = back_project(truth.depth, truth.fov_y_degrees)[counted]
@@ -148,125 +223,124 @@ def score_prediction(
     other_relief: Array | None = None,
     non_finite: NonFinite = "error",
 ) -> ImageScores:
-    """Return every score of what is predicted for one image; arguments and errors as `score_view`.
+    """Return every score of what is predicted for one image, by the names of `metric_names`.
 
-    The depth is scored after every alignment that leaves as much open as the method does.
-    """
-    depth, alignment = planar_depth(predicted, truth.depth)
-    return score_view(
-        depth,
-        predicted.normal,
-        truth,
-        reference,
-        other_relief,
-        points=predicted.geometry if predicted.kind == "points" else None,
-        fov_y_degrees=predicted.fov_y_degrees,
-        alignment=alignment,
-        alignments=alignments_scored(predicted.kind, predicted.alignment),
-        non_finite=non_finite,
-    )
-
-
-def score_view(
-    depth: Array,
-    normal: Array | None,
-    truth: TrueView,
-    reference: Reference,
-    other_relief: Array | None = None,
-    *,
-    points: Array | None = None,
-    fov_y_degrees: float | None = None,
-    alignment: Alignment = "none",
-    alignments: Sequence[Alignment] = (),
-    non_finite: NonFinite = "error",
-) -> ImageScores:
-    """Return every score of one image.
-
-    Surfels are back-projected from depth, in the camera frame, as Pix2Shape does (section "Scene
-    Reconstruction"). Names and units are those of `metric_names`.
+    The geometry is fitted to the truth as far as the method declares, before anything is scored.
+    Depth is scored once more after every alignment that leaves as much open as the method does.
 
     Args:
-        depth: predicted planar depth, (H, W), scene units.
-        normal: predicted normals, (H, W, 3), camera frame; None where the method gives none.
         truth: what it is compared with.
         reference: what belongs to that.
         other_relief: true relief of another scene, (H, W), scene units, NaN where it has none; None
             where there is no other scene.
-        points: predicted points, (H, W, 3), camera frame; None for those of the depth.
-        fov_y_degrees: predicted vertical field of view; None where the method gives none.
-        alignment: what the method cannot know. The depth is fitted to the truth of the image so
-            far before anything is scored; after "disparity_scale_shift" it is already.
-        alignments: the alignments after which depth is scored once more.
-        non_finite: what to do with scored pixels that break `submissions.rules`. "penalise" scores
-            them at the worst: depth as 0 (at the camera), a normal as opposite to the true one. An
-            image with such a depth gets the worst scores of relief, -1 and 0.
+        non_finite: what to do with an image in which a scored pixel breaks `submissions.rules`.
+            "penalise" gives it the worst value of every score, `metric_names.Metric.worst`.
 
     Raises PredictionError with the count and the first pixel, unless they are penalised, and
     ValueError on other shapes than the truth's.
     """
-    mask = truth.mask
-    depth, normal, broken = _repaired(depth, normal, truth, non_finite)
-    depth = fitted_depth(depth, truth.depth, mask, alignment)
-    nearest = nearest_distances_on_image(depth, truth.depth, truth.fov_y_degrees, mask)
-    scores = point_scores(nearest, F_SCORE_THRESHOLDS)
-    pair = compare_depth(depth, truth.depth, mask)
+    if non_finite == "penalise" and _breaks_rules(predicted, truth):
+        return _worst(predicted, truth, reference, other_relief)
+    for name, values in (predicted.kind, predicted.geometry), ("normal", predicted.normal):
+        if values is not None:
+            refuse_pixels(PredictionError, f"predicted {name}", name, values, truth.mask)
+    mask, fov = truth.mask, truth.fov_y_degrees
+    alignment = scored_alignment(predicted.kind, predicted.alignment)
+    alignments = alignments_scored(predicted.kind, predicted.alignment)
+    geometry = fitted_geometry(predicted, truth.depth, fov, mask)
+    # Both derived alike, so that a perfect depth is perfect at creases, too, where planes blend.
+    derived, _ = normals_from_points(_image(geometry.points, mask), fov, mask)
+    surface = surface_of(geometry.points, derived[mask], reference.surface.pitch, mask)
+    closest = _nearest(geometry, truth, reference.surface)
+    nearest = surface_distances(surface, reference.surface, closest, geometry.on_rays)
+    scores = point_scores(nearest, F_SCORE_THRESHOLDS) | paper_scores(closest)
+    pair = DepthPair(geometry.depth[mask], truth.depth[mask].astype(np.float64))
     scores |= depth_scores(pair)
     for after in alignments:
-        scores |= depth_scores(pair, after, aligned=after == alignment)
-    said = reference.empty - depth
-    relief = relief_scores(said[mask], (reference.empty - truth.depth)[mask])
-    if broken.any():  # else they would count as relief, at the camera
-        worst = {"relief_correlation": -1.0, "relief_iou": 0.0}
-        relief = {name: value if np.isnan(value) else worst[name] for name, value in relief.items()}
-    objects = _single_objects(depth, truth, nearest)
-    scores |= relief | object_means(objects)
-    if other_relief is not None:
-        both = mask & np.isfinite(other_relief)
-        with_other = relief_scores(said[both], other_relief[both]) if both.any() else relief
-        # Nothing of the prediction is in a picture where nothing stands out.
-        other = {name: 0.0 if np.isnan(value) else value for name, value in with_other.items()}
-        scores |= {
-            OTHER_SCENE + name: np.nan if np.isnan(relief[name]) else other[name] for name in relief
-        }
-    counted, hidden = counted_objects(truth.object_id), reference.hidden
-    scores |= boundary_scores(depth, truth.depth, mask)
-    scores |= behind_scores(np.abs(depth - truth.depth)[hidden], nearest.reverse[hidden[mask]])
-    scores |= _scores_of_points(depth, points, truth, reference, counted, alignment, alignments)
-    if fov_y_degrees is not None:
-        scores["fov_error_degrees"] = abs(fov_y_degrees - truth.fov_y_degrees)
-    scores |= _scores_of_normals(depth, normal, truth, reference, counted)
+        scores |= depth_scores(pair, after, aligned=after == alignment and geometry.on_rays)
+    objects = _single_objects(geometry.depth, truth, nearest)
+    scores |= object_means(objects)
+    scores |= _scores_of_relief(geometry, truth, reference, other_relief)
+    scores |= boundary_scores(geometry.depth, truth.depth, mask)
+    scores |= _scores_of_points(geometry, truth, reference, nearest, alignments)
+    if predicted.fov_y_degrees is not None:
+        scores["fov_error_degrees"] = abs(predicted.fov_y_degrees - fov)
+    scores |= _scores_of_normals(derived, predicted.normal, truth, reference)
     return ImageScores(scores, objects)
 
 
-def _repaired(
-    depth: Array, normal: Array | None, truth: TrueView, non_finite: NonFinite
-) -> tuple[Array, Array | None, Array]:
-    """Return depth and normals without values that break rules, and where such a depth was."""
+def _breaks_rules(predicted: PredictedView, truth: TrueView) -> bool:
+    against = Against(surface=truth.mask)
+    columns = ((predicted.kind, predicted.geometry), ("normal", predicted.normal))
+    return any(
+        True
+        for name, values in columns
+        if values is not None
+        for _ in broken_rules(name, values, against)
+    )
+
+
+def _worst(
+    predicted: PredictedView, truth: TrueView, reference: Reference, other_relief: Array | None
+) -> ImageScores:
+    """Return the worst value of each score that the truth would have in this submission."""
+    perfect: Array = np.where(truth.mask, truth.depth, 1.0)
+    if predicted.kind == "points":
+        perfect = back_project(perfect, truth.fov_y_degrees)
+    elif predicted.kind == "disparity":
+        perfect = 1.0 / perfect
+    normal = None if predicted.normal is None else truth.normal
+    instead = replace(predicted, geometry=perfect, normal=normal)
+    best = score_prediction(instead, truth, reference, other_relief)
+    scores = {
+        name: value if np.isnan(value) else metric(name).worst
+        for name, value in best.scores.items()
+    }
+    objects = {
+        name: np.full(column.shape, metric(name).worst) if name in OBJECT_SCORES else column
+        for name, column in best.objects.items()
+    }
+    return ImageScores(scores, objects)
+
+
+def _scores_of_relief(
+    geometry: Geometry, truth: TrueView, reference: Reference, other_relief: Array | None
+) -> dict[str, float]:
+    """Return the scores of relief, which is how far points stand before the empty room.
+
+    That is along the line from the camera to the point, which is the ray of its pixel for depth.
+    """
     mask = truth.mask
-    broken = np.zeros_like(mask)
-    if non_finite == "error":
-        refuse_pixels(PredictionError, "predicted depth", "depth", depth, mask)
-        if normal is not None:
-            refuse_pixels(PredictionError, "predicted normals", "normal", normal, mask)
-        return depth, normal, broken
-    broken = _broken("depth", depth, mask)
-    if normal is not None:
-        normal = np.where(_broken("normal", normal, mask)[..., None], -truth.normal, normal)
-    return np.where(broken, 0.0, depth), normal, broken
+    room = reference.empty[mask]
+    if not geometry.on_rays:
+        ahead = geometry.points[:, 2] < 0.0
+        lines = geometry.points[ahead] / -geometry.points[ahead, 2:]
+        room[ahead] = depth_along(lines, truth.world_from_camera)
+    said = room - geometry.depth[mask]
+    relief = relief_scores(said, (reference.empty - truth.depth)[mask])
+    if other_relief is None:
+        return relief
+    other = other_relief[mask]
+    both = np.isfinite(other)
+    with_other = relief_scores(said[both], other[both]) if both.any() else relief
+    # Nothing of the prediction is in a picture where nothing stands out.
+    others = {name: 0.0 if np.isnan(value) else value for name, value in with_other.items()}
+    return relief | {
+        OTHER_SCENE + name: np.nan if np.isnan(relief[name]) else others[name] for name in relief
+    }
 
 
 def _scores_of_normals(
-    depth: Array, normal: Array | None, truth: TrueView, reference: Reference, counted: Array
+    derived: Array, normal: Array | None, truth: TrueView, reference: Reference
 ) -> dict[str, float]:
-    """Return the scores of predicted normals, and of those of aligned depth."""
+    """Return the scores of predicted normals, and of those derived from the aligned points."""
     mask, inside, scores = truth.mask, reference.inside > 0, dict[str, float]()
+    counted = reference.counted
     if normal is not None:
         angles = angular_errors_degrees(normal, truth.normal, mask)
         scores |= normal_scores(angles)
         scores["object_normal_mean_degrees"] = _mean(angles[counted[mask]])
         scores["shape_normal_degrees"] = _mean(angles[inside[mask]])
-    # Both derived alike, so that a perfect depth is perfect at creases, too, where planes blend.
-    derived, _ = normals_from_depth(depth, truth.fov_y_degrees, mask)
     angles = np.full(mask.shape, np.nan)
     angles[mask] = angular_errors_degrees(derived, reference.normals, mask)
     smooth = reference.smooth
@@ -280,60 +354,28 @@ def _scores_of_normals(
 
 
 def _scores_of_points(
-    depth: Array,
-    points: Array | None,
+    geometry: Geometry,
     truth: TrueView,
     reference: Reference,
-    counted: Array,
-    alignment: Alignment,
-    alignments: Sequence[Alignment],
+    nearest: NearestDistances,
+    alignments: tuple[Alignment, ...],
 ) -> dict[str, float]:
-    """Return the scores of points, over the image and inside objects.
-
-    `depth` was aligned already. Points that are predicted have an alignment of their own, in space.
-    """
-    mask = truth.mask
-    true = back_project(truth.depth, truth.fov_y_degrees)[mask]
-    at_depth = back_project(depth, truth.fov_y_degrees)[mask]
-    cloud = at_depth
-    if points is not None:
-        cloud = align_points(np.where(np.isfinite(points), points, 0.0)[mask], true, alignment)
-    scores = point_map_scores(cloud, true)
+    """Return the scores of points of the same pixels: over the image, inside objects, behind."""
+    mask, points, true = truth.mask, geometry.points, reference.surface.points
+    scores = point_map_scores(points, true)
     for after in ("scale", "scale_shift"):
         if after in alignments:
-            scores |= point_map_scores(cloud, true, after)
-    scores |= local_point_scores(cloud, true, np.where(counted, truth.object_id, 0)[mask])
+            scores |= point_map_scores(points, true, after)
+    ids = np.where(reference.counted, truth.object_id, 0)[mask]
+    scores |= local_point_scores(points, true, ids)
+    height, width = mask.shape
+    rays = pixel_directions(height, width, truth.fov_y_degrees)[mask]
+    apart = departures(points, truth.depth[mask], rays, geometry.on_rays)
     inside = reference.inside[mask]
     at = inside > 0
-    return scores | shape_scores(at_depth[at], true[at], inside[at])
-
-
-def noise_floors(truth: TrueView) -> dict[str, float]:
-    """Return what two samples of the true surface score against each other, by name of the score.
-
-    One sample is at the pixels' centres, the other, in the place of a prediction, at the corners
-    between them. A method whose surfels lie on the true surface, but not on the truth's rays,
-    scores about this. A corner counts where its four pixels show one object; its depth is that of
-    the plane through them, for which 1 / depth is linear across the image. No score where no corner
-    counts. Scores that compare depth along the truth's rays have no such floor: it is 0.
-    """
-    ids, mask = truth.object_id, truth.mask
-    height, width = ids.shape
-    quads = [(slice(i, height - 1 + i), slice(j, width - 1 + j)) for i, j in np.ndindex(2, 2)]
-    whole = np.logical_and.reduce([mask[q] & (ids[q] == ids[quads[0]]) for q in quads])
-    if not whole.any():
-        return {}
-    depth = np.where(mask, truth.depth, 1.0).astype(np.float64)
-    corner_depth = 4.0 / np.sum([1.0 / depth[q] for q in quads], axis=0)
-    rays = pixel_directions(height, width, truth.fov_y_degrees)
-    between = np.sum([rays[q] for q in quads], axis=0) / 4.0
-    corners = (corner_depth[..., None] * between)[whole]
-    centres = back_project(truth.depth, truth.fov_y_degrees)[mask]
-    nearest = nearest_distances(corners, centres)
-    objects = object_means(_single_objects(truth.depth, truth, nearest))
-    scores = {"chamfer": chamfer(nearest), "hausdorff": hausdorff(nearest), **objects}
-    names = ("chamfer", "hausdorff", "object_completeness")
-    return {name: scores[name] for name in names if np.isfinite(scores[name])}
+    scores |= shape_scores(apart[at], points[at], true[at], inside[at])
+    at = reference.hidden[mask]
+    return scores | behind_scores(np.sqrt(np.square(apart[at]).sum(axis=-1)), nearest.reverse[at])
 
 
 def _single_objects(depth: Array, truth: TrueView, nearest: NearestDistances) -> dict[str, Array]:
@@ -344,9 +386,3 @@ def _single_objects(depth: Array, truth: TrueView, nearest: NearestDistances) ->
 
 def _mean(angles: Array) -> float:
     return float(angles.mean()) if len(angles) else np.nan
-
-
-def _broken(name: str, values: Array, surface: Array) -> Array:
-    """Return at which pixels (H, W) any rule of a column is broken."""
-    wrong = [at for _, at in broken_rules(name, values, Against(surface=surface))]
-    return np.asarray(np.logical_or.reduce([np.zeros_like(surface), *wrong]))

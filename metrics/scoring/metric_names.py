@@ -26,24 +26,48 @@ OBJECT_SCORES = (
 )  # of single objects, too
 EMPTY_ROOM = "empty_room_"  # begins the names of the empty room's own scores
 CUT_OUT = "cut_out_"  # begins the names of the scores of flat cut-outs
-OF_TRUTH = (EMPTY_ROOM, CUT_OUT)  # begin names of scores that no submission has a part in
+# Begin the names of the scores of guesses at what the first view does not show.
+BALLS, BLOCKS = "balls_", "blocks_"
+OF_TRUTH = (
+    EMPTY_ROOM,
+    CUT_OUT,
+    BALLS,
+    BLOCKS,
+)  # begin names of scores that no submission has a part in
 OTHER_SCENE = "other_scene_"  # begins the names of scores against another scene's relief
 OF_EMPTY_ROOM = (
     "chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness",
     "behind_depth_error",
 )  # fmt: skip
 OF_CUT_OUT = {
+    "behind_depth_error": "of flat cut-outs, each at its object's median depth",
     "shape_error": "of flat cut-outs, each at its object's median depth",
     "shape_normal_degrees": "of each object's mean true normal",
     "derived_shape_normal_degrees": "of each object's mean true normal, derived from depth",
 }
 RELIEF = ("relief_correlation", "relief_iou")
-# Scores that have a skill: what begins the name of the floor's column, by name.
-SKILLED = (
-    dict.fromkeys(RELIEF, OTHER_SCENE)
-    | dict.fromkeys(OF_EMPTY_ROOM, EMPTY_ROOM)
-    | dict.fromkeys(OF_CUT_OUT, CUT_OUT)
+BEHIND = "behind_depth_error"
+# Scores that have a skill: what begins the names of the columns that may be the floor, by name.
+# The lowest one is.
+SKILLED: dict[str, tuple[str, ...]] = (
+    dict.fromkeys(RELIEF, (OTHER_SCENE,))
+    | dict.fromkeys(OF_EMPTY_ROOM, (EMPTY_ROOM,))
+    | dict.fromkeys(OF_CUT_OUT, (CUT_OUT,))
+    | {BEHIND: (EMPTY_ROOM, CUT_OUT, BALLS, BLOCKS)}
 )
+# The floors of BEHIND that were shown no more than the method.
+SHOWN_AS_MUCH = {
+    "scored_view": OF_TRUTH,
+    "first_view": (EMPTY_ROOM, BALLS, BLOCKS),
+    "no_view": (EMPTY_ROOM,),
+}
+WHOSE = {
+    EMPTY_ROOM: "empty room",
+    CUT_OUT: "flat cut-out",
+    BALLS: "balls",
+    BLOCKS: "blocks",
+    OTHER_SCENE: "against another scene",
+}
 F_SCORE = "f_score_<threshold>"
 DERIVED = "derived_"
 _NEAREST = "the predicted depth of an image nearest to the true depth in least squares."
@@ -101,6 +125,7 @@ class Metric:
         unit: "fraction" runs from 0 to 1.
         definition: one sentence that defines the score of one image or question.
         largest, smallest: the limits of its values.
+        of: what it is computed from.
         lacking: pictures that have no such score: "objects", those without any object that counts;
             "relief", those whose true relief nowhere exceeds `relief.RELIEF_ABOVE`; "inside", those
             without pixels inside objects (`shape.inside_objects`), and "bends", also those whose
@@ -117,11 +142,34 @@ class Metric:
     largest: float = math.inf
     smallest: float = 0.0
     lacking: Literal["", "objects", "relief", "inside", "bends", "behind", "boundary"] = ""
+    of: Literal["points", "depth", "normals", "field of view", "answers"] = "depth"
 
     @property
     def direction(self) -> str:
         """The direction that is better, in words."""
         return "higher is better" if self.higher_is_better else "lower is better"
+
+    @property
+    def worst(self) -> float:
+        """The value of an image in which a prediction is not finite, if these are penalised.
+
+        Of errors without a limit it is one that no surface in the room gets from another.
+        """
+        if self.higher_is_better:
+            return self.smallest
+        return self.largest if math.isfinite(self.largest) else _WORST[self.unit]
+
+
+# 4 scene units, and depth at the camera, of errors without a limit.
+_WORST = {
+    "scene unit": 4.0,
+    "scene unit squared": 16.0,
+    "ratio": 4.0,
+    "100 ln": 1000.0,
+    "ln": 10.0,
+    "log10": 4.0,
+    "1 / scene unit": 1000.0,
+}
 
 
 def _distance(name: str, title: str, definition: str, unit: str = "scene unit") -> Metric:
@@ -136,27 +184,36 @@ def _angle(name: str, title: str, definition: str) -> Metric:
     return Metric(name, title, "rooms", "degree", False, definition, 180.0)
 
 
-_POINTS = (
+_POINTS = tuple(replace(m, of="points") for m in (
     _distance("chamfer", "Chamfer", "`accuracy_distance` + `completeness_distance`; not squared."),
     _distance("accuracy_distance", "Accuracy distance",
-              "mean distance from the predicted points to the nearest true point."),
+              "mean distance from the predicted points to the true surface."),
     _distance("completeness_distance", "Completeness distance",
-              "mean distance from the true points to the nearest predicted point."),
+              "mean distance from the true surface to the predicted points."),
     _distance("chamfer_squared", "Chamfer, squared",
-              "mean squared distance from the predicted points to the nearest true point, plus that"
-              " from the true points to the nearest predicted point.", "scene unit squared"),
+              "mean squared distance from the predicted points to the true surface, plus that from"
+              " the true surface to the predicted points.", "scene unit squared"),
     _distance("hausdorff", "Hausdorff", "larger of `hausdorff_forward` and `hausdorff_reverse`."),
     _distance("hausdorff_forward", "Hausdorff, forward",
-              "largest distance from a predicted point to the nearest true point."),
+              "largest distance from a predicted point to the true surface."),
     _distance("hausdorff_reverse", "Hausdorff, reverse",
-              "largest distance from a true point to the nearest predicted point."),
+              "largest distance from the true surface to the predicted points."),
     _distance("hausdorff_95", "Hausdorff, 95%",
-              "larger of the 95th percentiles of the nearest distances from predicted to true and"
-              " from true to predicted points."),
+              "larger of the 95th percentiles of the distances from predicted points to the true"
+              " surface and from there to predicted points."),
     _share(F_SCORE, "F-score",
-           "harmonic mean of the fractions of predicted points nearer than the threshold (scene"
-           " units) to a true point, and of true points nearer to a predicted one."),
-)  # fmt: skip
+           "harmonic mean of the fraction of predicted points nearer than the threshold (scene"
+           " units) to the true surface, and of the fraction of that nearer to them."),
+    _distance("paper_chamfer", "Chamfer, as in the paper",
+              "mean distance from the predicted points to the nearest true point, plus that from"
+              " the true points to the nearest predicted point."),
+    _distance("paper_hausdorff", "Hausdorff, as in the paper",
+              "larger of `paper_hausdorff_forward` and `paper_hausdorff_reverse`."),
+    _distance("paper_hausdorff_forward", "Hausdorff, forward, as in the paper",
+              "largest distance from a predicted point to the nearest true point."),
+    _distance("paper_hausdorff_reverse", "Hausdorff, reverse, as in the paper",
+              "largest distance from a true point to the nearest predicted point."),
+))  # fmt: skip
 _DEPTH = (
     _distance("mse_depth", "MSE-depth",
               "mean squared difference of predicted and true planar depth.", "scene unit squared"),
@@ -180,32 +237,35 @@ _MORE_DEPTH = (
               "mean absolute difference of the decimal logarithms of depth.", "log10"),
     _distance("irmse", "iRMSE",
               "root mean square of 1 / predicted - 1 / true depth.", "1 / scene unit"),
-    replace(_share("boundary_f1", "Boundary F1",
-                   "harmonic mean of precision and recall of pairs of neighbours whose depths"
-                   " differ by a ratio above a threshold; weighted mean over ten thresholds from"
-                   " 1.05 to 1.25."), lacking="boundary"),
-    replace(_share("boundary_recall", "Boundary recall", "the same mean of the recall alone."),
-            lacking="boundary"),
+    _share("boundary_f1", "Boundary F1",
+           "harmonic mean of precision and recall of pairs of neighbours whose depths differ by a"
+           " ratio above a threshold, each the mean over four directions, 0 where there is none;"
+           " weighted mean over ten thresholds from 1.05 to 1.25."),
+    replace(_share("boundary_recall", "Boundary recall",
+                   "fraction of these pairs of the truth, in all directions together, that the"
+                   " prediction has as well; the same mean, over thresholds where the truth has"
+                   " any."), lacking="boundary"),
 )  # fmt: skip
-_POINT_MAPS = (
+_POINT_MAPS = tuple(replace(m, of="points") for m in (
     _distance("points_rel", "Points, relative error",
               "mean distance of each predicted point from the true one of its pixel, divided by the"
               " true distance from the camera.", "ratio"),
     _share("points_delta_1", "Points, delta 1",
            "fraction of the pixels where that distance is below a quarter of the smaller distance"
            " from the camera."),
-)  # fmt: skip
-_LOCAL_POINTS = (
+))  # fmt: skip
+_LOCAL_POINTS = tuple(replace(m, of=m.of if m.unit == "degree" else "points") for m in (
     replace(_distance("local_points_rel", "Local points, relative error",
                       "mean over objects of the mean distance of points, after scale and shift of"
                       " each object alone, divided by its diameter.", "ratio"), lacking="objects"),
     replace(_share("local_points_delta_1", "Local points, delta 1",
                    "mean over objects of the fraction of pixels where that ratio is below 0.25."),
             lacking="objects"),
-    _angle("fov_error_degrees", "Field of view, error",
-           "absolute difference of predicted and true vertical field of view."),
-)  # fmt: skip
-_NORMALS = (
+    replace(_angle("fov_error_degrees", "Field of view, error",
+                   "absolute difference of predicted and true vertical field of view."),
+            of="field of view"),
+))  # fmt: skip
+_NORMALS = tuple(replace(m, of="normals") for m in (
     _angle("normal_mean_degrees", "Normals, mean",
            "mean angle between predicted and true normals."),
     _angle("normal_median_degrees", "Normals, median", "median of these angles in the image."),
@@ -213,32 +273,37 @@ _NORMALS = (
     *(_share(f"normal_within_{limit}", f"Normals within {limit}°",
              f"fraction of these angles below {limit} degrees.")
       for limit in ("5", "7.5", "11.25", "22.5", "30")),
-)  # fmt: skip
+))  # fmt: skip
 _OBJECTS = tuple(
     replace(metric, lacking="objects")
     for metric in (
         _distance("object_depth_error", "Objects' depth error",
                   "mean absolute difference of predicted and true planar depth, over the pixels of"
                   " objects."),
-        _distance("object_completeness", "Objects' completeness",
-                  "mean distance from the true points of objects to the nearest of all predicted"
-                  " points."),
-        *(_share(f"object_recall_{limit}", f"Objects found within {limit}",
-                 "fraction of the objects whose own `object_completeness` is below"
-                 f" {limit} scene units.")
+        replace(_distance("object_completeness", "Objects' completeness",
+                          "mean distance from the true surface of objects to all predicted points."
+                          ), of="points"),
+        *(replace(_share(f"object_recall_{limit}", f"Objects found within {limit}",
+                         "fraction of the objects whose own `object_completeness` is below"
+                         f" {limit} scene units."), of="points")
           for limit in RECALL_WITHIN),
-        _angle("object_normal_mean_degrees", "Objects' normals, mean",
-               "mean angle between predicted and true normals, over the pixels of objects."),
-        _angle("derived_object_normal_mean_degrees", "Objects' normals, mean, from depth",
-               "the same of normals derived from the predicted and from the true depth."),
+        replace(_angle("object_normal_mean_degrees", "Objects' normals, mean",
+                       "mean angle between predicted and true normals, over the pixels of objects."
+                       ), of="normals"),
+        replace(_angle("derived_object_normal_mean_degrees", "Objects' normals, mean, from points",
+                       "the same of normals derived from the predicted and from the true points."),
+                of="points"),
     )
 )  # fmt: skip
 _SHAPE = tuple(
-    replace(metric, lacking=metric.lacking or "inside")
+    replace(
+        metric,
+        lacking=metric.lacking or "inside",
+        of="normals" if metric.name == "shape_normal_degrees" else "points",
+    )
     for metric in (
         _distance("shape_error", "Shape error",
-                  "mean absolute error of depth inside objects, after each object's median error is"
-                  " taken off."),
+                  "mean error inside objects, after each object's median error is taken off."),
         Metric("shape_correlation", "Shape correlation", "rooms", "correlation", True,
                "correlation inside objects of what predicted and true depth have left after the"
                " least-squares plane of each object.", 1.0, -1.0, "bends"),
@@ -246,36 +311,39 @@ _SHAPE = tuple(
                "fraction of the objects whose own `shape_error` is below 0.02 scene units."),
         _angle("shape_normal_degrees", "Normals inside objects",
                "mean angle between predicted and true normals inside objects."),
-        _angle("derived_shape_normal_degrees", "Normals inside objects, from depth",
-               "the same of normals derived from the predicted and from the true depth."),
+        _angle("derived_shape_normal_degrees", "Normals inside objects, from points",
+               "the same of normals derived from the predicted and from the true points."),
     )
 )  # fmt: skip
 _BEHIND = tuple(
-    replace(metric, lacking="behind")
+    replace(metric, lacking="behind", of="points")
     for metric in (
         _distance("behind_depth_error", "Depth error behind",
-                  "mean absolute difference of depth at the pixels of objects that the first view"
-                  " of the scene does not see."),
+                  "mean error at the pixels of objects that the first view of the scene does not"
+                  " see."),
         _share("behind_recall_0.05", "Found behind within 0.05",
-               "fraction of the true points there that are nearer than 0.05 scene units to a"
-               " predicted point."),
+               "fraction of the true surface there that is nearer than 0.05 scene units to the"
+               " predicted points."),
     )
 )  # fmt: skip
 _RELIEF = (
     Metric("relief_correlation", "Relief correlation", "rooms", "correlation", True,
            "correlation, over the scored pixels, of predicted with true relief: planar depth of the"
-           " empty room minus that of the surface.", 1.0, -1.0, "relief"),
+           " empty room minus that of the surface.", 1.0, -1.0, "relief", "points"),
     replace(
         _share("relief_iou", "Segmentation (relief IoU)",
                "pixels where predicted and true relief both exceed 0.05 scene units, divided by"
                " those where either does."),
-        lacking="relief"),
+        lacking="relief", of="points"),
 )  # fmt: skip
-_ACCURACY = _share(
-    "iqtt_accuracy",
-    "IQTT accuracy",
-    "1 where the right answer is given, else 0, abstentions included; chance is 1 / answers.",
-    "iqtt",
+_ACCURACY = replace(
+    _share(
+        "iqtt_accuracy",
+        "IQTT accuracy",
+        "1 where the right answer is given, else 0, abstentions included; chance is 1 / answers.",
+        "iqtt",
+    ),
+    of="answers",
 )
 
 
@@ -293,9 +361,10 @@ def _derived(metric: Metric) -> Metric:
     return replace(
         metric,
         name=DERIVED + metric.name,
-        title=f"{metric.title}, from depth",
-        definition=f"`{metric.name}` of normals derived from the predicted depth, against those"
-        " derived in the same way from the true depth.",
+        title=f"{metric.title}, from points",
+        definition=f"`{metric.name}` of normals derived from the predicted points, against those"
+        " derived in the same way from the true points.",
+        of="points",
     )
 
 
@@ -335,6 +404,15 @@ ALL |= {
         definition=f"`{name}` {whose}.",
     )
     for name, whose in OF_CUT_OUT.items()
+}
+ALL |= {
+    guess + BEHIND: replace(
+        ALL[BEHIND],
+        name=guess + BEHIND,
+        title=f"{ALL[BEHIND].title}, {WHOSE[guess]}",
+        definition=f"`{BEHIND}` of {WHOSE[guess]} in place of the first view's objects.",
+    )
+    for guess in (BALLS, BLOCKS)
 }
 ALL |= {
     OTHER_SCENE + name: replace(
@@ -387,34 +465,39 @@ def _threshold(name: str) -> float | None:
 
 def markdown_table() -> str:
     """Return all scores as the Markdown table of docs/scores.md."""
+    same = ("the same",) * 4
     forms = [
-        (f"<depth score>{ending}", "the same", "the same", definition)
+        (f"<depth score>{ending}", *same, definition)
         for ending, (_, definition) in _ALIGNED.items()
     ]
     points = [
-        (f"<point score>{ending}", "the same", "the same", definition)
+        (f"<point score>{ending}", *same, definition)
         for ending, (_, definition) in POINT_ALIGNMENTS.items()
     ]
     of_these = ", ".join(f"`{name}`" for name in OF_EMPTY_ROOM)
     floor = f"the same of the empty room, for {of_these}; in `items` alone."
     flat = "; ".join(f"`{name}` {whose}" for name, whose in OF_CUT_OUT.items())
     other = "the same of the prediction with the relief of another scene, seen in the same view."
-    derived = "the same of normals derived from the predicted and from the true depth."
+    guesses = f"`{BEHIND}` of {BALLS[:-1]} and {BLOCKS[:-1]}; in `items` alone."
+    derived = "the same of normals derived from the predicted and from the true points."
     rows = [
         *map(_cells, (*_SHAPE, *_BEHIND, *_RELIEF, *_OBJECTS, *_POINTS, *_DEPTH)),
         *forms,
         *map(_cells, (*_MORE_DEPTH, *_POINT_MAPS)),
         *points,
         *map(_cells, (*_LOCAL_POINTS, *_NORMALS)),
-        (f"{DERIVED}<normal score>", "the same", "the same", derived),
-        (f"{OTHER_SCENE}<relief score>", "the same", "-", other),
-        (f"{EMPTY_ROOM}<score>", "the same", "the same", floor),
-        (f"{CUT_OUT}<score>", "the same", "the same", f"{flat}; in `items` alone."),
+        (f"{DERIVED}<normal score>", "points", *same[1:], derived),
+        (f"{OTHER_SCENE}<relief score>", *same[:2], "-", "the same", other),
+        (f"{EMPTY_ROOM}<score>", *same, floor),
+        (f"{CUT_OUT}<score>", *same, f"{flat}; in `items` alone."),
+        (f"{BALLS}{BEHIND}`, `{BLOCKS}{BEHIND}", *same, guesses),
         _cells(_ACCURACY),
     ]
     lines = [f"| `{name}` | {' | '.join(cells)} |" for name, *cells in rows]
-    return "\n".join(["| name | unit | better | definition |", "| --- | --- | --- | --- |", *lines])
+    head = ["| name | of | unit | better | worst | definition |", "| --- " * 6 + "|"]
+    return "\n".join([*head, *lines])
 
 
-def _cells(m: Metric) -> tuple[str, str, str, str]:
-    return m.name, m.unit, "higher" if m.higher_is_better else "lower", m.definition
+def _cells(m: Metric) -> tuple[str, str, str, str, str, str]:
+    better = "higher" if m.higher_is_better else "lower"
+    return m.name, m.of, m.unit, better, f"{m.worst:g}", m.definition

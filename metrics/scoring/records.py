@@ -26,13 +26,14 @@ from metrics.scoring.estimates import (
     Skill,
     accuracy,
     estimates,
+    floor_column,
     grouped_estimates,
     object_sizes,
     question_skill,
     skills,
 )
 from metrics.scoring.known_tests import Task, known_test
-from metrics.scoring.metric_names import OBJECT_SCORES, OF_TRUTH, metric
+from metrics.scoring.metric_names import BEHIND, HEADLINE, OBJECT_SCORES, OF_TRUTH, metric
 from metrics.submissions.layout import Shown
 from metrics.submissions.strict_json import LARGEST_WHOLE
 
@@ -215,10 +216,21 @@ class ScoreFile:
         return self.columns["scene_index" if self.task == "rooms" else "question"]
 
     @property
-    def sees_first_view_alone(self) -> bool:
-        """Whether the method predicts other views than the one it was shown."""
+    def shown_of_several(self) -> Shown | None:
+        """What the method was shown, where there are other views than the first; else None."""
         later = self.task == "rooms" and bool((self.columns["view_index"] > 0).any())
-        return later and self.shown == "first_view"
+        return self.shown if later else None
+
+    @property
+    def headline(self) -> tuple[str, ...]:
+        """The main scores that there are. Who sees a view is not asked what is behind."""
+        names = [name for name in HEADLINE[self.task] if name in self.metrics]
+        return tuple(name for name in names if name != BEHIND or self.shown != "scored_view")
+
+    def floor_of(self, name: str) -> str | None:
+        """Return what begins the name of the column of items that is a score's floor; or None."""
+        column = floor_column(self.items, name, self.shown)
+        return None if column is None else column[: -len(name)]
 
     @property
     def place(self) -> str:
@@ -269,7 +281,7 @@ class ScoreFile:
     def skills(self) -> Mapping[str, Skill]:
         """The skills of some of the scores, by name."""
         if self.task == "rooms":
-            return skills(self.items, self.clusters, self._bootstrap)
+            return skills(self.items, self.clusters, self._bootstrap, self.shown)
         kinds = {
             kind: group.n for kind, group in self.answer_groups.get("by_distractor", {}).items()
         }

@@ -7,7 +7,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.scoring.geometry import scored_alignment
-from metrics.scoring.image_scores import noise_floors
 from metrics.scoring.metric_names import OBJECT_SCORES
 from metrics.scoring.records import OBJECT_COLUMNS, SHAPE_COLUMN, ScoreFile
 from metrics.scoring.rows import score_rows
@@ -21,12 +20,10 @@ from metrics.scoring.runs import (
 )
 from metrics.scoring.truth_digests import rooms_digest
 from metrics.submissions.reader import RoomPredictions
-from metrics.submissions.truths import read_true_view
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
-FLOOR_ROWS = 16  # rows on which noise floors are measured
 IDS_SHOWN = 8
 
 
@@ -64,7 +61,6 @@ def score_rooms(
     view = truth.read("view_index", slice(None))
     angle = view_angles(scene, view, truth.read("camera/world_from_camera", slice(None)))[rows]
     shape = object_shapes(truth, scored.objects["row"], scored.objects["object"])
-    floors = _mean_noise_floors(truth, rows)
     counts = {
         "rows_in_truth": len(truth),
         "rows_penalised": len(bad),
@@ -79,7 +75,7 @@ def score_rooms(
         **scored.floors,
     }
     objects = {name: scored.objects[name] for name in (*OBJECT_COLUMNS, *OBJECT_SCORES)}
-    meta = meta_of(files, truth, truth_given, truth.fingerprint, digest, settings, counts, floors)
+    meta = meta_of(files, truth, truth_given, truth.fingerprint, digest, settings, counts)
     alignment = scored_alignment(files[0].kind, files[0].alignment)
     objects[SHAPE_COLUMN] = shape
     shown = files[0].shown
@@ -114,13 +110,3 @@ def object_shapes(truth: RoomsFile, row: Array, object_id: Array) -> Array:
             raise FileFormatError(where, f"no shape of object {k}, which is seen", "its shape")
         shapes.append(names[index])
     return np.array(shapes, object)
-
-
-def _mean_noise_floors(truth: RoomsFile, rows: Array) -> dict[str, float]:
-    """Return the mean of each noise floor over some of these rows, spread evenly."""
-    spread = rows[np.unique(np.linspace(0, len(rows) - 1, FLOOR_ROWS).astype(int))]
-    views = [noise_floors(read_true_view(truth, row)) for row in spread.tolist()]
-    names = dict.fromkeys(name for floors in views for name in floors)
-    return {
-        name: float(np.mean([floors[name] for floors in views if name in floors])) for name in names
-    }

@@ -157,7 +157,8 @@ class RowScorer:
             if other != row:
                 relief = true_relief(*(self._truth.read(name, other) for name in seen))
             if first not in (row, -1):
-                first_view = FirstView(*(self._truth.read(name, first) for name in seen[:2]))
+                seen = ("depth", "object_id", "camera/world_from_camera")
+                first_view = FirstView(*(self._truth.read(name, first) for name in seen))
             reference = reference_of(view, first_view)
             scores = []
             for file, entries in zip(self._files, self._entries, strict=True):

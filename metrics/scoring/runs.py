@@ -106,7 +106,6 @@ def meta_of(
     digest: str,
     settings: Settings,
     counts: Mapping[str, int],
-    noise_floors: Mapping[str, float] | None = None,
 ) -> Meta:
     """Return what a score file records beside its items."""
     resampled = files[0].task == "rooms" or len(files) > 1
@@ -121,5 +120,4 @@ def meta_of(
         seed=settings.seed,
         resamples=settings.resamples if resampled else 0,
         counts=counts,
-        noise_floors=noise_floors or {},
     )

@@ -114,7 +114,8 @@ class PredictionPage(ScenePage):
         return clouds
 
     def _depth(self, room: Room) -> Array:
-        return depth_as_scored(self._predictions.view(self._entries[room.index]), room.depth)
+        predicted = self._predictions.view(self._entries[room.index])
+        return depth_as_scored(predicted, room.depth, room.fov_y_degrees)
 
     def _normal(self, room: Room) -> Array | None:
         if not self._predictions.has_normals:

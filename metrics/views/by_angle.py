@@ -6,18 +6,20 @@ from dataclasses import replace
 import numpy as np
 
 from metrics.measures.statistics import cluster_means
-from metrics.scoring.metric_names import HEADLINE, SKILLED, metric
+from metrics.scoring.metric_names import HEADLINE, WHOSE, metric
 from metrics.scoring.records import Score, ScoreFile
 from metrics.views.paper import PAPER, TABLES
 from metrics.views.plots import COLOURS, LINE, Chart, Point, Series, curves, kind_of
-from metrics.views.score_tables import FLOORS_OF_ROOMS
 from metrics.views.table import Cell, make_table
 
 
 def angle_floors(file: ScoreFile, name: str) -> dict[str, float]:
     """Return the mean of a score's floor by view angle, in whole degrees, from the items."""
-    angles, column = map(file.items.get, ("view_angle_degrees", SKILLED.get(name, "") + name))
-    if angles is None or column is None or name not in SKILLED:
+    angles, column = (
+        file.items.get("view_angle_degrees"),
+        file.items.get(f"{file.floor_of(name)}{name}"),
+    )
+    if angles is None or column is None:
         return {}
     floors = {}
     for degrees in file.by_view_angle:
@@ -43,7 +45,7 @@ def view_curves(files: Sequence[ScoreFile], labels: Sequence[str]) -> Iterator[C
         floors = angle_floors(files[0], name)
         points = [Point(float(key), floors[key]) for key in sorted(floors, key=int)]
         if points:
-            series.append(Series(f"floor: {FLOORS_OF_ROOMS[SKILLED[name]]}", points, LINE))
+            series.append(Series(f"floor: {WHOSE[str(files[0].floor_of(name))]}", points, LINE))
         if len({point.at for line in series for point in line.points}) >= 2:
             chart = curves(series, metric(name).title, metric(name).unit)
             assert chart is not None

@@ -134,12 +134,13 @@ def room_pictures(
 ) -> list[Picture]:
     """Return the pictures of a row; `place` is that of its prediction."""
     true_depth = rooms.read("depth", row)
+    fov_y_degrees = float(rooms.read("camera/fov_y_degrees", row))
     return view_pictures(
         decode_image(rooms.read("image", row)),
         true_depth,
-        depth_as_scored(predictions.view(place), true_depth),
+        depth_as_scored(predictions.view(place), true_depth, fov_y_degrees),
         rooms.read("normal", row),
-        float(rooms.read("camera/fov_y_degrees", row)),
+        fov_y_degrees,
         predictions.normal(place) if predictions.has_normals else None,
     )
 

@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.floors import floor_of_kind
-from metrics.scoring.estimates import ACCURACY
 from metrics.scoring.geometry import depth_as_scored
-from metrics.scoring.metric_names import HEADLINE, SKILLED, metric
+from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import Score, ScoreFile
 from metrics.submissions.reader import RoomPredictions, open_predictions
 from metrics.views.by_angle import angle_floors
@@ -152,7 +151,8 @@ def draw_grid(
                     )
                 true = rooms.read("depth", row).astype(np.float64)
                 picture = srgb_bytes(np.nan_to_num(decode_image(rooms.read("image", row))))
-                depths = [_predicted(file, row, true) for file in opened]
+                fov = float(rooms.read("camera/fov_y_degrees", row))
+                depths = [_predicted(file, row, true, fov) for file in opened]
                 lines.append((picture, true, depths))
     finally:
         for file in opened:
@@ -169,13 +169,13 @@ def labels_of(files: Sequence[ScoreFile]) -> list[str]:
     ]
 
 
-def _predicted(file: Any, row: int, true: Array) -> Array:
+def _predicted(file: Any, row: int, true: Array, fov_y_degrees: float) -> Array:
     if not isinstance(file, RoomPredictions):
         raise FigureError(file.path, "answers to questions", "predictions of rooms")
     places = np.flatnonzero(file.rows == row)
     if not len(places):
         raise FigureError(f"{file.path}: row {row}", "no prediction", "one of this row")
-    return np.asarray(depth_as_scored(file.view(int(places[0])), true), np.float64)
+    return depth_as_scored(file.view(int(places[0])), true, fov_y_degrees)
 
 
 def _grid(
@@ -237,10 +237,7 @@ def _common(files: Sequence[ScoreFile], name: str) -> str:
 
 
 def _floor(file: ScoreFile, name: str) -> float | None:
-    if name == ACCURACY:
-        return file.skills[name].floor if name in file.skills else None
-    floor = file.metrics.get(SKILLED.get(name, "-") + name)
-    return None if floor is None else floor.value
+    return file.skills[name].floor if name in file.skills else None
 
 
 def _group_floor(file: ScoreFile, by: str, key: str, name: str) -> float | None:

@@ -5,7 +5,7 @@ Beside a score stand its floor, what the paper reports, and the scores of other 
 
 from collections.abc import Iterator, Sequence
 
-from metrics.scoring.metric_names import HEADLINE, in_order, metric
+from metrics.scoring.metric_names import in_order, metric
 from metrics.scoring.records import GROUPINGS, Score, ScoreFile, Skill
 from metrics.views.by_angle import score_point
 from metrics.views.page import Lead, Section
@@ -52,7 +52,7 @@ def answer(scores: ScoreFile) -> Lead:
 
 def _main_scores(scores: ScoreFile) -> list[str]:
     """Return the names of the headline's scores that a file has; else of others."""
-    return [n for n in HEADLINE[scores.task] if n in scores.metrics] or in_order(scores.metrics)[:5]
+    return list(scores.headline) or in_order(scores.metrics)[:5]
 
 
 def _verdict(skill: Skill) -> str:

@@ -14,11 +14,8 @@ from metrics.measures.statistics import FEW_CLUSTERS
 from metrics.scoring.estimates import CONFIDENCE, question_skill
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
-    CUT_OUT,
-    EMPTY_ROOM,
     HEADLINE,
-    OTHER_SCENE,
-    SKILLED,
+    WHOSE,
     in_order,
     metric,
 )
@@ -29,11 +26,6 @@ from scenegen.files.new_file import written_beside
 
 INTERVAL = f"{CONFIDENCE:.0%} interval"
 SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
-FLOORS_OF_ROOMS = {
-    EMPTY_ROOM: "empty room",
-    CUT_OUT: "flat cut-out",
-    OTHER_SCENE: "against another scene",
-}
 BY_KIND = "by kind of question"
 GROUP_TITLES = {
     "by_view_angle": "by degrees between the view and the scene's first one",
@@ -79,7 +71,7 @@ def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> N
 
 def headline_rows(scores: ScoreFile) -> Table:
     """Return a row for each skill of a headline score, then for each such score, with floors."""
-    names = [name for name in HEADLINE[scores.task] if name in scores.metrics]
+    names = scores.headline
     rows: list[Sequence[str]] = [
         (f"skill of {n}", *interval_cells(scores.skills[n]), f"0: {floor_text(scores, n)}")
         for n in names
@@ -95,12 +87,12 @@ def headline_rows(scores: ScoreFile) -> Table:
 def floor_text(scores: ScoreFile, name: str) -> str:
     """Return the name of the floor of a score that has a skill."""
     if scores.task == "rooms":
-        return FLOORS_OF_ROOMS[SKILLED[name]]
+        return WHOSE[str(scores.floor_of(name))]
     return scores.skills[name].floor_name
 
 
 def floor_cell(scores: ScoreFile, name: str) -> Cell:
-    """Return the floor of a score with its name, and what chance or noise gives."""
+    """Return the floor of a score with its name, and what chance gives."""
     label, value = references(scores).get(name, ("", 0.0))
     reference = _beside(value, scores.metrics[name])
     if name not in scores.skills:
@@ -118,11 +110,10 @@ def _beside(reference: float, score: Score) -> str:
 
 
 def references(scores: ScoreFile) -> dict[str, tuple[str, float]]:
-    """Return by name of the score what noise or chance gives, with the label of either."""
-    values = {name: ("noise floor", floor) for name, floor in scores.meta.noise_floors.items()}
+    """Return by name of the score what chance gives, with its label."""
     if scores.task == "iqtt":
-        values["iqtt_accuracy"] = ("chance", 1.0 / scores.meta.counts["answers"])
-    return values
+        return {"iqtt_accuracy": ("chance", 1.0 / scores.meta.counts["answers"])}
+    return {}
 
 
 def alignment_tables(scores: ScoreFile) -> Iterator[Table]:
@@ -144,7 +135,7 @@ def alignment_tables(scores: ScoreFile) -> Iterator[Table]:
 
 
 def all_scores(scores: ScoreFile) -> Table:
-    """Return a row for each score; what chance or noise gives follows its score."""
+    """Return a row for each score; what chance gives follows its score."""
     rows: list[Sequence[str]] = []
     beside = references(scores)
     for name in in_order(scores.metrics):
@@ -251,18 +242,6 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
         if scores.alignment != "none":
             claim += ", fitted to the truth of each image before all scores"
         yield f"intervals: bootstrap over scenes, {bootstrap}; {claim}"
-        if meta.noise_floors:
-            yield "noise floor: the score of the true surface, sampled elsewhere, against itself"
-        below = [
-            name
-            for name, floor in meta.noise_floors.items()
-            if name in scores.metrics and (scores.metrics[name].value < floor)
-        ]
-        if below:
-            yield (
-                f"below the noise floor: {', '.join(below)}. This is no error: predictions on the"
-                " truth's own rays can lie nearer to it than two samplings of one surface"
-            )
     else:
         how = "Wilson's" if scores.runs == 1 else f"bootstrap, {bootstrap}"
         over = "questions, as the truth does not tell their shapes"
@@ -300,8 +279,9 @@ def what_the_floor_is(scores: ScoreFile) -> str:
     if scores.task == "rooms":
         return (
             "The floor of shape is a flat cut-out of each object at its median depth. Of relief it"
-            " is the same prediction, held against the relief of another scene. Else it is the"
-            " empty room: walls and floor from the true camera, no objects."
+            " is the same prediction, held against the relief of another scene. Of what is behind"
+            " it is the best guess that was shown as much. Else it is the empty room: walls and"
+            " floor from the true camera, no objects."
         )
     return "The floor is the best method without 3D, by kind of question: docs/results.md."
 

@@ -14,7 +14,11 @@ from scenegen.common.records import from_json
 
 LARGEST = 1_000_000  # characters of a file of cards
 HEAD = ("trained on", "told", "views seen", "paper", "code", "date")
-VIEWS_SEEN = {"scored_view": "the scored one", "first_view": "the first one", "no_view": "none"}
+VIEWS_SEEN = {
+    "scored_view": "the scored view",
+    "first_view": "the first view alone",
+    "no_view": "no view",
+}
 
 
 @dataclass(frozen=True)

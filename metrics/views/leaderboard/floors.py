@@ -1,4 +1,4 @@
-"""Floors beside scores: the empty room, noise, chance, and probes that know nothing of 3D."""
+"""Floors beside scores: the empty room, guesses, chance, and probes that know nothing of 3D."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -6,17 +6,17 @@ from collections.abc import Mapping, Sequence
 from iqtt import floors
 from iqtt.floors import floor_of_kind
 from metrics.score_file import SCORE_AGAIN
-from metrics.scoring.metric_names import EMPTY_ROOM, OTHER_SCENE, SKILLED
+from metrics.scoring.metric_names import EMPTY_ROOM, RELIEF, WHOSE
 from metrics.scoring.records import ScoreFile
 from metrics.views.by_angle import angle_floors
 from metrics.views.leaderboard.rows import Cells, unranked_rows
-from metrics.views.score_tables import FLOORS_OF_ROOMS, floor_text
+from metrics.views.score_tables import floor_text
 from metrics.views.table import Cell, Table
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import number, with_interval
 
 SKILL_OF = "skill of "  # begins the keys of columns of skills
-FLOOR, NOISE, CHANCE = "floor: ", "noise floor", "floor: chance"
+FLOOR, CHANCE = "floor: ", "floor: chance"
 AGREEMENT = 1e-9  # of floors, relative: other releases of libraries add differently
 
 
@@ -32,14 +32,11 @@ def floor_cells(file: ScoreFile, names: Sequence[str]) -> Cells:
     rows: dict[str, dict[str, float]] = {}
     for name in names:
         if name in file.skills:
-            text = floor_text(file, name) if is_shared(name) else FLOORS_OF_ROOMS[EMPTY_ROOM]
+            text = floor_text(file, name) if is_shared(name) else WHOSE[EMPTY_ROOM]
             row = rows.setdefault(FLOOR + " ".join(text.split()), {})
             row[SKILL_OF + name] = 0.0
             if is_shared(name):
                 row[name] = file.skills[name].floor
-    noise = file.meta.noise_floors
-    if any(name in noise for name in names):
-        rows[NOISE] = {name: noise[name] for name in names if name in noise}
     if file.task == "iqtt" and not any(label.startswith(CHANCE) for label in rows):
         rows[CHANCE] = {"iqtt_accuracy": 1.0 / file.meta.counts["answers"]}
     return _shown(rows)
@@ -49,7 +46,7 @@ def floor_cells_of_groups(file: ScoreFile, name: str, keys: Sequence[str]) -> Ce
     """Return the floors of a score by view angle, or by kind of question."""
     if file.task == "rooms":
         values = angle_floors(file, name) if is_shared(name) else {}
-        return _shown({FLOOR + FLOORS_OF_ROOMS[SKILLED[name]]: values} if values else {})
+        return _shown({FLOOR + WHOSE[str(file.floor_of(name))]: values} if values else {})
     answers = file.meta.counts["answers"]
     best = {kind: floor_of_kind(kind, answers)[0] for kind in keys}
     chance = dict.fromkeys(keys, 1.0 / answers)
@@ -70,7 +67,7 @@ def own_floors(file: ScoreFile) -> dict[str, float]:
 
 def is_shared(name: str) -> bool:
     """Return whether all files of one test set have the same floor of this score."""
-    return SKILLED.get(name) != OTHER_SCENE
+    return name not in RELIEF
 
 
 def require_same_floors(files: Sequence[ScoreFile]) -> None:
@@ -88,13 +85,11 @@ def require_same_floors(files: Sequence[ScoreFile]) -> None:
 
 
 def _stated(file: ScoreFile) -> dict[str, float]:
-    skills = {
-        f"skills.{name}.floor": skill.floor
+    return {
+        f"skills.{name}.floor ({skill.floor_name})": skill.floor
         for name, skill in file.skills.items()
         if is_shared(name)
     }
-    noise = {f"meta.noise_floors.{name}": value for name, value in file.meta.noise_floors.items()}
-    return skills | noise
 
 
 def floors_table(files: Sequence[ScoreFile]) -> Table | None:

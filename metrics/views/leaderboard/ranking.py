@@ -15,10 +15,11 @@ import numpy as np
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ID_COLUMNS, Score, ScoreFile, Skill
+from metrics.submissions.layout import Shown
 from metrics.views.by_angle import angle_floors
 from metrics.views.compare.compare import Comparison, compare
 from metrics.views.compare.pairing import ComparisonError
-from metrics.views.leaderboard.cards import Card, card_cells
+from metrics.views.leaderboard.cards import VIEWS_SEEN, Card, card_cells
 from metrics.views.leaderboard.floors import (
     SKILL_OF,
     floor_cells,
@@ -121,8 +122,8 @@ def rankings(
     """Return what is shown of each test set, in the order of the files, and further tables.
 
     The digest of its truth tells a test set, wherever its file lay and whatever made it. Methods
-    that see a scene's first view alone, and predict others, have a ranking of their own. Further
-    tables have what probes reached on the kinds of questions, and the paper's own tables.
+    that were shown different views of a scene have rankings of their own. Further tables have what
+    probes reached on the kinds of questions, and the paper's own tables.
 
     Args:
         files: any number, of any test sets.
@@ -141,20 +142,19 @@ def rankings(
     """
     _require_once(files)
     tasks = {name: metric(name).task for name in metrics or ()}
-    groups: dict[tuple[str, str, bool], list[ScoreFile]] = {}
+    groups: dict[tuple[str, str, Shown | None], list[ScoreFile]] = {}
     for file in files:
-        key = (file.task, file.meta.truth_digest, file.sees_first_view_alone)
+        key = (file.task, file.meta.truth_digest, file.shown_of_several)
         groups.setdefault(key, []).append(file)
     ranked: list[Ranking] = []
     placed: set[Figure] = set()
-    for (task, digest, first_alone), members in groups.items():
-        lists = (groups.get((task, digest, alone), []) for alone in (False, True))
-        together = [file for group in lists for file in group]
+    for (task, digest, seen), members in groups.items():
+        together = [file for file in files if (file.task, file.meta.truth_digest) == (task, digest)]
         _require_same_rows(together)
         require_same_floors(together)
         names = [name for name in tasks if tasks[name] == task]
         behind_first = sorted(HEADLINE[task], key=lambda name: name != BEHIND)
-        headline = [name for name in behind_first if first_alone or name != BEHIND]
+        headline = [n for n in behind_first if n != BEHIND or seen in ("first_view", "no_view")]
         there = [n for n in headline if any(n in file.metrics for file in members)]
         columns = _columns(members, names or there or HEADLINE[task][:1], headline=not names)
         figures = [] if paper == "none" else _figures(members, columns)
@@ -346,7 +346,7 @@ def compared_with_first(files: Sequence[ScoreFile]) -> Comparison | None:
     if not ranked:
         return None
     first = ranked[0]
-    names = [name for name in HEADLINE[first.task] if name in first.metrics and name in first.items]
+    names = [name for name in first.headline if name in first.items]
     paired = [file for file in ranked[1:] if _pairs(first, file, names)]
     return compare([first, *paired], names) if paired and names else None
 
@@ -403,7 +403,9 @@ def _title(file: ScoreFile) -> str:
     if file.task == "iqtt":
         kind = f" of the kind {plain(*file.by_distractor)}" if len(file.by_distractor) == 1 else ""
         return f"Mental rotation: {len(file.ids):,} questions{kind}, {name}"
-    task = "Rooms from the first view" if file.sees_first_view_alone else "Rooms"
+    task = {"first_view": "Rooms from the first view", "no_view": "Rooms from no view"}.get(
+        file.shown_of_several or "", "Rooms"
+    )
     scenes, views = (len(np.unique(c)) for c in (file.clusters, file.columns["view_index"]))
     angles = file.columns.get("view_angle_degrees", np.array([-1]))
     span = f" from 0° to {angles.max()}°" if angles.max() > 0 else ""
@@ -426,8 +428,10 @@ def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
     truth = f", truth {first.meta.truth_digest[:12]}"
     if first.task == "rooms":
         yield f"{len(first.ids):,} images of {len(np.unique(first.clusters)):,} scenes{truth}."
-        if first.sees_first_view_alone:
-            yield "These methods saw each scene's first view alone; others have their own list."
+        if first.shown_of_several is not None:
+            yield (
+                f"These methods were shown {VIEWS_SEEN[first.shown]}; others have their own list."
+            )
     else:
         chance = 1.0 / first.meta.counts["answers"]
         yield f"{len(first.ids):,} questions{truth}; chance is {chance:.4f}."
@@ -440,12 +444,6 @@ def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
     )
     yield SHARED
     yield from (f"Warning: {text}." for text in few_clusters(first))
-    if first.meta.noise_floors:
-        yield (
-            "Noise floor: the score of the true surface, sampled elsewhere, against itself. Floors"
-            " are as the score files state them; files that disagree are refused. A relief has a"
-            " floor of its own beside it."
-        )
 
 
 def _same_request_notes(members: Sequence[ScoreFile], files: Sequence[ScoreFile]) -> Iterator[str]:

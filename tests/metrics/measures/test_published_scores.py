@@ -73,21 +73,38 @@ def test_boundaries():
         said, true = boundaries(PREDICTED, ratio), boundaries(TRUE, ratio)
         r = mean(len(said[way] & true[way]) / max(len(true[way]), 1) for way in said)
         p = mean(len(said[way] & true[way]) / max(len(said[way]), 1) for way in said)
-        f1, recall = f1 + ratio * 2 * r * p / (r + p), recall + ratio * r
-        total += ratio
+        found_of_all = sum(len(said[way] & true[way]) for way in said)
+        recall += ratio * found_of_all / sum(map(len, true.values()))
+        f1, total = f1 + ratio * 2 * r * p / (r + p), total + ratio
     found = boundary_scores(PREDICTED, TRUE, MASK)
     assert found["boundary_f1"] == pytest.approx(f1 / total)
     assert found["boundary_recall"] == pytest.approx(recall / total)
 
 
-def test_the_truth_has_perfect_boundaries_and_depth_without_any_has_none():
+def test_boundaries_that_lack_a_direction_count_as_published():
+    """One step, in one direction of four and at five ratios of ten: the truth itself has .21."""
     flat = np.ones((6, 6))
     step = np.where(np.arange(6) < 3, 1.0, 1.1) * flat
     whole = np.ones_like(flat, bool)
+    ratios = np.linspace(1.05, 1.25, 10)
+    expected = 0.25 * ratios[ratios < 1.1].sum() / ratios.sum()
     for scale in (1.0, 7.0):
-        assert set(boundary_scores(scale * step, step, whole).values()) == {1.0}
+        found = boundary_scores(scale * step, step, whole)
+        assert found == {"boundary_f1": pytest.approx(expected), "boundary_recall": 1.0}
     assert set(boundary_scores(flat, step, whole).values()) == {0.0}
-    assert np.isnan(list(boundary_scores(step, flat, whole).values())).all()
+    found = boundary_scores(step, flat, whole)
+    assert found["boundary_f1"] == 0.0
+    assert np.isnan(found["boundary_recall"])
+
+
+def test_recall_is_of_all_true_boundaries_and_needs_no_precision():
+    """Noise adds boundaries of its own, and hides none."""
+    true = np.where(np.arange(12) < 6, 1.0, 2.0) * np.ones((8, 1))
+    said = true * RNG.choice([1.0, 1.3], true.shape, p=[0.7, 0.3])
+    found = boundary_scores(said, true, np.ones_like(true, bool))
+    kept = np.mean(said[:, 6] / said[:, 5] > 1.25)
+    assert found["boundary_recall"] == pytest.approx(kept)
+    assert found["boundary_f1"] < 0.5 * kept
 
 
 def test_point_maps():

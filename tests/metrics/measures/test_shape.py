@@ -32,7 +32,7 @@ INSIDE = inside_objects(IDS)
 def scores(depth):
     at = INSIDE > 0
     points, true = (back_project(d, FOV)[at] for d in (depth, TRUE))
-    return shape_scores(points, true, INSIDE[at])
+    return shape_scores((TRUE - depth)[at][:, None], points, true, INSIDE[at])
 
 
 def test_inside_is_the_mask_without_its_rim_of_objects_that_are_large_enough():
@@ -76,10 +76,11 @@ def test_a_slanted_plane_and_noise_have_no_correlation():
 def test_flat_truth_has_no_correlation_and_no_object_has_no_score():
     at = INSIDE > 0
     true = back_project(np.full_like(TRUE, 2.0), FOV)[at]
-    found = shape_scores(true, true, INSIDE[at])
+    none = np.zeros((len(true), 1))
+    found = shape_scores(none, true, true, INSIDE[at])
     assert found["shape_error"] == 0.0
     assert np.isnan(found["shape_correlation"])
-    assert np.isnan(list(shape_scores(true[:0], true[:0], INSIDE[at][:0]).values())).all()
+    assert np.isnan(list(shape_scores(none[:0], true[:0], true[:0], INSIDE[at][:0]).values())).all()
     assert np.isnan([flat_error(TRUE[:0], IDS[:0]), one_normal_degrees(true[:0], IDS[:0])]).all()
 
 

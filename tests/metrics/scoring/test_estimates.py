@@ -14,7 +14,9 @@ SCENES = 6
 def columns(**given_columns):
     """Items of SCENES rows, of which each has its own scene; columns that are not given are 0.5."""
     items = {name: np.full(SCENES, 0.5) for name in SKILLED}
-    items |= {SKILLED[name] + name: np.full(SCENES, 0.5) for name in SKILLED}
+    items |= {
+        begin + name: np.full(SCENES, 0.5) for name, begins in SKILLED.items() for begin in begins
+    }
     return items | {name: np.asarray(column, np.float64) for name, column in given_columns.items()}
 
 

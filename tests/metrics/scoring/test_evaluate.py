@@ -49,13 +49,11 @@ def test_the_truth_is_perfect(folder):
     assert found.comparable
     for name, value in found.metrics.items():
         best = 1.0 if metric(name).higher_is_better else 0.0
-        if not name.startswith(OTHER_SCENE):
+        if not name.startswith(OTHER_SCENE) and name != "boundary_f1":  # which lacks directions
             assert value.value == pytest.approx(best, abs=1e-10), name
     assert {(s.value, s.low, s.high) for s in found.skills.values()} == {(1.0, 1.0, 1.0)}
     assert set(found.skills) == set(SKILLED) - {"behind_depth_error"}  # of single views
     assert {"normal_mean_degrees", "derived_normal_mean_degrees"} <= set(found.metrics)
-    floors = found.meta.noise_floors
-    assert 0 < floors["object_completeness"] < floors["chamfer"] < floors["hausdorff"] < 0.2
     for scores in (*found.by_object_shape.values(), *found.by_object_size.values()):
         for name, value in scores.items():
             assert value.value == (1.0 if metric(name).higher_is_better else 0.0)
@@ -74,14 +72,16 @@ def test_points_are_those_of_scipy_and_means_those_of_numpy(folder):
                     a, b = (back_project(d, room.fov_y_degrees)[mask] for d in (depth, room.depth))
                     halves = cKDTree(b).query(a)[0].mean() + cKDTree(a).query(b)[0].mean()
                     expected[run, row] = halves
-    got = found.metrics["chamfer"]
-    assert np.asarray(found.items["chamfer"]) == pytest.approx(expected.mean(axis=0), rel=1e-9)
+    got = found.metrics["paper_chamfer"]
+    assert np.asarray(found.items["paper_chamfer"]) == pytest.approx(
+        expected.mean(axis=0), rel=1e-9
+    )
     assert got.value == pytest.approx(expected.mean(), rel=1e-9)
     assert got.std == pytest.approx(expected.mean(axis=1).std(ddof=1), rel=1e-9)
     assert got.n == 8
     assert got.low < got.value < got.high
     assert [one.run for one in found.meta.submissions] == ["0", "1", "2"]
-    assert score(paths[:1]).metrics["chamfer"].std is None
+    assert score(paths[:1]).metrics["paper_chamfer"].std is None
 
 
 def test_processes_change_no_digit_and_scores_read_back(folder, tmp_path):
@@ -196,10 +196,7 @@ def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_pa
     found = score([path], truth, Settings(non_finite="penalise"))
     assert not found.comparable
     assert found.meta.counts["rows_penalised"] == 1
-    with RoomsFile(folder / "rooms.h5") as rooms:
-        room = rooms[row]
-        worst = room.depth[3, 7] ** 2 / np.isfinite(room.depth).sum()
-    assert found.items["mse_depth"][row] == pytest.approx(worst)
+    assert found.items["mse_depth"][row] == metric("mse_depth").worst
     assert np.count_nonzero(found.items["mse_depth"]) == 1
 
 

@@ -5,9 +5,10 @@ import pytest
 
 from metrics.scoring.geometry import depth_as_scored
 from metrics.submissions.reader import PredictedView
+from scenegen.camera import back_project
 
 TRUE = np.random.default_rng(0).uniform(1, 2, (6, 7))
-POINTS = np.dstack([TRUE, TRUE, -TRUE])
+POINTS = back_project(TRUE, 40.0)
 
 
 @pytest.mark.parametrize(
@@ -24,7 +25,7 @@ def test_depth_is_fitted_where_both_are_known(kind, alignment, geometry):
     hole = np.array(geometry)
     hole[2, 3] = np.nan
     true = np.where(np.eye(6, 7), np.nan, TRUE)
-    seen = depth_as_scored(PredictedView(kind, alignment, hole, None), true)
+    seen = depth_as_scored(PredictedView(kind, alignment, hole, None), true, 40.0)
     known = np.isfinite(true)
     known[2, 3] = False
     np.testing.assert_allclose(seen[known], TRUE[known], rtol=1e-9)
@@ -34,4 +35,4 @@ def test_depth_is_fitted_where_both_are_known(kind, alignment, geometry):
 def test_nothing_to_fit():
     nothing = np.full((2, 2), np.nan)
     view = PredictedView("depth", "scale", nothing, None)
-    assert np.isnan(depth_as_scored(view, np.ones((2, 2)))).all()
+    assert np.isnan(depth_as_scored(view, np.ones((2, 2)), 40.0)).all()

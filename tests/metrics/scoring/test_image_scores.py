@@ -4,11 +4,13 @@ import h5py
 import numpy as np
 import pytest
 from h5_edits import replaced
-from scipy.spatial import cKDTree
 
 from baselines.trivial import write_room_baseline
+from metrics.measures.chamfer_hausdorff import nearest_distances
 from metrics.measures.empty_room import empty_room
+from metrics.measures.normals import normals_from_depth
 from metrics.measures.objects import LEAST_PIXELS
+from metrics.measures.surface import surface_distances, surface_of
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
@@ -16,7 +18,7 @@ from metrics.scoring.image_scores import true_relief
 from metrics.scoring.metric_names import OF_CUT_OUT, metric
 from metrics.scoring.rows import other_scenes
 from metrics.scoring.runs import Settings
-from scenegen.camera import back_project
+from scenegen.camera import back_project, pixel_size
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
@@ -103,9 +105,9 @@ def test_going_against_the_mean_relief_wins_nothing(folder, tmp_path):
     assert value < -0.2
 
 
-def test_true_outlines_without_any_shape_win_relief_but_find_no_object(folder, tmp_path):
+def test_true_outlines_without_any_shape_win_relief_but_find_no_object(make_rooms, tmp_path):
     """What relief cannot tell, as docs/scores.md says: flat outlines from shapes."""
-    path, truth = tmp_path / "flat.h5", folder / "rooms.h5"
+    path, truth = tmp_path / "flat.h5", make_rooms(tmp_path / "r.h5", 8, height=64, width=64)
     with RoomsFile(truth) as rooms, RoomPredictionWriter(path, truth, method="flat") as out:
         for row, room in enumerate(rooms):
             size = room.depth.shape
@@ -117,19 +119,32 @@ def test_true_outlines_without_any_shape_win_relief_but_find_no_object(folder, t
     assert found.metrics["derived_object_normal_mean_degrees"].value > 40.0
 
 
+def reverse_distances(depth, room, mask):
+    """From the true points to predicted patches, (H, W)."""
+    points, true = (back_project(d, room.fov_y_degrees)[mask] for d in (depth, room.depth))
+    normals, _ = normals_from_depth(depth, room.fov_y_degrees, mask)
+    pitch, image = pixel_size(len(mask), room.fov_y_degrees), np.full(mask.shape, np.nan)
+    said, truth = (
+        surface_of(p, n[mask], pitch, mask)
+        for p, n in ((points, normals), (true, room.normal.astype(float)))
+    )
+    image[mask] = surface_distances(said, truth, nearest_distances(points, true), False).reverse
+    return image
+
+
 def test_scores_of_objects_and_relief_are_those_of_scipy_and_numpy(folder):
     found = score([folder / "noisy-0.h5"], folder / "rooms.h5")
     with RoomsFile(folder / "rooms.h5") as rooms, h5py.File(folder / "noisy-0.h5") as file:
         place = {int(row): i for i, row in enumerate(file["row"])}
         for row, room in enumerate(rooms):
             depth, mask = file["depth"][place[row]].astype(float), np.isfinite(room.depth)
-            points, true = (back_project(d, room.fov_y_degrees) for d in (depth, room.depth))
-            tree, each = cKDTree(points[mask]), {}
+            _, true = (back_project(d, room.fov_y_degrees) for d in (depth, room.depth))
+            near_true, each = reverse_distances(depth, room, mask), {}
             for one in np.unique(room.object_id[room.object_id > 0]).tolist():
                 pixels = room.object_id == one
                 if pixels.sum() >= LEAST_PIXELS:
                     error = np.abs(depth - room.depth)[pixels]
-                    each[one] = tree.query(true[pixels])[0], error, error.size
+                    each[one] = near_true[pixels], error, error.size
             entries = np.flatnonzero(found.objects["row"] == row)
             assert found.objects["object"][entries].tolist() == list(each)
             assert found.objects["pixels"][entries].tolist() == [n for *_, n in each.values()]
@@ -184,8 +199,8 @@ def test_rows_without_objects_are_left_out_and_counted(folder, make_rooms, tmp_p
     assert found.metrics["chamfer"].n == 8
 
 
-def test_a_depth_that_is_not_finite_is_no_relief(folder, tmp_path):
-    """Where objects are, it would lie at the camera, and so far before the empty room."""
+def test_an_image_with_a_value_that_is_not_finite_has_the_worst_scores(folder, tmp_path):
+    """At the camera it would stand far before the empty room, or near what it should be."""
     path = tmp_path / "holes.h5"
     with RoomsFile(folder / "rooms.h5") as rooms, h5py.File(folder / "empty-room.h5") as file:
         ids = np.stack([room.object_id for room in rooms])[file["row"][:]]
@@ -193,8 +208,14 @@ def test_a_depth_that_is_not_finite_is_no_relief(folder, tmp_path):
     with h5py.File(path, "r+") as file:
         replaced("depth", lambda depth: np.where(ids > 0, np.nan, depth))(file)
     found = score([path], folder / "rooms.h5", Settings(non_finite="penalise"))
-    assert found.metrics["relief_iou"].value == 0.0
-    assert found.metrics["relief_correlation"].value == -1.0
+    holes = found.items["relief_iou"] == 0.0
+    assert holes.any()
+    for name in found.metrics:
+        values = found.items[name][holes]
+        assert (values[np.isfinite(values)] == metric(name).worst).all(), name
+    assert set(
+        found.objects["object_depth_error"][np.isin(found.objects["row"], np.flatnonzero(holes))]
+    ) == {4.0}
     assert found.skills["object_depth_error"].value < 0.0
     assert not found.comparable
 
