@@ -28,6 +28,7 @@ from metrics.submissions.layout import Shown
 from scenegen.camera import pixel_directions, pixel_size, transform_points
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
+from scenegen.common.threads import one_thread
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
@@ -229,17 +230,16 @@ def _regression(features: Array, relief: Array) -> Callable[[Array], Array]:
 def _trees(features: Array, relief: Array) -> Callable[[Array], Array]:
     """Return what gradient-boosted trees make of features, learned with absolute errors."""
     from sklearn.ensemble import HistGradientBoostingRegressor
-    from threadpoolctl import threadpool_limits
 
     trees = HistGradientBoostingRegressor(
         loss="absolute_error", max_iter=100, learning_rate=0.2, early_stopping=False, random_state=0
     )
 
     def lift(values: Array) -> Array:
-        with threadpool_limits(1):  # so few rows are not worth several threads
+        with one_thread():  # so few rows are not worth several threads
             return np.asarray(trees.predict(values))
 
-    with threadpool_limits(1):  # sums then have one order
+    with one_thread():  # sums then have one order
         trees.fit(features[::8], relief[::8])
     return lift
 

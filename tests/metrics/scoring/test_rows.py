@@ -1,8 +1,6 @@
 """Scoring in several processes that the machine stops."""
 
 import signal
-from concurrent.futures import ProcessPoolExecutor
-from multiprocessing import get_context
 
 import numpy as np
 import pytest
@@ -15,13 +13,15 @@ from metrics.submissions.reader import open_predictions
 from scenegen.rooms.reader import RoomsFile
 
 
+def killed(job, chunk):
+    signal.raise_signal(signal.SIGKILL)
+
+
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="sends signals")
 def test_a_killed_worker_is_an_error_and_no_traceback(tmp_path, rooms_path, monkeypatch):
     """As Linux does where memory is short."""
     write_room_baseline("oracle", rooms_path, tmp_path / "oracle.h5")
-    killed = {"initializer": signal.raise_signal, "initargs": (signal.SIGKILL,)}
-    pool = ProcessPoolExecutor(2, get_context("spawn"), **killed)
-    monkeypatch.setattr(module, "worker_pool", lambda count: pool)
+    monkeypatch.setattr(module, "_score_in_worker", killed)
     monkeypatch.setattr(module, "CHUNK", 2)
     with (
         open_predictions(tmp_path / "oracle.h5") as file,
