@@ -91,9 +91,7 @@ class _Process:
 
     def __init__(self) -> None:
         """Start it; it never sees Ctrl-C, which a terminal sends to all processes."""
-        code = f"import sys; sys.path[:] = {list(map(str, sys.path))!r}; import {__name__} as pool"
-        flags = subprocess._args_from_interpreter_flags()  # type: ignore[attr-defined]
-        command = [sys.executable, "-P", *flags, "-c", f"{code}; pool.serve()"]
+        command = python_command(f"from {__name__} import serve; serve()")
         environment, pipe = {**os.environ, **ONE_THREAD}, subprocess.PIPE
         with without_interrupts():
             self._popen = subprocess.Popen(command, stdin=pipe, stdout=pipe, env=environment)
@@ -161,6 +159,16 @@ def worker_pool(count: int, function: Callable[[Any], Any]) -> Iterator[Pool]:
         pool.kill()
         raise
     pool.close()
+
+
+def python_command(code: str) -> list[str]:
+    """Return a command that runs code in another Python, which imports from where this one does.
+
+    The code needs no main module of this process, and gets none.
+    """
+    flags = subprocess._args_from_interpreter_flags()  # type: ignore[attr-defined]
+    path = f"import sys; sys.path[:] = {list(map(str, sys.path))!r}"
+    return [sys.executable, "-P", *flags, "-c", f"{path}; {code}"]
 
 
 # ---- in the process ----

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metrics.intake.model_file import ModelError, load_model
+from metrics.intake.model_file import ModelError, opened_model
 from metrics.intake.running import Call, run_model
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
@@ -20,16 +20,16 @@ INFER = f"import numpy as np\ndef infer(image, intrinsics=None):\n    return {WA
 def run(truths, tmp_path):
     """Run the text of a model; return what was said. The submission is at `run.out`."""
 
-    def go(text, data=truths.rooms, load=None, keep=None, **call):
+    def go(text, data=truths.rooms, load=None, keep=None, timeout=None, **call):
         path = tmp_path / "my_model.py"
         path.write_text(text)
-        model = load_model(path, load or {})
-        return run_model(
-            model, data, go.out, call=Call(**call), method="m", overwrite=True, keep=keep,
-            options=load,
-        )  # fmt: skip
+        with opened_model(path, load, timeout, go.notes.append) as model:
+            return run_model(
+                model, data, go.out, call=Call(**call), method="m", overwrite=True, keep=keep,
+                options=load,
+            )  # fmt: skip
 
-    go.out = tmp_path / "p.h5"
+    go.out, go.notes = tmp_path / "p.h5", []
     return go
 
 
