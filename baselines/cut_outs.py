@@ -45,6 +45,7 @@ MOST_IMAGES = 1500  # of training rooms, spread evenly
 CELLS = 16  # a side, of the pictures that `nearest` compares
 
 
+@one_thread()
 def write_cut_outs(
     name: str,
     data: str | Path,
@@ -235,13 +236,8 @@ def _trees(features: Array, relief: Array) -> Callable[[Array], Array]:
         loss="absolute_error", max_iter=100, learning_rate=0.2, early_stopping=False, random_state=0
     )
 
-    def lift(values: Array) -> Array:
-        with one_thread():  # so few rows are not worth several threads
-            return np.asarray(trees.predict(values))
-
-    with one_thread():  # sums then have one order
-        trees.fit(features[::8], relief[::8])
-    return lift
+    trees.fit(features[::8], relief[::8])
+    return lambda values: np.asarray(trees.predict(values))
 
 
 def _left_over(rooms: RoomsFile, row: int) -> Array:

@@ -93,13 +93,13 @@ def _read_structure(path: str, memory: int, seconds: float) -> None:
     """
     import h5py
 
-    from scenegen.files.input_file import HDF5_ERRORS, faults, virtual_sources
+    from scenegen.files.input_file import HDF5_ERRORS, faults, is_virtual, virtual_sources
 
     def look(_name: str, item: h5py.Group | h5py.Dataset) -> None:
         dict(item.attrs)
         if not isinstance(item, h5py.Dataset):
             return
-        if item.is_virtual:
+        if is_virtual(item):
             virtual_sources(item)
         elif h5py.check_string_dtype(item.dtype) is not None:
             for first in range(0, len(item) if item.shape else 0, BLOCK_ROWS):
