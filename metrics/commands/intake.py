@@ -1,5 +1,6 @@
 """The `bench` commands that make submissions: from folders of files, and from a model."""
 
+import shlex
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
@@ -156,7 +157,7 @@ def _print_hints(out: str, truth: str) -> None:
             print_line(f"{out}: {opened.kind}, alignment {opened.alignment}{normals}")
             for hint in found:
                 print_line(f"hint: {out}: {hint}", err=True)
-    print_line(f"now: bench score {out} --truth {truth}")
+    print_line(f"now: {shlex.join(['bench', 'score', out, '--truth', truth])}")
 
 
 # fmt: off
