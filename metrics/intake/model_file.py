@@ -94,16 +94,16 @@ class Model:
             pass
 
     def _ask(self, request: Any) -> Future[bytes]:
-        message = pickle.dumps(request, 5)
-        return self._asking.submit(lambda: self._tell(message) or self._hear())
+        return self._asking.submit(self._answer, pickle.dumps(request, 5))
+
+    def _answer(self, message: bytes) -> bytes:
+        assert self._process.stdout is not None
+        self._tell(message)
+        return model_runner.read(self._process.stdout)
 
     def _tell(self, message: bytes) -> None:
         assert self._process.stdin is not None
         model_runner.write(self._process.stdin, message)
-
-    def _hear(self) -> bytes:
-        assert self._process.stdout is not None
-        return model_runner.read(self._process.stdout)
 
     def _wait(self, asked: Future[bytes], where: str, timeout: float | None) -> Any:
         """Return the result of a call; tells where it is meanwhile."""
