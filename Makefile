@@ -103,7 +103,7 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.questions
 	$(BIN)/python -m benchmarks.nearest
 	$(BIN)/python -m benchmarks.surfels
-	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.score_rows
+	$(BIN)/python -m benchmarks.score_rows
 
 # Needs an NVIDIA GPU; writes docs/gpu.md.
 bench-gpu: $(VENV)/.test
@@ -111,7 +111,7 @@ bench-gpu: $(VENV)/.test
 
 # Hours; stop it when you like, and start it again. RESULTS="--only questions --seeds 1" runs a part.
 results: $(VENV)/.model
-	OMP_NUM_THREADS=1 $(BIN)/python -m benchmarks.results $(RESULTS)
+	$(BIN)/python -m benchmarks.results $(RESULTS)
 
 fuzz: $(VENV)/.test
 	$(BIN)/python -m fuzz --seconds 600 --corpus fuzz-corpus

@@ -28,6 +28,7 @@ from metrics.submissions.layout import Shown
 from scenegen.camera import pixel_directions, pixel_size, transform_points
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
+from scenegen.common.threads import one_thread
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
@@ -44,6 +45,7 @@ MOST_IMAGES = 1500  # of training rooms, spread evenly
 CELLS = 16  # a side, of the pictures that `nearest` compares
 
 
+@one_thread()
 def write_cut_outs(
     name: str,
     data: str | Path,
@@ -229,19 +231,13 @@ def _regression(features: Array, relief: Array) -> Callable[[Array], Array]:
 def _trees(features: Array, relief: Array) -> Callable[[Array], Array]:
     """Return what gradient-boosted trees make of features, learned with absolute errors."""
     from sklearn.ensemble import HistGradientBoostingRegressor
-    from threadpoolctl import threadpool_limits
 
     trees = HistGradientBoostingRegressor(
         loss="absolute_error", max_iter=100, learning_rate=0.2, early_stopping=False, random_state=0
     )
 
-    def lift(values: Array) -> Array:
-        with threadpool_limits(1):  # so few rows are not worth several threads
-            return np.asarray(trees.predict(values))
-
-    with threadpool_limits(1):  # sums then have one order
-        trees.fit(features[::8], relief[::8])
-    return lift
+    trees.fit(features[::8], relief[::8])
+    return lambda values: np.asarray(trees.predict(values))
 
 
 def _left_over(rooms: RoomsFile, row: int) -> Array:

@@ -18,6 +18,7 @@ from iqtt.files.reader import QuestionsFile, open_questions, parts
 from metrics.prediction_writer import write_answers
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check
+from scenegen.common.threads import one_thread
 
 Array = NDArray[Any]
 Progress = Callable[[int, int], Any]  # questions done since the last call, in all
@@ -28,6 +29,7 @@ ENSEMBLE = 3  # sets of trees
 Outlines = tuple[Array, Array]  # features and distances, as `iqtt.audit.features.outlines` has them
 
 
+@one_thread()
 def write_outline(
     data: str | Path,
     out: str | Path,
@@ -45,6 +47,7 @@ def write_outline(
     write_answers(out, data, method="outline", scores=scores, overwrite=overwrite)
 
 
+@one_thread()
 def write_outline_trees(
     data: str | Path,
     out: str | Path,

@@ -1,6 +1,6 @@
 """Milliseconds a pair of the scorer's nearest neighbours both ways, on rooms and predictions.
 
-    OMP_NUM_THREADS=1 python -m benchmarks.nearest [--sizes 128 256] [--rounds 5]
+    python -m benchmarks.nearest [--sizes 128 256] [--rounds 5]
 
 Ours starts from the depth images; the others are given the points. "error" is the largest
 difference of any method from scipy in double precision.
@@ -8,7 +8,6 @@ difference of any method from scipy in double precision.
 
 import argparse
 import importlib.util
-import os
 import runpy
 import statistics
 from collections.abc import Callable, Iterator
@@ -93,7 +92,6 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=5)
     arguments = parser.parse_args()
     make_room = runpy.run_path(str(ROOMS))["make_room_depth"]
-    print("OMP_NUM_THREADS =", os.environ.get("OMP_NUM_THREADS", "not set"))
     names = ["ours", *installed_methods()]
     print(f"{'size  prediction':40s}", *(f"{name:>9s}" for name in names), "    error")
     for size in arguments.sizes:

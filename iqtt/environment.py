@@ -164,9 +164,9 @@ class Questions(Sequence[dict[str, Any]]):
             "metadata": {name: getattr(made, name) for name in facts},
         }
 
-    def score_answer(self, answer: str, entry: dict[str, Any]) -> float:
-        """Return 1.0 where a model's text gives the entry's letter, else 0.0."""
-        reading = read_answer(answer, 3).answer
+    def score_answer(self, answer: str | None, entry: dict[str, Any]) -> float:
+        """Return 1.0 where a model's text gives the entry's letter, else 0.0; None is no answer."""
+        reading = read_answer(answer, 3).answer if isinstance(answer, str) else None
         return float(reading is not None and LETTERS[reading] == entry["answer"])
 
 

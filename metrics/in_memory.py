@@ -28,12 +28,14 @@ from metrics.submissions.reader import PredictedView, RoomPredictions
 from metrics.submissions.rules import as_doubles
 from metrics.submissions.truths import TrueView
 from scenegen.common.errors import SpecError
+from scenegen.common.threads import one_thread
 from scenegen.rooms.reader import Room, RoomsFile
 
 Array = NDArray[Any]
 PLACE = Path("predictions in memory")
 
 
+@one_thread()
 def evaluate_room(
     prediction: Any,
     truth: Room,

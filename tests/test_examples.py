@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from metrics.intake.model_file import load_model
+from metrics.intake.model_file import opened_model
 from metrics.intake.running import Call, run_model
 from metrics.score_file import read_scores
 from metrics.scoring.evaluate import score
@@ -44,8 +44,9 @@ def test_an_example_writes_what_can_be_scored(name, run, truths, tmp_path):
 
 @pytest.mark.parametrize(("name", "kind"), [("numpy", "disparity"), ("torch", "points")])
 def test_a_model_runs_and_can_be_scored(name, kind, truths, tmp_path):
-    model = load_model(EXAMPLES / f"run_{name}.py", {"batch": 3} if name == "torch" else {})
-    run_model(model, truths.rooms, tmp_path / "out.h5", call=Call(batch=3), method=name)
+    options = {"batch": 3} if name == "torch" else {}
+    with opened_model(EXAMPLES / f"run_{name}.py", options) as model:
+        run_model(model, truths.rooms, tmp_path / "out.h5", call=Call(batch=3), method=name)
     with open_predictions(tmp_path / "out.h5") as predictions:
         assert predictions.kind == kind
     assert score([tmp_path / "out.h5"], truths.rooms).comparable

@@ -63,7 +63,7 @@ class Torture:
         self.folder, self.words = folder, command.split()
         self.temporary = folder / "tmp"
         self.temporary.mkdir(exist_ok=True)
-        self.environment = {**os.environ, "OMP_NUM_THREADS": "1", "TMPDIR": str(self.temporary)}
+        self.environment = {**os.environ, "TMPDIR": str(self.temporary)}
         self.fresh("unbroken")
         start = time.perf_counter()
         self.start().communicate()

@@ -21,6 +21,7 @@ from iqtt.audit.proofs import shapes as shape_proofs
 from iqtt.audit.proofs.shapes import Shapes
 from iqtt.audit.proofs.verdict import Proof
 from iqtt.audit.table import AuditTable, find_tables, lacking, read_table
+from scenegen.common.threads import one_thread
 from scenegen.files.cluster import Cluster
 from scenegen.files.row_file import writer_name
 
@@ -111,6 +112,7 @@ def question_count(paths: Sequence[str | Path]) -> int:
     return sum(source.count for source in find_tables(paths))
 
 
+@one_thread()
 def audit(
     paths: Sequence[str | Path],
     *,

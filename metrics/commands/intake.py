@@ -1,6 +1,8 @@
 """The `bench` commands that make submissions: from folders of files, and from a model."""
 
+import shlex
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -155,7 +157,7 @@ def _print_hints(out: str, truth: str) -> None:
             print_line(f"{out}: {opened.kind}, alignment {opened.alignment}{normals}")
             for hint in found:
                 print_line(f"hint: {out}: {hint}", err=True)
-    print_line(f"now: bench score {out} --truth {truth}")
+    print_line(f"now: {shlex.join(['bench', 'score', out, '--truth', truth])}")
 
 
 # fmt: off
@@ -181,12 +183,15 @@ def _print_hints(out: str, truth: str) -> None:
 @click.option("--resume", "keep", flag_value="resume",
               help="Keep rows that another model, other weights or other options made.")
 @click.option("--restart", "keep", flag_value="restart", help="Begin anew.")
+@click.option("--timeout", type=click.FloatRange(0, min_open=True), metavar="SECONDS",
+              help="End the run where one call of the model takes longer.")
 @click.option("--traceback", is_flag=True, help="Show all of an error that the model raises.")
 @OVERWRITE
 def run(
     model: str, truth: str, out: str, method: str | None, run_name: str, notes: str,
     device: str | None, batch: int | None, intrinsics: bool, curve: str, exposure: float,
-    key: str | None, frame: Any, missing: Any, keep: str | None, traceback: bool, overwrite: bool,
+    key: str | None, frame: Any, missing: Any, keep: str | None, timeout: float | None,
+    traceback: bool, overwrite: bool,
 ) -> None:
     """Run a model on every image of a file and write its predictions.
 
@@ -196,9 +201,7 @@ def run(
 
     A killed run loses nothing: the same command goes on where it stopped.
     """
-    from traceback import print_exception
-
-    from metrics.intake.model_file import ModelError, load_model
+    from metrics.intake.model_file import ModelError, opened_model
     from metrics.intake.outputs import KEYS
     from metrics.intake.running import DEFAULT_BATCH, Call, count_rows, run_model
     from scenegen.files.new_file import check_writable
@@ -209,22 +212,26 @@ def run(
                                  param_hint="--key")
     asked = {"device": device, "batch": batch}
     options = {name: value for name, value in asked.items() if value is not None}
+    loaded = None
     call = Call(curve, exposure, intrinsics, batch or DEFAULT_BATCH, frame, key, missing)
     try:
-        loaded = load_model(model, options)
-        with progress_bar(count_rows(truth), "row") as bar:
+        with (
+            opened_model(model, options, timeout, partial(print_line, err=True)) as loaded,
+            progress_bar(count_rows(truth), "row") as bar,
+        ):
             said = run_model(
                 loaded, truth, out, call=call, method=method or Path(model).stem, run=run_name,
                 notes=notes, overwrite=overwrite, keep=keep, options=options, progress=bar.update,
             )
     except ModelError as error:
-        if traceback and error.__cause__ is not None:
-            print_exception(error.__cause__)
-        elif error.__cause__ is not None:
+        if traceback and error.traceback:
+            print_line(error.traceback, err=True)
+        elif error.traceback:
             error.hint = "; ".join(filter(None, (error.hint, "--traceback shows all of it")))
         raise
     except KeyboardInterrupt:
-        print_line(f"stopped; the same command goes on with the rows in {out}.rows", err=True)
+        at = f" at {loaded.at}" if loaded is not None and loaded.at else ""
+        print_line(f"stopped{at}; the same command goes on with the rows in {out}.rows", err=True)
         raise
     print_line(f"{out}: {said}")
     _print_hints(out, truth)

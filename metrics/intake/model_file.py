@@ -1,97 +1,180 @@
-"""Load a model from a Python file of the user's, and call it.
+"""A model in a Python file of the user's, in a process of its own: `model_runner`.
 
 The file holds `infer(image, intrinsics=None)`; or `load()`, which returns an object with `infer`;
 or one class with `infer`. What the file prints goes to standard error. What it raises becomes one
-line that names the file's line.
+line that names the file's line. Where it crashes or hangs, the row is named.
 """
 
-import contextlib
 import hashlib
-import importlib.util
-import inspect
+import os
+import pickle
+import signal
+import subprocess
 import sys
-import traceback
+import time
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from types import ModuleType
+from types import SimpleNamespace
 from typing import Any
 
+from metrics.intake import model_runner
 from scenegen.common.errors import SceneGenError
+from scenegen.files.pool import ended
 
-EXPECTED = "infer(image, intrinsics=None), or load() or one class that gives an object with it"
 WEIGHTS = (".pt", ".pth", ".ckpt", ".safetensors", ".onnx", ".bin")
-EXAMPLE = "see docs/your-model.md"
+PATIENCE = 10.0  # seconds that a model has to end by itself, after the last row
+MOMENT = 1.0  # seconds between two looks whether its process lives
+SILENCE = 60.0  # seconds of one call after which the row is told; then twice, four times as many
+Note = Callable[[str], Any]
 
 
 class ModelError(SceneGenError):
-    """A model that cannot be loaded, or that raised; `__cause__` is what it raised."""
+    """A model that cannot be loaded, or that raised, crashed or took too long.
+
+    Attributes:
+        traceback: of what it raised; empty where it raised nothing.
+    """
+
+    traceback = ""
 
 
-@dataclass(frozen=True)
 class Model:
-    """A loaded model.
+    """A loaded model; `opened_model` makes it.
 
     Attributes:
         path: its file.
-        infer: for one image, or one question.
-        infer_batch: for several images at once; None where the model has none.
         sha256: of the file, and of names, sizes and dates of the weights beside it.
+        takes_batches: whether it has infer_batch.
+        takes_intrinsics: whether infer_batch, or infer where it has none, does.
+        at: the call that it is at, in words; empty for none.
     """
 
-    path: Path
-    infer: Callable[..., Any]
-    infer_batch: Callable[..., Any] | None
-    sha256: str
+    def __init__(self, path: Path, timeout: float | None, note: Note) -> None:
+        self.path, self.sha256, self.at = path, _digest(path), ""
+        self._timeout, self._note = timeout, note
+        # -P: the folder of the runner must not be among those of imports.
+        command = [sys.executable, "-P", model_runner.__file__]
+        # Of its own session, so that Ctrl-C is not told to it, and what it starts ends with it.
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+        )
+        self._asking = ThreadPoolExecutor(1, thread_name_prefix="model")
+        self.takes_batches = self.takes_intrinsics = False
 
-    def call(self, function: Callable[..., Any], where: str, *arguments: Any) -> Any:
-        """Return what the model returns. Raises ModelError, with `where` in it."""
-        with _guarded(self.path, where):
-            return function(*arguments)
+    def load(self, settings: Mapping[str, Any]) -> None:
+        """Let the process import the file and make the model. Raises ModelError."""
+        about = self._wait(self._ask((str(self.path), dict(settings))), "import and load()", None)
+        self.takes_batches, self.takes_intrinsics = about["batch"], about["intrinsics"]
+
+    def begin(self, function: str, where: str, *arguments: Any) -> Callable[[], Any]:
+        """Begin to call `infer` or `infer_batch`; the function returned waits for the result.
+
+        The result has Python's own values and arrays of NumPy. Raises ModelError, with `where`.
+        """
+        asked = self._ask((function, arguments))
+        return lambda: self._wait(asked, where, self._timeout)
+
+    def close(self) -> None:
+        """Let it end by itself, and end it and all that it has started where it does not."""
+        self._asking.submit(self._tell, model_runner.END)
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(PATIENCE)
+        self.kill()
+
+    def kill(self) -> None:
+        """End it and all that it has started."""
+        with suppress(OSError):
+            if hasattr(os, "killpg"):
+                os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.kill()
+        self._asking.shutdown(cancel_futures=True)
+        with suppress(OSError), self._process:
+            pass
+
+    def _ask(self, request: Any) -> Future[bytes]:
+        return self._asking.submit(self._answer, pickle.dumps(request, 5))
+
+    def _answer(self, message: bytes) -> bytes:
+        assert self._process.stdout is not None
+        self._tell(message)
+        return model_runner.read(self._process.stdout)
+
+    def _tell(self, message: bytes) -> None:
+        assert self._process.stdin is not None
+        model_runner.write(self._process.stdin, message)
+
+    def _wait(self, asked: Future[bytes], where: str, timeout: float | None) -> Any:
+        """Return the result of a call; tells where it is meanwhile."""
+        begun, self.at, told = time.monotonic(), where, SILENCE
+        place = f"{self.path}: {where}"
+        while True:
+            try:
+                answer = asked.result(MOMENT)
+                break
+            except TimeoutError:
+                seconds = time.monotonic() - begun
+            except (OSError, EOFError):
+                with suppress(subprocess.TimeoutExpired):
+                    self._process.wait(MOMENT)
+                raise self._lost(place) from None
+            if self._process.poll() is not None and not asked.done():
+                self.kill()  # what it started may hold the pipe
+                raise self._lost(place)
+            if timeout is not None and seconds > timeout:
+                self.kill()
+                found, hint = f"no answer after {timeout:g} s", "--timeout may give it more"
+                raise ModelError(place, found, "", hint)
+            if seconds > told:
+                self._note(f"{place}: at work for {seconds:.0f} s; --timeout ends what hangs")
+                told *= 2
+        self.at = ""
+        succeeded, content = answer[:1] == b"+", pickle.loads(answer[1:])
+        if succeeded:
+            return _with_types(content)
+        if content.get("interrupt"):
+            raise KeyboardInterrupt
+        if "unusable" in content:
+            raise ModelError(*content["unusable"])
+        line = f", line {content['line']}" if content["line"] else ""
+        error = ModelError(f"{self.path}{line}: {where}", content["found"])
+        error.traceback = content["traceback"]
+        raise error
+
+    def _lost(self, place: str) -> ModelError:
+        code = self._process.poll()
+        how = "closed its pipes" if code is None else f"ended with {ended(code)}"
+        hint = "memory may be short" if code == -getattr(signal, "SIGKILL", 9) else ""
+        return ModelError(place, f"a model whose process {how}", "", hint)
 
 
-def load_model(path: str | Path, settings: Mapping[str, Any]) -> Model:
-    """Import the file and make its model.
+@contextmanager
+def opened_model(
+    path: str | Path,
+    settings: Mapping[str, Any] | None = None,
+    timeout: float | None = None,
+    note: Note = lambda text: None,
+) -> Iterator[Model]:
+    """Import the file and make its model, in a process that lives as long as the block.
 
     Args:
         settings: such as device and batch, without those that are not set; handed to `load` or to
             the class where it takes an argument of that name.
+        timeout: seconds that a call may take; None for any.
+        note: is called with a line where a call takes long.
 
     Raises ModelError for a file that cannot be imported, holds no model, or takes no such setting
     ("batch" only where there is no `infer_batch` either); OSError for the path.
     """
-    path = Path(path)
-    digest = _digest(path)
-    module = _imported(path)
-    make = getattr(module, "load", None)
-    if not callable(make):
-        make = None if callable(getattr(module, "infer", None)) else _only_class(module, path)
-    taken = {name: settings[name] for name in settings if make and accepts(make, name)}
-    model: Any = module
-    if make is not None:
-        with _guarded(path, f"{make.__name__}()"):
-            model = make(**taken)
-        model = module if model is None else model
-    infer, batch = getattr(model, "infer", None), getattr(model, "infer_batch", None)
-    if not callable(infer):
-        raise ModelError(path, f"no infer in {type(model).__name__}", EXPECTED, EXAMPLE)
-    for name in settings:
-        if name not in taken and not (name == "batch" and callable(batch)):
-            expected = f"a load() or a class that takes {name}"
-            if name == "batch":
-                expected += ", or infer_batch(images, intrinsics=None)"
-            raise ModelError(f"--{name}", f"{path}, which does not take it", expected)
-    return Model(path, infer, batch if callable(batch) else None, digest)
-
-
-def accepts(function: Callable[..., Any], name: str) -> bool:
-    """Return whether a function takes an argument of this name."""
+    model = Model(Path(path), timeout, note)
     try:
-        parameters = inspect.signature(function).parameters
-    except (TypeError, ValueError):  # of some built-in functions
-        return False
-    kinds = (p.kind for p in parameters.values())
-    return name in parameters or inspect.Parameter.VAR_KEYWORD in kinds
+        model.load(settings or {})
+        yield model
+    except BaseException:
+        model.kill()
+        raise
+    model.close()
 
 
 def _digest(path: Path) -> str:
@@ -103,51 +186,11 @@ def _digest(path: Path) -> str:
     return digest.hexdigest()
 
 
-def _imported(path: Path) -> ModuleType:
-    """Import a file as `python FILE` would: with its folder first among those of imports."""
-    name = path.stem if path.stem.isidentifier() and path.stem not in sys.modules else "user_model"
-    spec = importlib.util.spec_from_file_location(name, path)
-    if spec is None or spec.loader is None:
-        raise ModelError(path, f"the ending {path.suffix!r:.20}", "a Python file, .py")
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module  # dataclasses and pickle look a class up by its module
-    sys.path.insert(0, str(path.resolve().parent))
-    with _guarded(path, "import"):
-        spec.loader.exec_module(module)
-    return module
-
-
-def _only_class(module: ModuleType, path: Path) -> Any:
-    """Return the class of the file that has `infer`. Raises ModelError unless there is just one."""
-    classes = [
-        value
-        for value in vars(module).values()
-        if isinstance(value, type) and value.__module__ == module.__name__
-        if hasattr(value, "infer")
-    ]
-    if len(classes) != 1:
-        names = ", ".join(value.__name__ for value in classes)
-        found = f"{len(classes)} classes with infer: {names}" if classes else "no infer"
-        raise ModelError(path, found, EXPECTED, EXAMPLE)
-    return classes[0]
-
-
-@contextlib.contextmanager
-def _guarded(path: Path, where: str) -> Iterator[None]:
-    """Let the block print to standard error, and turn what it raises into a ModelError."""
-    try:
-        with contextlib.redirect_stdout(sys.stderr):
-            yield
-    except (Exception, SystemExit) as error:
-        found = f"{type(error).__name__}: {error}".strip().removesuffix(":")
-        place = f"{path}{_line(error, path)}: {where}"
-        raise ModelError(place, " ".join(found.split())[:400], "", "") from error
-
-
-def _line(error: BaseException, path: Path) -> str:
-    """Return the last line of the file that an error went through, in words; "" for none."""
-    if isinstance(error, SyntaxError) and error.filename == str(path):
-        return f", line {error.lineno}"
-    frames = traceback.extract_tb(error.__traceback__)
-    lines = [frame.lineno for frame in frames if frame.filename == str(path)]
-    return f", line {lines[-1]}" if lines else ""
+def _with_types(value: Any) -> Any:
+    """Return a value in which what was no plain one has its type's name, its shape and its text."""
+    if isinstance(value, SimpleNamespace):
+        shown = {"shape": value.shape, "__repr__": lambda self: str(value.text)}
+        return type(value.type, (), shown)()
+    if isinstance(value, dict):
+        return {name: _with_types(one) for name, one in value.items()}
+    return [_with_types(one) for one in value] if isinstance(value, list) else value

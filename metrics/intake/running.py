@@ -1,17 +1,17 @@
 """Run a model on every row of a file of rooms or questions, and write its submission."""
 
 import itertools
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from metrics.intake.importing import told_of_missing
 from metrics.intake.kept_rows import KeptRows, kept_rows
-from metrics.intake.model_file import Model, ModelError, accepts
+from metrics.intake.model_file import Model, ModelError
 from metrics.intake.outputs import Frame, Geometry, Missing, OutputError, read_output
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.writer import RoomPredictionWriter, as_array, write_answers
@@ -24,6 +24,7 @@ from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
+Begun = TypeVar("Begun")
 Progress = Callable[[int], Any]
 DEFAULT_BATCH = 8  # images, of a model that has infer_batch
 KIND = "file of rooms or questions"
@@ -125,7 +126,7 @@ def _run_rooms(
     settings: dict[str, Any], keep: str | None, progress: Progress,
 ) -> str:  # fmt: skip
     if call.intrinsics:
-        if not accepts(model.infer_batch or model.infer, "intrinsics"):
+        if not model.takes_intrinsics:
             found = f"infer of {model.path}, which takes none"
             raise ModelError("--intrinsics", found, "infer(image, intrinsics=None)")
         texts["notes"] = "\n".join(filter(None, (texts["notes"], TOLD)))
@@ -157,15 +158,17 @@ def _geometries(
     model: Model, rooms: RoomsFile, call: Call, kept: KeptRows
 ) -> Iterator[tuple[int, Geometry]]:
     """Yield what is predicted for each row, in order: kept, or from the model."""
-    size = call.batch if model.infer_batch else 1
+    size = call.batch if model.takes_batches else 1
     height, width = rooms.spec.height, rooms.spec.width
-    for start in range(0, len(rooms), size):
-        rows = range(start, min(start + size, len(rooms)))
-        stored = {row: kept.read(row) for row in rows}
-        todo = [row for row in rows if stored[row] is None]
-        outputs = dict(zip(todo, _outputs(model, rooms, call, todo), strict=True)) if todo else {}
-        for row in rows:
-            arrays = stored[row]
+
+    def begin(start: int) -> tuple[dict[int, Any], Callable[[], dict[int, Any]]]:
+        stored = {row: kept.read(row) for row in range(start, min(start + size, len(rooms)))}
+        todo = [row for row in stored if stored[row] is None]
+        return stored, _begun(model, rooms, call, todo) if todo else dict
+
+    for stored, wait in _one_ahead(begin, range(0, len(rooms), size)):
+        outputs = wait()
+        for row, arrays in stored.items():
             if arrays is not None:
                 yield row, _geometry(arrays)
                 continue
@@ -179,31 +182,46 @@ def _geometries(
             yield row, geometry
 
 
-def _outputs(model: Model, rooms: RoomsFile, call: Call, rows: Sequence[int]) -> Sequence[Any]:
-    """Return what the model returns for some rows. Raises ModelError."""
+def _one_ahead(begin: Callable[[int], Begun], items: Iterable[int]) -> Iterator[Begun]:
+    """Begin each item before the one before it is yielded: the model works meanwhile."""
+    before: list[Begun] = []
+    for item in items:
+        before.append(begin(item))
+        if len(before) > 1:
+            yield before.pop(0)
+    yield from before
+
+
+def _begun(
+    model: Model, rooms: RoomsFile, call: Call, rows: Sequence[int]
+) -> Callable[[], dict[int, Any]]:
+    """Let the model begin some rows; the function returned waits for what it returns for each.
+
+    Raises ModelError, and OutputError for a list of another length.
+    """
     images, cameras = [], []
     for row in rows:
         images.append(call.picture(rooms.read("image", row), rooms.place("image", row)))
         fov = float(rooms.read("camera/fov_y_degrees", row))
         size = rooms.spec.height, rooms.spec.width
         cameras.append(intrinsics(*size, fov, pixel_centers="half"))
-    if model.infer_batch is None:
-        told = [(camera,) if call.intrinsics else () for camera in cameras]
-        return [
-            model.call(model.infer, f"row {row}", image, *more)
-            for row, image, more in zip(rows, images, told, strict=True)
-        ]
+    if not model.takes_batches:
+        (row,), told = rows, cameras if call.intrinsics else []
+        one = model.begin("infer", f"row {row}", *images, *told)
+        return lambda: {row: one()}
     where = f"rows {rows[0]} to {rows[-1]}"
     batch = (np.stack(images), *([np.stack(cameras)] if call.intrinsics else []))
-    outputs = model.call(model.infer_batch, where, *batch)
-    if not isinstance(outputs, Sequence) or len(outputs) != len(rows):
-        found = f"{type(outputs).__name__}" + (
-            f" of {len(outputs)}" if isinstance(outputs, Sequence) else ""
-        )
-        raise OutputError(
-            f"{model.path}: {where}: infer_batch", found, f"a list of {len(rows)} dicts"
-        )
-    return outputs
+    several = model.begin("infer_batch", where, *batch)
+
+    def wait() -> dict[int, Any]:
+        outputs = several()
+        if not isinstance(outputs, list) or len(outputs) != len(rows):
+            count = f" of {len(outputs)}" if isinstance(outputs, list) else ""
+            place, found = f"{model.path}: {where}: infer_batch", type(outputs).__name__ + count
+            raise OutputError(place, found, f"a list of {len(rows)} dicts")
+        return dict(zip(rows, outputs, strict=True))
+
+    return wait
 
 
 def _arrays(geometry: Geometry) -> dict[str, Any]:
@@ -235,15 +253,20 @@ def _run_questions(
         settings |= {"data": questions.fingerprint or ""}
         with kept_rows(out, settings, keep) as kept:
             done = kept.count
-            for row in range(len(questions)):
+
+            def begin(row: int) -> tuple[int, Any, Callable[[], Any]]:
                 arrays = kept.read(row)
+                if arrays is not None:
+                    return row, arrays, lambda: None
+                images = call.picture(questions.read("questions", row), f"{data}: row {row}")
+                return row, None, model.begin("infer", f"row {row}", images[0], images[1:])
+
+            for row, arrays, wait in _one_ahead(begin, range(len(questions))):
+                where = f"{model.path}: row {row}: returned"
+                value = arrays["value"] if arrays else _answer(wait(), questions.answers, where)
                 if arrays is None:
-                    images = call.picture(questions.read("questions", row), f"{data}: row {row}")
-                    value = model.call(model.infer, f"row {row}", images[0], images[1:])
-                    where = f"{model.path}: row {row}: returned"
-                    arrays = {"value": _answer(value, questions.answers, where)}
-                    kept.write(row, arrays)
-                values.append(arrays["value"])
+                    kept.write(row, {"value": value})
+                values.append(value)
                 if values[-1].shape != values[0].shape:
                     where = f"{model.path}: row {row}: returned"
                     raise OutputError(where, "an index after scores, or scores after an index",

@@ -3,7 +3,6 @@
 import atexit
 import functools
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,8 +23,10 @@ from metrics.scoring.truth_digests import RowDigests, view_digests
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import Identity, RoomPredictions, on_any_machine, open_predictions
 from metrics.submissions.truths import read_true_view
+from scenegen.common.threads import one_thread
 from scenegen.files.cluster import Cluster
-from scenegen.files.workers import processors, worker_pool
+from scenegen.files.pool import LostWorkerError
+from scenegen.files.workers import in_processes, processors
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
@@ -78,7 +79,7 @@ def score_rows(
     if settings.cluster is not None:
         parts = _on_cluster(job, chunks, settings.cluster)
     elif processes == 1 or few:
-        parts = map(RowScorer(files, truth).score, chunks)
+        parts = _scored_here(RowScorer(files, truth), chunks)
     else:
         parts = _in_processes(job, chunks, processes)
     scored = []
@@ -193,14 +194,19 @@ class RowScorer:
         )
 
 
+def _scored_here(scorer: RowScorer, chunks: Sequence[Array]) -> Iterator[ScoredRows]:
+    with one_thread():
+        yield from map(scorer.score, chunks)
+
+
 def _in_processes(job: Job, chunks: Sequence[Array], processes: int) -> Iterator[ScoredRows]:
     """Yield what `RowScorer.score` gives for the chunks, in their order."""
     try:
-        with worker_pool(processes) as pool:
-            yield from pool.map(functools.partial(_score_in_worker, job), chunks)
-    except BrokenProcessPool as error:
+        yield from in_processes(functools.partial(_score_in_worker, job), chunks, processes)
+    except LostWorkerError as error:
         hint = "memory may be short: take fewer --processes"
-        raise ScoringError(job[0][0][0], "a process that scores was killed", "", hint) from error
+        what = f"a process that scores ended ({error.found})"
+        raise ScoringError(job[0][0][0], what, "", hint) from error
 
 
 def _on_cluster(job: Job, chunks: Sequence[Array], cluster: Cluster) -> Iterator[ScoredRows]:
@@ -223,8 +229,7 @@ def _opened(job: Job, opening: ExitStack) -> RowScorer:
 def _score_apart(job: Job, chunks: Sequence[Array]) -> list[ScoredRows]:
     """Score chunks with files that are opened for them alone; a cluster's worker lives on."""
     with ExitStack() as opening:
-        scorer = _opened(job, opening)
-        return [scorer.score(chunk) for chunk in chunks]
+        return list(_scored_here(_opened(job, opening), chunks))
 
 
 def _score_in_worker(job: Job, rows: Array) -> ScoredRows:

@@ -2,6 +2,7 @@
 
 import importlib.util
 import re
+import shlex
 import sys
 import warnings
 from collections.abc import Iterator
@@ -164,7 +165,10 @@ def needs(who: str, packages: tuple[str, ...], extra: str) -> None:
 
 
 def creation_command(program: str) -> str:
-    """Return the command line for a file to record, without options that change no byte."""
+    """Return the command line for a file to record, without options that change no byte.
+
+    A shell reads the words back as they were.
+    """
     words, recorded = iter(sys.argv[1:]), [program]
     for word in words:
         if word == "--overwrite":
@@ -173,4 +177,4 @@ def creation_command(program: str) -> str:
             next(words, None)
         elif word.partition("=")[0] not in WITHOUT_EFFECT:
             recorded.append(word)
-    return " ".join(recorded)
+    return shlex.join(recorded)

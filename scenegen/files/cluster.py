@@ -7,25 +7,28 @@ only here.
 import importlib
 import logging
 import os
+import subprocess
 import sys
 import threading
+import time
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import resource_tracker
 from typing import Any, TypeVar
 
 from scenegen.common.errors import SceneGenError
 from scenegen.common.signals import without_interrupts
 from scenegen.files.places import lacking
+from scenegen.files.pool import ended, python_command
 
 T = TypeVar("T")
 Task = TypeVar("Task")
 LOCAL = "local"
 LOGGING = "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED"  # which Dask's processes read as they start
 BATCH = 200  # tasks that the scheduler is told of at once, as each message costs milliseconds
-PATIENCE = 10  # seconds in which a scheduler must answer
+PATIENCE = 10  # seconds in which a scheduler must answer, or workers must end
+MOMENT = 0.05  # seconds between two looks whether workers are there
 _one_at_a_time = threading.Lock()  # Mitsuba and HDF5 take one task in a process
 Versions = Callable[[], Mapping[str, str]]
 
@@ -147,22 +150,52 @@ def connected(
 @contextmanager
 def _client(distributed: Any, scheduler: str, workers: int) -> Iterator[Any]:
     if scheduler == LOCAL:
-        resource_tracker.ensure_running()  # else a worker starts it, which lets Ctrl-C through
+        address = "127.0.0.1:0"
         with without_interrupts():
-            cluster = distributed.LocalCluster(
-                n_workers=max(1, workers), threads_per_worker=1, dashboard_address="127.0.0.1:0"
-            )
-        with cluster, distributed.Client(cluster) as client:
+            cluster = distributed.LocalCluster(n_workers=0, dashboard_address=address)
+        with (
+            cluster,
+            distributed.Client(cluster) as client,
+            _workers_here(client, cluster.scheduler_address, max(1, workers)),
+        ):
             yield client
         return
     try:
         client = distributed.Client(scheduler, timeout=PATIENCE)
-    except (OSError, ValueError, TimeoutError) as error:
+    except Exception as error:  # Dask raises whatever its transports do
         what = f"--scheduler {scheduler}: no scheduler answers ({type(error).__name__})"
         expected = "the address of a Dask scheduler, such as tcp://host:8786, or local"
-        raise SceneGenError(what, expected=expected) from error
+        hint = "tell Dask where its certificates are: distributed.comm.tls in its configuration"
+        hint = hint if scheduler.startswith("tls:") else ""
+        raise SceneGenError(what, expected=expected, hint=hint) from error
     with client:
         yield client
+
+
+@contextmanager
+def _workers_here(client: Any, address: str, count: int) -> Iterator[None]:
+    """Start so many workers of a scheduler, by a process that starts them again if they die.
+
+    `LocalCluster` would start them by `multiprocessing`, which imports the caller's main module.
+    """
+    words = [address, "--nworkers", str(count), "--nthreads", "1", "--no-dashboard"]
+    code = f"from distributed.cli.dask_worker import main; main({words!r})"
+    with without_interrupts():
+        starter = subprocess.Popen(python_command(code), stdin=subprocess.DEVNULL)
+    try:
+        while len(client.scheduler_info(n_workers=-1)["workers"]) < count:
+            if starter.poll() is not None:
+                what = f"Workers of Dask cannot be started here ({ended(starter.returncode)})"
+                raise SceneGenError(what, hint="use no --scheduler")
+            time.sleep(MOMENT)
+        yield
+    finally:
+        starter.terminate()
+        try:
+            starter.wait(PATIENCE)
+        except subprocess.TimeoutExpired:
+            starter.kill()
+            starter.wait()
 
 
 @contextmanager

@@ -211,9 +211,11 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
 
     Asking a virtual data set for its shape would open the files that it is made of.
     """
-    storage = dataset.get_create_plist()
-    layout = storage.get_layout()
-    if layout == h5d.VIRTUAL or storage.get_external_count():
+    with storage_of(dataset) as storage:
+        layout, external = storage.get_layout(), storage.get_external_count()
+        chunks = storage.get_chunk() if layout == h5d.CHUNKED else ()
+        used = [storage.get_filter(i)[0] for i in range(storage.get_nfilters())]
+    if layout == h5d.VIRTUAL or external:
         expected = "values in this file itself"
         yield Fault(
             name, "link", "values that lie in another file", expected, layout == h5d.VIRTUAL
@@ -227,13 +229,11 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
         if math.prod(shape) and not written and dataset.shape is not None:
             yield Fault(name, "written", f"shape {shape}, but nothing was written", "values")
         return
-    chunks = storage.get_chunk()
     slab = slab_bytes(shape, chunks, size)
     if slab > MOST_BYTES:
         found = f"chunks {chunks}, so that a row takes {slab >> 20} MiB to unpack"
         expected = f"at most {MOST_BYTES >> 20} MiB (store one row to a chunk)"
         yield Fault(name, "chunks", found, expected)
-    used = [storage.get_filter(i)[0] for i in range(storage.get_nfilters())]
     filters = [FILTERS.get(code, (f"filter {code}", -1)) for code in used]
     places = [place for _, place in filters]
     if -1 in places or places != sorted(set(places)):
@@ -251,15 +251,42 @@ def _dataset_faults(name: str, dataset: Any) -> Iterator[Fault]:
         yield Fault(name, "written", found, "chunks of the size that their shape has")
 
 
+@contextmanager
+def storage_of(dataset: Any) -> Iterator[Any]:
+    """Give the creation properties of a low-level data set, and close them after the block.
+
+    HDF5 crashes as the process ends where those of a virtual data set are still open then, held by
+    a traceback perhaps. `Dataset.is_virtual` and the like of h5py keep them with the data set.
+    """
+    storage = dataset.get_create_plist()
+    try:
+        yield storage
+    finally:
+        storage.close()
+
+
+def is_virtual(dataset: h5py.Dataset) -> bool:
+    """Return whether the values of a data set lie in others."""
+    with storage_of(dataset.id) as storage:
+        return bool(storage.get_layout() == h5d.VIRTUAL)
+
+
 def virtual_sources(dataset: h5py.Dataset) -> list[tuple[str, str, int, int]]:
     """Return what a virtual data set shows: files, data sets in them, first row here, and rows.
 
     A source of which not all rows are shown in their order has -1 rows.
     """
-    listed, sources = dataset.id.get_create_plist(), []
-    for i in range(listed.get_virtual_count()):
-        name = listed.get_virtual_filename(i), listed.get_virtual_dsetname(i)
-        here, there = listed.get_virtual_vspace(i), listed.get_virtual_srcspace(i)
+    with storage_of(dataset.id) as listed:
+        mapped = [
+            (
+                (listed.get_virtual_filename(i), listed.get_virtual_dsetname(i)),
+                listed.get_virtual_vspace(i),
+                listed.get_virtual_srcspace(i),
+            )
+            for i in range(listed.get_virtual_count())
+        ]
+    sources = []
+    for name, here, there in mapped:
         (first, *low), (last, *high) = here.get_select_bounds()
         rows, shape = last - first + 1, here.get_simple_extent_dims()[1:]
         whole = not any(low) and tuple(high) == tuple(size - 1 for size in shape)
@@ -288,8 +315,8 @@ class StoredArray:
         self.dataset = dataset
         self.shape: tuple[int, ...] = dataset.shape or ()
         self.dtype, self.attrs = dataset.dtype, dataset.attrs
-        storage = dataset.id.get_create_plist()
-        self._filters = [storage.get_filter(i)[0] for i in range(storage.get_nfilters())]
+        with storage_of(dataset.id) as storage:
+            self._filters = [storage.get_filter(i)[0] for i in range(storage.get_nfilters())]
         plain = {h5z.FILTER_SHUFFLE, h5z.FILTER_DEFLATE}.issuperset(self._filters)
         as_stored = self.dtype.kind in "iuf" and dataset.id.get_type() == h5t.py_create(self.dtype)
         self._own = plain and as_stored and dataset.chunks == (1, *self.shape[1:])

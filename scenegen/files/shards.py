@@ -31,8 +31,10 @@ from scenegen.files.input_file import (
     checking,
     describing,
     faults,
+    is_virtual,
     open_file,
     open_unchecked,
+    storage_of,
     virtual_sources,
 )
 from scenegen.files.places import as_place, is_remote
@@ -168,12 +170,12 @@ class OpenFile:
         dataset = self.file.get(name)
         if not isinstance(dataset, h5py.Dataset):
             raise FileFormatError(f"{self.path}: {name}", "no dataset of this name", "one")
-        return JoinedArray(self, dataset) if dataset.is_virtual else StoredArray(dataset)
+        return JoinedArray(self, dataset) if is_virtual(dataset) else StoredArray(dataset)
 
     def numbers(self, dataset: h5py.Dataset) -> list[int]:
         """Return which shards hold the rows of a virtual data set."""
-        storage = dataset.id.get_create_plist()
-        first = storage.get_virtual_filename(0) if storage.get_virtual_count() else None
+        with storage_of(dataset.id) as storage:
+            first = storage.get_virtual_filename(0) if storage.get_virtual_count() else None
         part = next((shard.part for shard in self.shards if shard.file == first), None)
         return [i for i, shard in enumerate(self.shards) if shard.part == part]
 

@@ -1,27 +1,21 @@
-"""Work in threads and processes; processes end with the one that started them, however it ends."""
+"""Work spread over threads and processes, and how many processors there are for it."""
 
 import math
-import multiprocessing
 import os
-import threading
 import warnings
 from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Generator, Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from functools import partial
-from multiprocessing.context import SpawnContext, SpawnProcess
 from pathlib import Path
 from typing import Any, TypeVar
 
-from scenegen.common.errors import SceneGenError
-from scenegen.common.signals import without_interrupts
+from scenegen.files.pool import worker_pool
 
 T = TypeVar("T")
 Task = TypeVar("Task")
 Made = Callable[[Task], Generator[T, None, Any]]
-PATIENCE = 5.0  # seconds, until a killed process is gone
 AHEAD = 2  # tasks for each process that are begun, or done and not yet taken
 
 
@@ -125,90 +119,18 @@ def in_processes(function: Callable[[Task], T], tasks: Iterable[Task], count: in
     The function is pickled once for each process. At most AHEAD tasks for each process are begun
     before their results are taken. Warnings are given again here, where Python drops repeated ones.
 
-    Raises what the function raises, and SceneGenError where a process ends by itself.
+    Raises what the function raises, and as `worker_pool`.
     """
-    done = False
-    try:
-        with worker_pool(count, function) as pool:
-            ahead = AHEAD * count - 1
-            results = _oldest_first(lambda task: pool.submit(_do, task), tasks, ahead)
-            for result, caught in results:
-                for text, category in caught:
-                    warnings.warn(text, category, stacklevel=2)
-                yield result
-                done = True
-    except BrokenProcessPool as error:
-        what = "A worker process was killed, probably because memory ran out"
-        guard = 'call it inside `if __name__ == "__main__":`, or use one worker'
-        hint = "use fewer --workers"
-        hint = hint if done else f"{hint}; in a script of your own, {guard}"
-        raise SceneGenError(what, hint=hint) from error
+    with worker_pool(count, partial(_with_warnings, function)) as pool:
+        for result, caught in _oldest_first(pool.submit, tasks, AHEAD * count - 1):
+            for text, category in caught:
+                warnings.warn(text, category, stacklevel=2)
+            yield result
 
 
-class _Worker(SpawnProcess):
-    def start(self) -> None:
-        """Start a process that never sees Ctrl-C, which a terminal sends to all processes."""
-        with without_interrupts():
-            super().start()
-
-
-class _Spawning(SpawnContext):
-    Process = _Worker
-
-
-@contextmanager
-def worker_pool(
-    count: int, function: Callable[[Any], Any] | None = None
-) -> Iterator[ProcessPoolExecutor]:
-    """Open a pool of spawned processes: forked ones would share open files and threads' locks.
-
-    The block waits for them at its end. Where it ends by an error, they are killed instead.
-    """
-    with _processes_to_be_had():
-        pool = ProcessPoolExecutor(count, _Spawning(), _begin, (function,))
-    try:
-        yield pool
-    except BaseException:
-        # A process that was being started when Ctrl-C came is not listed; it ends by itself.
-        processes = list((pool._processes or {}).values())
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes:
-            process.kill()
-        for process in processes:
-            process.join(PATIENCE)
-        raise
-    pool.shutdown()
-
-
-@contextmanager
-def _processes_to_be_had() -> Iterator[None]:
-    """Turn an error of the system about processes into one that does not blame the output."""
-    try:
-        yield
-    except (OSError, ImportError, NotImplementedError) as error:
-        what = f"Worker processes cannot be started here ({error})"
-        hint = "use --workers 1; in a container, let /dev/shm be written to"
-        raise SceneGenError(what, hint=hint) from error
-
-
-_Warning = tuple[str, type[Warning]]
-_work: list[Callable[[Any], Any]] = []  # of this process, if it is a worker of `in_processes`
-
-
-def _do(task: Any) -> tuple[Any, list[_Warning]]:
+def _with_warnings(
+    function: Callable[[Task], T], task: Task
+) -> tuple[T, list[tuple[str, type[Warning]]]]:
     with warnings.catch_warnings(record=True) as caught:
-        result = _work[0](task)
+        result = function(task)
     return result, [(str(warning.message), warning.category) for warning in caught]
-
-
-def _begin(function: Callable[[Any], Any] | None) -> None:
-    """Keep what this process is to do, and end it when the one that started it is gone."""
-    _work[:] = [] if function is None else [function]
-    threading.Thread(target=_end_after_parent, daemon=True).start()
-
-
-def _end_after_parent() -> None:
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

@@ -60,8 +60,7 @@ def make_dataset(
             machine, or on a worker of the cluster, and uploaded when it is complete.
         batch: images rendered at once; it bounds memory and changes no byte of the file.
         workers: processes that render; 0 for one a processor where that is worth while. They
-            change no byte either. More than one need a script whose own work is inside
-            `if __name__ == "__main__":`, and `objects` that can be pickled.
+            change no byte either. More than one need `objects` that can be pickled.
         shard_size: if there are more scenes, they go to shards of so many beside `path`, which then
             shows all of them as one. The same call goes on where an earlier one was killed.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.

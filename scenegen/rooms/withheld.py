@@ -10,6 +10,7 @@ from pathlib import Path
 import h5py
 
 from scenegen.common.errors import FileFormatError
+from scenegen.files.input_file import is_virtual
 from scenegen.files.row_file import new_file
 from scenegen.layout import WITHHELD
 from scenegen.rooms.reader import INPUT, RoomsFile
@@ -45,7 +46,7 @@ def withhold_truth(truth: str | Path, out: str | Path, overwrite: bool = False) 
         source = rooms.opened.file
         if not rooms.has_truth:
             raise FileFormatError(truth, "rooms without truth", "a whole file of rooms")
-        if any(source[name].is_virtual for name in INPUT):
+        if any(is_virtual(source[name]) for name in INPUT):
             hint = "merge it with `scenegen merge`, or render with a larger --shard-size"
             raise FileFormatError(truth, "a set of shards", "one file", hint)
         for name in INPUT:

@@ -50,6 +50,7 @@ def test_entries_score_letters() -> None:
     entry = entries[0]
     assert entries.score_answer(f"**{entry['answer']}**", entry) == 1.0
     assert entries.score_answer("A or B", entry) == 0.0
+    assert entries.score_answer(None, entry) == 0.0
 
 
 @pytest.mark.parametrize(

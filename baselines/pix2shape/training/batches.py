@@ -4,12 +4,14 @@ So training can go on where it was stopped, and every process can take its share
 """
 
 import re
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import torch
+from threadpoolctl import threadpool_limits
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset, default_collate
 
@@ -143,15 +145,23 @@ def question_batches(
         yield source.as_batch(items), items["answer"]
 
 
+def _use_one_thread(_worker: int) -> None:
+    threadpool_limits(1)
+
+
 def _loaded(
     source: RoomImages | QuestionImages, draws: Draws, workers: int
 ) -> Iterator[dict[str, Tensor]]:
     """Yield batch after batch without end, read by so many processes."""
+    # A fork needs nothing of the caller's main module, whatever start method the caller chose.
+    forks = "fork" if workers and sys.platform == "linux" else None
     loader = DataLoader(
         _Catching(source),
         batch_sampler=draws,
         num_workers=workers,
         collate_fn=_collated,
+        multiprocessing_context=forks,
+        worker_init_fn=_use_one_thread,
     )
     for items in loader:
         if isinstance(items, Exception):

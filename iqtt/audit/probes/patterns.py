@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.probes.trees import one_thread
 from scenegen.common.random.seeding import Purpose, item_rng
+from scenegen.common.threads import one_thread
 
 Array = NDArray[Any]
 PATTERNS, SIDE = 24, 3  # how many, and pixels a side

@@ -35,7 +35,8 @@ from numpy.typing import NDArray
 from iqtt.audit.features.outlines import nearest_outline
 from iqtt.audit.features.statistics import THUMBNAIL
 from iqtt.audit.probes.patterns import pattern_responses
-from iqtt.audit.probes.trees import FOLDS, among_others, choose, next_to_reference, one_thread
+from iqtt.audit.probes.trees import FOLDS, among_others, choose, next_to_reference
+from scenegen.common.threads import one_thread
 
 Array = NDArray[Any]
 WITHOUT, LIGHT, MIRRORED = "without the reference", "light", "mirrored"

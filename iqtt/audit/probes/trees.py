@@ -6,12 +6,12 @@ So the trees are the same for all places of an answer, and for any number of ans
 input gives the same bits: random choices have a fixed seed, and sums one thread.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from scenegen.common.threads import one_thread
 
 Array = NDArray[Any]
 FOLDS = 5  # of the cross-validation
@@ -112,12 +112,3 @@ def _least_of_others(values: Array) -> Array:
     """Return for each answer the least value of the others, (N, K, D)."""
     order = np.sort(values, axis=1)
     return np.where(values == order[:, :1], order[:, 1:2], order[:, :1])
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Use one thread: sums then have one order, so that the same input gives the same bits."""
-    from threadpoolctl import threadpool_limits
-
-    with threadpool_limits(1):
-        yield

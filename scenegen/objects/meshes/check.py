@@ -2,15 +2,13 @@
 
 import time
 import warnings
-from collections import deque
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, wait
-from concurrent.futures.process import BrokenProcessPool
+from concurrent.futures import as_completed
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
-from scenegen.common.errors import SceneGenError
-from scenegen.files.workers import worker_pool
+from scenegen.files.pool import LostWorkerError, worker_pool
 from scenegen.objects.cache import DiskCache
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFile, ModelFolder
@@ -88,7 +86,7 @@ def _check(file: ModelFile, up: str, cache: DiskCache) -> ModelCheck:
     return ModelCheck(file.name, True, "", len(model.faces), model.mended, seconds)
 
 
-def _check_in_worker(file: ModelFile, up: str, cache_dir: Path | None) -> ModelCheck:
+def _check_in_worker(up: str, cache_dir: Path | None, file: ModelFile) -> ModelCheck:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # the caller has already warned about the cache
         return _check(file, up, DiskCache(cache_dir))
@@ -97,40 +95,13 @@ def _check_in_worker(file: ModelFile, up: str, cache_dir: Path | None) -> ModelC
 def _in_processes(
     files: Sequence[ModelFile], up: str, cache_dir: Path | None, jobs: int
 ) -> Iterator[ModelCheck]:
-    """Check the files in processes. If one dies, try the models it was working on one by one."""
-    waiting = deque(files)
-    while waiting:
-        lost: list[ModelFile] = []
-        yield from _until_one_dies(waiting, up, cache_dir, jobs, lost)
-        for file in lost:
-            guilty: list[ModelFile] = []
-            yield from _until_one_dies(deque([file]), up, cache_dir, 1, guilty)
-            if guilty:
-                reason = "the process that read it died (too little memory, or a crash)"
-                yield ModelCheck(file.name, False, f"{reason}; simplify the model", 0)
-
-
-def _until_one_dies(
-    waiting: deque[ModelFile], up: str, cache_dir: Path | None, jobs: int, lost: list[ModelFile]
-) -> Iterator[ModelCheck]:
-    """Check the files that wait. If a process dies, stop and put the unfinished ones in `lost`."""
-    running: dict[Future[ModelCheck], ModelFile] = {}
-    with worker_pool(jobs) as pool:
-        try:
-            pool.submit(time.perf_counter).result()
-        except BrokenProcessPool as error:  # before any model was read
-            hint = 'call it inside `if __name__ == "__main__":`, or with jobs=1'
-            raise SceneGenError(
-                "check_models", "worker processes that ended as soon as they began", hint=hint
-            ) from error
-        try:
-            while waiting or running:
-                while waiting and len(running) < 2 * jobs:
-                    file = waiting.popleft()
-                    running[pool.submit(_check_in_worker, file, up, cache_dir)] = file
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    record = future.result()
-                    del running[future]
-                    yield record
-        except BrokenProcessPool:
-            lost.extend(running.values())
+    """Check the files in processes; the model of one that ends by itself is refused."""
+    with worker_pool(jobs, partial(_check_in_worker, up, cache_dir)) as pool:
+        running = {pool.submit(file): file for file in files}
+        for future in as_completed(running):
+            try:
+                yield future.result()
+            except LostWorkerError as error:
+                name, cause = running[future].name, "too little memory, or a crash"
+                reason = f"the process that read it ended with {error.found} ({cause})"
+                yield ModelCheck(name, False, f"{reason}; simplify the model", 0)

@@ -97,7 +97,7 @@ def test_a_process_that_is_killed_ends_the_other_with_one_line(folder, check_ref
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = str(probe.getsockname()[1])
-    meeting = {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port, "OMP_NUM_THREADS": "1"}
+    meeting = {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port}
     line = f"train {LARGE} --device cpu --nodes 2 --every 1 --set networks.width=0.05"
     command = [sys.executable, "-W", "ignore", "-c", "import cli; cli.pix2shape()", *line.split()]
     first, second = (

@@ -73,7 +73,7 @@ def folder(
             return to
         (top / "runs").write_text(json.dumps([run]))
         command = [sys.executable, "-W", "ignore", shared_training.__file__, top / "runs"]
-        more = {"PYTHONPATH": str(Path(__file__).parents[3]), "OMP_NUM_THREADS": "1"}
+        more = {"PYTHONPATH": str(Path(__file__).parents[3])}
         subprocess.run(command, timeout=300, check=True, env={**os.environ, **more})
         return to
 

@@ -1,9 +1,16 @@
 """Models of many shapes are run, resumed and refused."""
 
+import os
+import sys
+import time
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from metrics.intake.model_file import ModelError, load_model
+from metrics.intake import model_file
+from metrics.intake.model_file import ModelError, opened_model
+from metrics.intake.model_runner import plain
 from metrics.intake.running import Call, run_model
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
@@ -20,16 +27,16 @@ INFER = f"import numpy as np\ndef infer(image, intrinsics=None):\n    return {WA
 def run(truths, tmp_path):
     """Run the text of a model; return what was said. The submission is at `run.out`."""
 
-    def go(text, data=truths.rooms, load=None, keep=None, **call):
+    def go(text, data=truths.rooms, load=None, keep=None, timeout=None, **call):
         path = tmp_path / "my_model.py"
         path.write_text(text)
-        model = load_model(path, load or {})
-        return run_model(
-            model, data, go.out, call=Call(**call), method="m", overwrite=True, keep=keep,
-            options=load,
-        )  # fmt: skip
+        with opened_model(path, load, timeout, go.notes.append) as model:
+            return run_model(
+                model, data, go.out, call=Call(**call), method="m", overwrite=True, keep=keep,
+                options=load,
+            )  # fmt: skip
 
-    go.out = tmp_path / "p.h5"
+    go.out, go.notes = tmp_path / "p.h5", []
     return go
 
 
@@ -192,6 +199,102 @@ def test_rows_of_another_model_are_not_mixed_in_silence(run, tmp_path):
     run(other, keep="restart")
     with open_predictions(run.out) as found:
         assert found.depth(4)[0, 0] == 2.5
+
+
+# ---- a process of its own ----
+
+
+def test_the_model_may_change_its_folder(run, tmp_path, monkeypatch, truths):
+    """As many do to find their weights; the paths of the run stay what they are."""
+    monkeypatch.chdir(tmp_path)
+    run.out = Path("p.h5")
+    assert run("import os; os.chdir('/')\n" + INFER, Path(os.path.relpath(truths.rooms))) == (
+        "depth_metric of 8 rows"
+    )
+    assert (tmp_path / "p.h5").exists()
+
+
+def test_names_of_ours_in_the_folder_of_the_model_are_its_own(run, tmp_path):
+    for name in ("metrics", "baselines", "scenegen", "iqtt"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "__init__.py").write_text("depth = 1.5\n")
+    for name in ("cli", "outputs", "running", "model_runner", "matching"):
+        (tmp_path / f"{name}.py").write_text("depth = 1.5\n")
+    text = "import numpy as np\nfrom {0} import depth\nimport {1}\nassert {1}.depth == depth\n"
+    text = "".join(text.format(*names) for names in [("metrics", "cli"), ("scenegen", "outputs"),
+                   ("baselines", "running"), ("iqtt", "model_runner")])  # fmt: skip
+    run(text + f"def infer(image): return {WALL.replace('1.5', 'depth')}\n")
+    with open_predictions(run.out) as found:
+        assert found.depth(7)[0, 0] == 1.5
+
+
+def test_nothing_of_ours_is_loaded_and_no_variable_limits_its_threads(run):
+    run(
+        "import os, sys\n"
+        "ours = {'scenegen', 'iqtt', 'metrics', 'baselines', 'cli', 'click', 'h5py'}\n"
+        "assert not ours & {name.partition('.')[0] for name in sys.modules}\n"
+        f"assert os.environ.get('OMP_NUM_THREADS') == {os.environ.get('OMP_NUM_THREADS')!r}\n"
+        + INFER
+    )
+
+
+def gone(group):
+    for _ in range(100):
+        try:
+            os.killpg(group, 0)
+        except ProcessLookupError:
+            return True
+        time.sleep(0.1)
+    return False
+
+
+ENDS = {
+    "crash": ("import ctypes; ctypes.string_at(0)", "SIGSEGV"),
+    "exit": ("import os; os._exit(0)", "exit code 0"),
+    "killed": ("import os; os.kill(os.getpid(), 9)", "SIGKILL"),
+    "hang": ("import time; time.sleep(1000)", "no answer after 2 s"),
+    "hang in C": ("import ctypes; ctypes.PyDLL(None).sleep(1000)", "no answer after 2 s"),
+    "child": ("import os; os.fork() and os._exit(3); import time; time.sleep(1000)", "code 3"),
+}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="signals of Linux")
+@pytest.mark.parametrize("how", ENDS)
+def test_what_ends_or_hangs_is_named_by_its_row_and_rows_are_kept(how, run, tmp_path, monkeypatch):
+    monkeypatch.setattr(model_file, "SILENCE", 0.5)
+    code, words = ENDS[how]
+    text = f"import os\nopen({str(tmp_path / 'group')!r}, 'w').write(str(os.getpgid(0)))\n"
+    text += INFER.replace("    return", f"    if next(N) == 5:\n        {code}\n    return")
+    with pytest.raises(ModelError) as caught:
+        run(f"import itertools\nN = itertools.count()\n{text}", timeout=2)
+    assert "row 5" in caught.value.where
+    assert words in caught.value.found
+    assert len(list((tmp_path / "p.h5.rows").glob("*.npz"))) == 5
+    assert any("row 5" in note for note in run.notes) == ("hang" in how)
+    assert gone(int((tmp_path / "group").read_text())), "the model, or what it has started, lives"
+    assert run(INFER, keep="resume") == "depth_metric of 8 rows, 5 of them from an earlier run"
+
+
+def test_what_a_model_prints_and_reads_is_kept_apart(run, capfd):
+    text = "import os, sys\nos.write(1, b'loud\\n')\nassert sys.stdin.read() == ''\n"
+    run(text + INFER.replace("    return", "    print('row')\n    return"))
+    out, err = capfd.readouterr()
+    assert (out, err.count("row\n"), err.count("loud\n")) == ("", 8, 1)
+
+
+VALUES = {
+    "np.float32(3)": 3.0, "torch.ones(2, requires_grad=True) * 3": [3.0, 3.0],
+    "[[1, 2], [3, 4]]": [[1, 2], [3, 4]], "torch.ones(1, dtype=torch.bfloat16)": [1.0],
+    "[torch.ones(2), np.zeros(2)]": [[1.0, 1.0], [0.0, 0.0]],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("value", VALUES)
+def test_values_arrive_as_they_are(value):
+    import torch
+
+    found = np.asarray(plain(eval(value, {"np": np, "torch": torch})))
+    assert np.array_equal(found, VALUES[value])
 
 
 # ---- refusals ----

@@ -71,6 +71,14 @@ def test_the_batch_is_not_recorded(monkeypatch, batch):
     assert creation_command("scenegen") == "scenegen render --n 5"
 
 
+def test_a_recorded_command_can_be_pasted(monkeypatch):
+    words = ["render", "--out", "my rooms.h5", "--objects-root", "it's $HOME; rm *", "--seed", "1"]
+    monkeypatch.setattr(sys, "argv", ["/x/scenegen", *words])
+    shell = ["sh", "-c", f"printf '%s\\n' {creation_command('scenegen')}"]
+    done = subprocess.run(shell, capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == ["scenegen", *words]
+
+
 @pytest.mark.parametrize(
     ("arguments", "alike"),
     [

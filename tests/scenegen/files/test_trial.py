@@ -1,6 +1,9 @@
 """Files on which HDF5 itself hangs or crashes, found by changing bytes of files that it wrote."""
 
+import os
 import shutil
+import subprocess
+import sys
 import zlib
 from pathlib import Path
 
@@ -66,6 +69,48 @@ def test_files_that_another_process_can_read(rooms_path, tmp_path, monkeypatch):
     with pytest.raises(FileFormatError) as error:
         try_file(path)
     assert "had not read after 0 s" in error.value.found
+
+
+LIMITED = """
+import resource, sys
+from scenegen.files import trial
+kind, most = getattr(resource, sys.argv[2]), int(sys.argv[3])
+import numpy, h5py  # of the program, which needs no more memory then
+resource.setrlimit(kind, (most, most))
+if len(sys.argv) > 4:
+    trial.python_command = lambda code: [sys.executable, "-c", sys.argv[4]]
+try:
+    trial.try_file(sys.argv[1])
+except trial.FileFormatError as error:
+    print("file:", error)
+except trial.SceneGenError as error:
+    print("trial:", error)
+"""
+BUSY = "print('ready cpu', flush=True)\nwhile True: pass"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="limits of Linux")
+@pytest.mark.parametrize(
+    ("name", "kind", "most", "code", "said"),
+    [
+        ("sound", "RLIMIT_AS", 2 * 10**9, "", ""),
+        ("sound", "RLIMIT_CPU", 5, "", ""),
+        ("crashes", "RLIMIT_CPU", 5, "", "file: "),
+        ("sound", "RLIMIT_CPU", 1, BUSY, "trial: "),
+        ("sound", "RLIMIT_AS", 2 * 10**9, "print('ready memory'); exit(3)", "trial: "),
+        ("sound", "RLIMIT_AS", 2 * 10**9, "1 / 0", "trial: "),
+    ],
+)
+def test_limits_of_this_process_are_no_fault_of_the_file(
+    name, kind, most, code, said, broken, rooms_path
+):
+    path = rooms_path if name == "sound" else broken(name)
+    words = [sys.executable, "-c", LIMITED, path, kind, str(most), *filter(None, [code])]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    done = subprocess.run(words, capture_output=True, text=True, check=False, env=environment)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(said)
+    assert bool(done.stdout) == bool(said)
 
 
 @pytest.mark.tried

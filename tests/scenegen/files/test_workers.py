@@ -8,20 +8,22 @@ import signal
 import subprocess
 import sys
 import warnings
+from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
 
 from scenegen.common.errors import SceneGenError
-from scenegen.files import workers
+from scenegen.files import pool, workers
+from scenegen.files.pool import LostWorkerError
 from scenegen.files.workers import in_order, in_processes, in_threads
 
 BUSY = """
 import sys, time
-from scenegen.files.workers import worker_pool
+from scenegen.files.pool import worker_pool
 try:
-    with worker_pool(2) as pool:
-        tasks = [pool.submit(time.sleep, seconds) for seconds in (float(sys.argv[1]), 0.1)]
+    with worker_pool(2, time.sleep) as pool:
+        tasks = [pool.submit(seconds) for seconds in (float(sys.argv[1]), 0.1)]
         tasks[1].result()  # one process is busy now, and the other waits
         time.sleep(0.3)
         print("busy", flush=True)
@@ -103,9 +105,9 @@ def _strange(task):
 
 
 def test_a_process_that_ends_by_itself_is_told():
-    with pytest.raises(SceneGenError) as refused:
+    with pytest.raises(LostWorkerError) as lost:
         list(in_processes(os._exit, [1, 2, 3], 2))
-    assert "worker process" in refused.value.where
+    assert lost.value.found.startswith("exit code")
 
 
 def test_processors_are_those_of_the_cgroup(tmp_path):
@@ -127,10 +129,88 @@ def test_processors_are_those_of_the_cgroup(tmp_path):
     assert 1 <= workers.processors() <= os.cpu_count()
 
 
-@pytest.mark.parametrize("error", [OSError(errno.EROFS, "Read-only"), NotImplementedError("few")])
-def test_where_no_processes_are_to_be_had_workers_are_named(monkeypatch, error):
-    """As where /dev/shm cannot be written to; the output is not blamed."""
-    monkeypatch.setattr(workers, "ProcessPoolExecutor", Mock(side_effect=error))
+def test_where_no_processes_are_to_be_had_workers_are_named(monkeypatch):
+    """As where no memory is left; the output is not blamed."""
+    monkeypatch.setattr(pool.subprocess, "Popen", Mock(side_effect=OSError(errno.ENOMEM, "No")))
     with pytest.raises(SceneGenError) as refused:
-        list(workers.in_processes(abs, [1], 2))
+        list(in_processes(abs, [1], 2))
     assert "--workers" in refused.value.hint
+
+
+def test_a_process_that_cannot_begin_is_no_fault_of_a_task(monkeypatch):
+    monkeypatch.setattr(pool.sys, "executable", "/bin/false")
+    with pytest.raises(SceneGenError) as refused:
+        list(in_processes(abs, [1], 2))
+    assert not isinstance(refused.value, LostWorkerError)
+
+
+class Unreadable(Exception):
+    def __init__(self, one, two):
+        super().__init__(one)
+
+
+def _awkward(task):
+    raise Unreadable("a", lambda: "b") if task else SystemExit(3)
+
+
+def test_errors_that_cannot_be_passed_on():
+    with pytest.raises(TypeError):
+        list(in_processes(_awkward, [1], 1))
+    with pytest.raises(LostWorkerError) as lost:
+        list(in_processes(_awkward, [0], 1))
+    assert lost.value.found == "exit code 3"
+
+
+def test_a_pool_goes_on_after_a_process_ended():
+    with pool.worker_pool(1, _strange_end) as workers:
+        ends = [workers.submit(task).exception() for task in (0, 1, 0)]
+    assert [end is None for end in ends] == [True, False, True]
+
+
+def _strange_end(task):
+    if task:
+        os._exit(0)
+
+
+def _threads(_task):
+    import numpy  # noqa: F401
+    import scipy.linalg  # noqa: F401
+    from threadpoolctl import threadpool_info
+
+    return [library["num_threads"] for library in threadpool_info()]
+
+
+def test_libraries_of_a_process_use_one_thread():
+    found = next(in_processes(_threads, [0], 1))
+    assert set(found) == {1}
+
+
+SCRIPT = """
+import sys
+print("once")
+import pathlib
+pathlib.Path("ran").open("a").write("x")
+from scenegen.files.workers import in_processes
+print(list(in_processes(abs, [-1, 2, -3], 2)))
+"""
+
+
+@pytest.mark.parametrize("how", ["script", "stdin", "module", "inside", "thread"])
+def test_a_script_without_a_guard_runs_once(how, tmp_path):
+    """Nothing of the main module is needed, whatever that is."""
+    text = SCRIPT
+    if how == "thread":
+        lines = "".join(f"  {line}\n" for line in SCRIPT.strip().splitlines())
+        text = f"import threading\ndef go():\n{lines}t = threading.Thread(target=go)\n"
+        text += "t.start()\nt.join()\n"
+    (tmp_path / "plain.py").write_text(text)
+    (tmp_path / "outer.py").write_text("import runpy\nrunpy.run_path('plain.py')\n")
+    (tmp_path / "scenegen").mkdir()  # of the user's own, without what is needed
+    words = {"stdin": ["-"], "module": ["-m", "plain"], "inside": ["outer.py"]}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    done = subprocess.run(
+        [sys.executable, *words.get(how, ["plain.py"])], input=text, cwd=tmp_path, timeout=120,
+        capture_output=True, text=True, check=False, env=environment,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("once\n[1, 2, 3]\n", "")
+    assert (tmp_path / "ran").read_text() == "x"

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import trimesh
 
+from scenegen.objects.meshes import check
 from scenegen.objects.meshes.check import ModelCheck, check_models
 from scenegen.objects.meshes.folders import open_objects
 from scenegen.objects.meshes.listing import object_split
@@ -105,22 +106,10 @@ def test_jobs_give_what_one_gives(root, tmp_path):
     assert [r.was_mended for r in alone] == [r.name == "box/double" for r in alone]
 
 
-DEADLY = """
-import os, sys
-from scenegen.objects.meshes import check, models
-from scenegen.objects.meshes.folders import open_objects
-from scenegen.objects.meshes.listing import object_split
-if __name__ == "__main__":
-    for record in check.check_models(open_objects(sys.argv[1]), None, 2, None):
-        print(record.name, record.ok, record.reason)
-else:  # in the worker processes
-    parse = models.parse_mesh
-    def deadly(data, suffix):
-        if b"deadly" in data:
-            os._exit(1)
-        return parse(data, suffix)
-    models.parse_mesh = deadly
-"""
+def deadly(up, cache_dir, file):
+    if file.name in ("box/3", "box/4"):
+        os._exit(1)
+    return ModelCheck(file.name, True, "", 1)
 
 
 def python(*arguments):
@@ -130,16 +119,14 @@ def python(*arguments):
     )
 
 
-def test_a_model_that_crashes_its_process_is_refused_alone(tmp_path):
+def test_a_model_that_crashes_its_process_is_refused_alone(tmp_path, monkeypatch):
     (tmp_path / "models" / "box").mkdir(parents=True)
     for i in range(6):
-        text = BOX.export(file_type="off") + ("# deadly\n" if i in (3, 4) else "")
-        (tmp_path / "models" / "box" / f"{i}.off").write_text(text)
-    (tmp_path / "script.py").write_text(DEADLY)
-    done = python(tmp_path / "script.py", tmp_path / "models")
-    found = [line.split(maxsplit=2)[:2] for line in done.stdout.splitlines()]
-    assert found == [[f"box/{i}", str(i not in (3, 4))] for i in range(6)], done.stderr
-    assert done.stdout.count("process") == 2
+        (tmp_path / "models" / "box" / f"{i}.off").write_text(BOX.export(file_type="off"))
+    monkeypatch.setattr(check, "_check_in_worker", deadly)
+    found = check_models(open_objects(tmp_path / "models"), None, 2)
+    assert [(r.name, r.ok) for r in found] == [(f"box/{i}", i not in (3, 4)) for i in range(6)]
+    assert ["exit code 1" in r.reason for r in found] == [not r.ok for r in found]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="uses Linux system calls")

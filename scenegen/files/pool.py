@@ -1,0 +1,233 @@
+"""Processes that do tasks and need nothing of the program that started them.
+
+They are started by `subprocess`, as those of `multiprocessing` import the main module of the
+caller: a script without `if __name__ == "__main__":` would run once more in each. They end with the
+process that started them, however it ends, and their libraries use one thread.
+"""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import traceback
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager, suppress
+from queue import SimpleQueue
+from typing import IO, Any
+
+from scenegen.common.errors import SceneGenError
+from scenegen.common.signals import without_interrupts
+from scenegen.common.threads import ONE_THREAD
+
+SIZE = 8  # bytes of a message's length, before it
+PATIENCE = 5.0  # seconds, until a process that closed its pipes has ended
+END = b""  # the message after the last task
+
+
+class LostWorkerError(SceneGenError):
+    """A process ended by itself while it did a task."""
+
+
+class Pool:
+    """At most `count` processes; a thread for each waits for its answers.
+
+    A process that ended is replaced when the next task comes.
+    """
+
+    def __init__(self, count: int, function: Callable[[Any], Any]) -> None:
+        """Take the function of all tasks, which is pickled once for each process."""
+        self._function = pickle.dumps(function)
+        self._threads = ThreadPoolExecutor(count, thread_name_prefix="worker")
+        self._idle: list[_Process] = []
+        self._started: list[_Process] = []
+        self._lock, self._killed = threading.Lock(), False
+
+    def submit(self, task: Any) -> Future[Any]:
+        """Return the future of the function's result; its error may be a LostWorkerError."""
+        return self._threads.submit(self._do, task)
+
+    def close(self) -> None:
+        """Wait for all tasks, and for the end of the processes."""
+        self._threads.shutdown()
+        for process in self._started:
+            process.end()
+
+    def kill(self) -> None:
+        """End the processes now."""
+        self._threads.shutdown(wait=False, cancel_futures=True)
+        with self._lock:
+            self._killed = True
+            for process in self._started:
+                process.kill()
+        self.close()
+
+    def _do(self, task: Any) -> Any:
+        message = pickle.dumps(task)
+        process = self._idle.pop() if self._idle else self._start()
+        succeeded, result = process.answer(message)
+        self._idle.append(process)
+        if not succeeded:
+            raise result
+        return result
+
+    def _start(self) -> "_Process":
+        with self._lock:
+            if self._killed:
+                raise LostWorkerError("The worker processes were ended")
+            try:
+                process = _Process()
+            except OSError as error:
+                raise _not_to_be_had(error) from error
+            self._started.append(process)
+        process.begin(self._function)
+        return process
+
+
+class _Process:
+    """One process, and the pipes to it and from it."""
+
+    def __init__(self) -> None:
+        """Start it; it never sees Ctrl-C, which a terminal sends to all processes."""
+        command = python_command(f"from {__name__} import serve; serve()")
+        environment, pipe = {**os.environ, **ONE_THREAD}, subprocess.PIPE
+        with without_interrupts():
+            self._popen = subprocess.Popen(command, stdin=pipe, stdout=pipe, env=environment)
+
+    def begin(self, function: bytes) -> None:
+        """Hand over the function of all tasks. Raises SceneGenError where it cannot begin."""
+        try:
+            succeeded, result = self.answer(function)
+        except LostWorkerError as error:
+            raise _not_to_be_had(f"the first ended as it began, {error.found}") from error
+        if not succeeded:
+            raise result
+
+    def answer(self, message: bytes) -> tuple[bool, Any]:
+        """Return whether a task succeeded, and its result or error. Raises LostWorkerError."""
+        assert self._popen.stdin is not None
+        assert self._popen.stdout is not None
+        try:
+            _write(self._popen.stdin, message)
+            answer = _read(self._popen.stdout)
+        except (OSError, EOFError):  # it has closed the pipes, as it ends
+            with suppress(subprocess.TimeoutExpired):
+                self._popen.wait(PATIENCE)
+            self.kill()
+            what, hint = "A worker process ended", "memory may be short: use fewer --workers"
+            raise LostWorkerError(what, ended(self._popen.wait()), "", hint) from None
+        succeeded, result = pickle.loads(answer)
+        return succeeded, result
+
+    def end(self) -> None:
+        """Let it end by itself where it lives, wait for that, and close the pipes."""
+        assert self._popen.stdin is not None
+        with suppress(OSError):
+            _write(self._popen.stdin, END)
+        with suppress(OSError), self._popen:
+            pass
+
+    def kill(self) -> None:
+        """End it now."""
+        self._popen.kill()
+
+
+def _not_to_be_had(why: object) -> SceneGenError:
+    what = f"Worker processes cannot be started here ({why})"
+    return SceneGenError(what, hint="use --workers 1")
+
+
+def ended(code: int) -> str:
+    """Return how a process ended, in words, by the return code of `subprocess`."""
+    if code >= 0:
+        return f"exit code {code}"
+    try:
+        return f"signal {-code}, {signal.Signals(-code).name}"
+    except ValueError:  # of real time
+        return f"signal {-code}"
+
+
+@contextmanager
+def worker_pool(count: int, function: Callable[[Any], Any]) -> Iterator[Pool]:
+    """Open a pool. The block waits for all tasks at its end; where it raises, they are killed."""
+    pool = Pool(count, function)
+    try:
+        yield pool
+    except BaseException:
+        pool.kill()
+        raise
+    pool.close()
+
+
+def python_command(code: str) -> list[str]:
+    """Return a command that runs code in another Python, which imports from where this one does.
+
+    The code needs no main module of this process, and gets none.
+    """
+    flags = subprocess._args_from_interpreter_flags()  # type: ignore[attr-defined]
+    path = f"import sys; sys.path[:] = {list(map(str, sys.path))!r}"
+    return [sys.executable, "-P", *flags, "-c", f"{path}; {code}"]
+
+
+# ---- in the process ----
+
+
+def serve() -> None:
+    """Do the tasks that come by standard input, and answer each by standard output."""
+    requests, answers = (os.fdopen(os.dup(number), mode) for number, mode in ((0, "rb"), (1, "wb")))
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.dup2(2, 1)  # what libraries print must not come between the answers
+    messages: SimpleQueue[bytes] = SimpleQueue()
+    threading.Thread(target=_listen, args=(requests, messages), daemon=True).start()
+    function: Callable[[Any], Any] | None = None
+    while message := messages.get():
+        try:
+            task = pickle.loads(message)
+            if function is None:
+                function, result = task, None
+            else:
+                result = function(task)
+            answer = pickle.dumps((True, result))
+        except Exception as error:
+            answer = _told(error)
+        _write(answers, answer)
+
+
+def _listen(requests: IO[bytes], messages: "SimpleQueue[bytes]") -> None:
+    """Pass messages on. Ends this process, whatever it does, when the one that started it ends."""
+    while True:
+        try:
+            messages.put(_read(requests))
+        except (OSError, EOFError):
+            os._exit(1)
+
+
+def _told(error: Exception) -> bytes:
+    """Return an error as an answer, with its traceback where nobody is meant to read it."""
+    if not isinstance(error, (SceneGenError, OSError)):
+        error.add_note(traceback.format_exc())
+    try:
+        return pickle.dumps((False, error))
+    except Exception:
+        return pickle.dumps((False, RuntimeError(traceback.format_exc())))
+
+
+# ---- messages ----
+
+
+def _write(stream: IO[bytes], message: bytes) -> None:
+    stream.write(len(message).to_bytes(SIZE, "little"))
+    stream.write(message)
+    stream.flush()
+
+
+def _read(stream: IO[bytes]) -> bytes:
+    """Return the next message. Raises EOFError where the other side is gone."""
+    size = stream.read(SIZE)
+    message = stream.read(int.from_bytes(size, "little"))
+    if len(size) < SIZE or len(message) < int.from_bytes(size, "little"):
+        raise EOFError
+    return message
