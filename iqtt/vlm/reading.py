@@ -13,12 +13,18 @@ import html
 import json
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 Outcome = Literal["answered", "unparsed", "refused", "cut off"]
 LETTERS = "ABCDEFGHIJ"
+# What servers and harnesses call the end of a reply, where it is no answer like others.
+ENDINGS: Mapping[str, Outcome] = {
+    **dict.fromkeys(("length", "max_tokens", "model_length", "max_output_tokens"), "cut off"),
+    **dict.fromkeys(("content_filter", "refusal", "safety", "prohibited_content"), "refused"),
+}
+QUOTED, QUOTE = 3, 80  # unread replies that are quoted, and their characters
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,39 @@ def read_answer(text: str, answers: int = 3, *, cut_off: bool = False) -> Readin
         return Reading(answer, "answered")
     refused = not letters and any(map(_REFUSAL.search, _replies(text)))
     return Reading(None, "refused" if refused else "unparsed")
+
+
+def read_reply(text: str, answers: int, outcome: Outcome | None) -> Reading:
+    """Return how a reply is read whose end a server or a harness tells, as ENDINGS has it."""
+    if outcome == "refused":
+        return Reading(None, "refused")
+    return read_answer(text, answers, cut_off=outcome == "cut off")
+
+
+def unread_note(unread: Sequence[tuple[str, str]], rows: int) -> str:
+    """Return the share of rows without a letter, and the first three of their texts.
+
+    Args:
+        unread: name of the row and text of the model, of each row without a letter.
+        rows: how many replies there are.
+    """
+    if not unread:
+        return f"all of {rows} replies name a letter"
+    quoted = [f"{name}: {_quoted(text)}" for name, text in unread[:QUOTED]]
+    share = f"{len(unread)} of {rows} replies name no letter ({len(unread) / rows:.0%})"
+    return f"{share}, such as {'; '.join(quoted)}"
+
+
+def _quoted(text: str) -> str:
+    """Return the end of a text, where an answer would stand, as one line that prints."""
+    line = " ".join(text.split()).encode(errors="replace").decode()
+    line = "".join(c if c.isprintable() else "?" for c in line)
+    return json.dumps(line if len(line) <= QUOTE else f"...{line[3 - QUOTE:]}", ensure_ascii=False)
+
+
+def is_thought_alone(text: str) -> bool:
+    """Return whether a text holds nothing outside of the model's thoughts."""
+    return not any(_replies(_characters(text)))
 
 
 # ---- what is the reply ----
