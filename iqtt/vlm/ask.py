@@ -215,7 +215,9 @@ def _line(path: str | Path, number: int, line: bytes) -> dict[str, Any]:
     except ValueError:
         value = None
     if not isinstance(value, dict) or not ("format" in value or value.keys() >= NEEDED):
-        raise FileFormatError(f"{path}: line {number}", "no reply", "a JSON object with id, letter, ...")
+        raise FileFormatError(
+            f"{path}: line {number}", "no reply", "a JSON object with id, letter, ..."
+        )
     return value
 
 
