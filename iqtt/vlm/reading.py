@@ -113,8 +113,7 @@ _SAME_AS = str.maketrans(
     }
 )  # fmt: skip
 _THOUGHT = (
-    r"(?:\w+:)?(?:think(?:ing)?|thoughts?|thought_process|reason(?:ing)?|analysis|reflection|"
-    r"scratchpad|inner_monologue|internal_monologue|antthinking|cot)"
+    r"(?:(?!no)[\w:-]*(?:think|thought|reason(?!able)|reflection|scratchpad|monologue)[\w-]*|analysis|cot)"
 )
 _ANSWER = (
     r"(?:\w+:)?(?:(?:final_?|my_?)?answer|final|conclusion|choice|solution|response|result|output|"
@@ -128,22 +127,26 @@ def _tag(name: str) -> str:
     A closing tag is the group "end".
     """
     return (
-        rf"(?P<end>[<\[◁]\|?\s*/\s*{name}\s*\|?[>\]▷]|<\|end_(?:of_)?{name}\|>|<\|{name}_end\|>)"
+        rf"(?P<end>[<\[◁]\|?\s*/\s*{name}\s*\|?[>\]▷]|<\|?end_(?:of_)?{name}\|?>|<\|?{name}_end\|?>)"
         rf"|[<\[◁]\|?\s*(?:(?:begin|start)_(?:of_)?)?{name}(?:_start)?(?:\s[^<>\[\]]*)?\|?[>\]▷]"
     )
 
 
 _THOUGHT_TAG = re.compile(_tag(_THOUGHT), re.IGNORECASE)
 _ANSWER_TAG = re.compile(_tag(_ANSWER), re.IGNORECASE)
+_CHANNEL = r"(?:<\|channel\|?>|(?<=<\|end\|>)|^)\s*"
 # Marks of thoughts that are no tags, and the tag that stands for them.
 _CHANNELS = [
-    (r"<\|channel\|?>\s*final\b[^<]*?(?:<\|message\|>|\n)", "</think>"),  # gpt-oss, Gemma
-    (r"<\|channel\|?>\s*\w*[^<]*?(?:<\|constrain\|>[^<]*)?(?:<\|message\|>|(?=\n)|$)", "<think>"),
+    # gpt-oss and Gemma, with their special tokens and without
+    (rf"{_CHANNEL}final\b[^<]*(?:<\|constrain\|>[^<]*)?<\|message\|>", "</think>"),
+    (r"<\|channel\|?>\s*final\b", "</think>"),
+    (rf"{_CHANNEL}(?:analysis|commentary)\b[^<]*(?:<\|constrain\|>[^<]*)?<\|message\|>", "<think>"),
+    (r"<\|channel\|?>\s*\w*", "<think>"),
+    (r"^\s*(?:(?:assistant)?\s*analysis(?=[A-Z\s]).*?)?assistant\s*final(?![a-z])", "</think>"),
+    (r"^\s*analysis(?=[A-Z])", "<think>"),
     (r"<channel\|>\s*$", ""),
-    (r"<channel\|>|<\|inner_suffix\|>", "</think>"),
-    (r"<\|inner_prefix\|>", "<think>"),
-    (r"^\s*(?:assistant)?\s*analysis(?=[A-Z\s]).*?assistant\s*final(?![a-z])", "</think>"),
-    (r"^\s*analysis(?=[A-Z])", "<think>"),  # gpt-oss without its special tokens
+    (r"<channel\|>|<\|inner_suffix\|>|<unused95>", "</think>"),  # Gemma, Apertus, MedGemma
+    (r"<\|inner_prefix\|>|<unused94>", "<think>"),
     (r"^\W*here(?:'s| is) my thought process\W", "<think>"),  # Granite
     (r"\n\W*here(?:'s| is) my response\W", "</think>"),
 ]
@@ -208,6 +211,7 @@ def _without_thoughts(text: str) -> str:
 # ---- what declares its content to be the answer ----
 
 _BOX = re.compile(r"\\?[bf](?:ox(?:ed)?)\s*\{((?:[^{}]|\{(?:[^{}]|\{[^{}]*\})*\})*)(?:\}|$)")
+_BARE_BOX = re.compile(r"\\boxed\s+([A-J])\b")
 _DOUBLE = re.compile(r"(?:\[\[|<<+|\{\{)\s*([A-J])\s*(?:\]\]|>>+|\}\})")
 _KEYS = re.compile(
     r"(?:the|my|final|correct|right|best|selected|chosen|predicted)*"
@@ -228,7 +232,7 @@ def _declared_parts(text: str) -> list[str]:
             opened = None
     if opened is not None:
         found.append((len(text), text[opened:]))
-    for pattern in (_BOX, _DOUBLE):
+    for pattern in (_BOX, _BARE_BOX, _DOUBLE):
         found += [(match.end(), match[1]) for match in pattern.finditer(text)]
     found += _of_json(text)
     asked = re.compile(r"[\s$)\]]*\?")
@@ -258,7 +262,7 @@ def _value_of_answer(value: Any, depth: int = 0) -> str | None:
         return value
     if isinstance(value, list):
         return ", ".join(entry for entry in value if isinstance(entry, str)) or None
-    if isinstance(value, dict) and depth < 3:
+    if isinstance(value, dict) and depth < 3 and False not in value.values():
         plain = {re.sub(r"[\W_]", "", key).lower(): entry for key, entry in value.items()}
         keys = [key for key in plain if _KEYS.fullmatch(key)]
         keys.sort(key=lambda key: "answer" not in key)
@@ -283,12 +287,12 @@ _NOUN = (
 )
 _OF_ANSWER = _words(
     r"answer|ans|solution|verdict|conclusion|final|choice|pick|selection|guess|decision|prediction|"
-    r"response|option|letter|bet|antwort|lösung|wahl|réponse|choix|respuesta|solución|elección|"
-    r"opción|risposta|scelta|resposta|antwoord|ответ",
-    "答案|答え|正解|回答|解答|选择|選択|选项|정답|답",
+    r"response|option|letter|bet|remaining|antwort|lösung|wahl|réponse|choix|respuesta|solución|elección|"
+    r"opción|risposta|scelta|resposta|antwoord|ответ|đáp\s+án",
+    "الجواب|उत्तर|答案|答え|正解|回答|解答|选择|選択|选项|정답|답",
 )
 _GOOD = _words(
-    r"same|match(?:es|ing|ed)?|identical|correct|congruent|equivalent|fits?|fitting|corresponds?|"
+    r"rotat\w+\s+(?:(?:version\s+)?of\s+)?(?:the\s+)?(?:into|reference)|same|match(?:es|ing|ed)?|identical|correct|congruent|equivalent|fits?|fitting|corresponds?|"
     r"corresponding|best|yes|true|most similar|closest|(?:is|be)\s+right|right\s+(?:one|answer|"
     r"choice|option|picture|image|match|shape|figure)|gleich\w*|dasselbe|dieselbe\w*|derselbe\w*|"
     r"richtig\w*|korrekt\w*|passt|passende?|stimmt|identisch\w*|même|correcte|bonne?|correspond|"
@@ -311,8 +315,8 @@ _NOT = _words(
 )
 _OTHER = _words(  # what stands before a letter that is compared with, or left out
     r"than|unlike|instead\s+of|opposed\s+to|over|versus|vs|except(?:\s+for)?|exclud\w*|"
-    r"eliminat\w*|reject\w*|rul\w+\s+out|discard\w*|dismiss\w*|avoid\w*|compared\s+(?:to|with)|"
-    r"similar\s+to|resembl\w+|confus\w+|tempt\w+|statt|anstatt|außer|anstelle\s+von|que|au\s+lieu\s+"
+    r"eliminat\w*|reject\w*|rul\w+\s+out|discard\w*|dismiss\w*|avoid\w*|doubt\w*|unlikely|impossible|compared\s+(?:to|with)|"
+    r"similar\s+to|resembl\w+|confus\w+|tempt\w+|statt|anstatt|außer|anstelle\s+von|au\s+lieu\s+"
     r"de|sauf|en\s+(?:lugar|vez)\s+de|excepto|salvo|if|suppose|assum\w+|wenn|si|could\s+be|"
     r"might\s+be|may\s+be|would\s+have\s+been|were|was|thought",
     "排除|比|而非|除了|如果|より",
@@ -331,7 +335,7 @@ _CHOOSE = _words(
     r"choos(?:e|es|ing)|chose|pick(?:s|ed|ing)?|select(?:s|ed|ing)?|go(?:ing)?\s+(?:with|for)|"
     r"opt(?:s|ed|ing)?\s+for|vote\s+for|settl(?:e|ed|ing)\s+(?:on|for)|decid(?:e|ed|ing)\s+(?:on|"
     r"for)|(?:change|revise|correct|switch|update)d?\s+(?:(?:my|the)\s+)?(?:answer|mind|choice)?\s*"
-    r"to|switch(?:ing)?\s+to|i(?:'d|\s+would|\s+will|'ll)?\s+(?:say|answer)|answer|ans|wähle|nehme|"
+    r"to|i\s+meant?|inclined\s+to\s+say|lean(?:ing)?\s+towards?|prefer|switch(?:ing)?\s+to|i(?:'d|\s+would|\s+will|'ll)?\s+(?:say|answer)|answer|ans|dirais|wähle|nehme|"
     r"entscheide\s+mich\s+für|tippe\s+auf|choisis|choisirais|opte\s+pour|sélectionne|elijo|escojo|"
     r"selecciono|elegiría|me\s+quedo\s+con|scelgo|escolho|final",
     "选择|選擇|选|選|选取|判断为",
@@ -344,30 +348,31 @@ _IS = (
 _MY = r"(?:\b(?:the|la|le|el|das|die|der|either|both|no\.)\s*|\bl')?"
 _SO = _words(
     r"therefore|thus|hence|so|then|consequently|accordingly|finally|in\s+conclusion|in\s+summary|"
-    r"overall|ultimately|(?:so\s+|then\s+)?(?:it|this|that)(?:'s|\s+is|\s+must\s+be|\s+has\s+to\s+be|"
-    r"\s+should\s+be)|that\s+leaves|which\s+leaves|leaves|leaving|but(?:\s+rather)?|sure|okay|ok|"
+    r"overall|ultimately|(?:so\s+|then\s+)?(?:it|this|that)(?:'?s|\s+is|\s+must\s+be|\s+has\s+to\s+be|\s+would\s+be|"
+    r"\s+should\s+be)|that\s+leaves|which\s+leaves|leaves|leaving|actually|scratch\s+that|correction|edit|no(?=,)|wait|(?:the\s+)?(?:picture|image|figure)\s+is|but(?:\s+rather)?|sure|okay|ok|"
     r"daher|deshalb|folglich|also|somit|sondern|es\s+ist|bleibt|donc|ainsi|alors|c'est|mais|"
     r"por\s+(?:lo\s+)?tanto|así\s+que|entonces|luego|sino|es|quindi|portanto|logo",
     "因此|所以|故|于是|而是|よって|したがって|従って|なので|따라서",
 )
 _BELIEF = _words(
     r"(?:i|we)(?:'d|'m|\s+would|\s+am)?\s+(?:think|believe|guess|say|suspect|feel|reckon|conclude|"
-    r"(?:pretty\s+|quite\s+|fairly\s+)?(?:sure|confident|certain))|to\s+guess|probably|likely|maybe|perhaps|"
+    r"(?:pretty\s+|quite\s+|fairly\s+)?(?:sure|confident|certain))|to\s+(?:guess|choose|pick)|probably|likely|maybe|perhaps|"
     r"presumably|definitely|clearly|certainly|only|just|looks\s+like|seems\s+(?:like|to\s+be)|"
     r"appears\s+to\s+be|must\s+be|ich\s+(?:denke|glaube|meine)|vermutlich|wahrscheinlich|"
     r"je\s+(?:pense|crois)|probablement|creo|pienso|probablemente|penso|acho",
     "我认为|我觉得|我想|应该是|可能是|もちろん|おそらく|たぶん",
 )
-_THAT = r"\W*(?:\b(?:that|dass|que|it's|it\s+is|es\s+ist|c'est|es)\b\W*)?"
+_THAT = r"\W*(?:(?:\b(?:that|dass|que|it's|its|it\s+is|es\s+ist|c'est|es)\b|是)\W*){0,2}"
 _BEFORE_ANSWER = re.compile(rf"(?:{_CHOOSE})[\s:]*{_MY}$", re.IGNORECASE)
 _BEFORE_IS = re.compile(rf"{_IS}\W*{_MY}$", re.IGNORECASE)
 _BEFORE_SO = re.compile(rf"(?:{_SO})\W*{_MY}(?:(?:{_BELIEF}){_THAT})?$", re.IGNORECASE)
+_BELIEF_WORDS = re.compile(_BELIEF, re.IGNORECASE)
 _BEFORE_BELIEF = re.compile(rf"(?:{_BELIEF}){_THAT}{_MY}$", re.IGNORECASE)
 _ABOUT_ANSWER = re.compile(rf"(?:{_OF_ANSWER}|{_GOOD})", re.IGNORECASE)
 _AFTER_ANSWER = re.compile(
     r"^\s*(?:(?:is|must\s+be|has\s+to\s+be|ist|est|es|è|é)\s+(?:\w+\s+){0,3}?(?:answer|choice|option|pick|"
-    r"selection|correct|right(?=\s*(?:$|one|choice))|solution|match|richtig\w*|korrekt\w*|antwort|"
-    r"lösung|réponse|correcte?|bonne|respuesta|correct[oa])\b|it\s+is\b"
+    r"selection|(?:correct|right|richtig|korrekt|correcte|correct[oa])(?=\W*$|\s+(?:one|choice))|"
+    r"solution|match|one(?=\W*$)|antwort|lösung|réponse|respuesta)\b|it\s+is\b|would\s+be\s+(?:my|the)\s+(?:answer|choice|pick)(?=\W*$)"
     r"|(?:是|为)?\s*(?:正确|正確|答案)|です|だ(?!け)|である|が(?:正解|答え|正しい)|を選|と(?:思|考)|입니다|이다|[를을]\s*선택)",
     re.IGNORECASE,
 )
@@ -383,13 +388,13 @@ _DENIAL_AT_END = re.compile(
     re.IGNORECASE,
 )
 _BREAK = re.compile(
-    rf"[,;()—–]|\s-\s|{_words('and|but|because|since|as|while|whereas|where|with|so|then|thus|hence|therefore|due|based|for|und|aber|weil|da|denn|et|parce|car|y|porque|ya|pero|which|for', '因为|因為|因|而|但')}",
+    rf"[,;()—–]|\s-\s|{_words('and|but|because|since|as|while|whereas|where|with|over|rather|instead|so|then|thus|hence|therefore|due|based|for|und|aber|weil|da|denn|et|parce|car|y|porque|ya|pero|which|for', '因为|因為|因|而|但')}",
     re.IGNORECASE,
 )
 _HARMLESS = re.compile(  # negations that deny nothing
     _words(
         r"(?:there(?:'s|\s+is)\s+)?(?:no|without(?:\s+a|\s+any)?|not?\s+in)\s+(?:doubt|question)|not?\s+"
-        r"(?:hard|difficult)|not\s+only|on\s+(?:second\s+thoughts?|(?:closer\s+|further\s+)?(?:reflection|inspection))|none\s+other\s+than|nothing\s+but|"
+        r"(?:hard|difficult)|not\s+only|none\s+other\s+than|nothing\s+but|"
         r"(?:not|n't|no|nicht|kein\w*|pas|sin)\s+(?:a\s+|the\s+|an\s+|its\s+|any\s+|une?\s+|ein\w*\s+)?(?:mirror\w*(?:\s+"
         r"(?:images?|versions?))?|reflect\w*|flipped|inverted|different|differences?|wrong|gespiegelt|spiegelbild\w*)|"
         r"(?:i(?:'m|\s+am)\s+)?not\s+(?:\w+\s+)?(?:sure|certain)|can(?:not|'t)\s+be\s+"
@@ -402,13 +407,18 @@ _HARMLESS = re.compile(  # negations that deny nothing
 # ---- letters and their standing ----
 
 _CJK = r"[\u3040-\u30ff\u3400-\u9fff\uac00-\ud7af]"
-_L = r"[\"'(\[{<]{0,4}(?:[A-HJ]|I(?=\W*$))[)\]}>\"']*(?![\w'-])"
+_L = r"[\"'(\[{<]{0,4}(?:[A-HJ]|I(?=\W*$))[)\]}>\"']*(?![\w+-]|'(?!s\b))"
 _LETTER = rf"(?<![\w'\\.-]){_L}"
 _JOIN = (
-    r"\s*(?:,\s*(?:or|and|nor|und|oder|et|ou|y|o)\b|[/&|+]|,(?=\s*[\"'(\[]*[A-J]\W*(?:$|[,/]|\b(?:or|and|nor)\b))|\b(?:or|and|nor|und|oder|et|ou|y|o|e|vs\.?|"
+    rf"\s*(?:,\s*(?:or|and|nor|und|oder|et|ou|y|o)\b|[/&|+]|,(?=\s*[\"'(\[]*[A-J]\W*(?:$|[,/]|\b(?:or|and|nor)\b))"
+    rf"|\band\b(?!\s*(?:{_NOUN})?[\"'(\[]*[A-J]\W*\s(?:is|has|was|shows|"
+    r"matches|does|differs)\b)|\b(?:or|nor|und|oder|et|ou|y|o|e|vs\.?|"
     r"as\s+well\s+as)\b|和|或|与|跟|と|か|또는|와|과)\s*(?:both\s+|also\s+)?"
 )
-_MENTION = re.compile(rf"(?i:{_NOUN})?{_LETTER}(?:(?i:{_JOIN}(?:{_NOUN})?){_L})*")
+_MENTION = re.compile(
+    rf"(?i:{_NOUN})?{_LETTER}"
+    rf"(?:(?:\s*,\s*(?i:(?:or|and|nor|und|oder|et|ou|y|o)\s+)?{_L}){{2,}}|(?:(?i:{_JOIN}(?:{_NOUN})?){_L})*)"
+)
 _SENTENCE_END = re.compile(r"(?<=[.!?;])\s+|[\n;]|(?<=[!?])")
 _VERBS = (  # words that follow the letter A, and not the article
     r"is|isn't|was|are|has|have|shows?|match(?:es)?|does|doesn't|do|don't|can|cannot|can't|could|would|"
@@ -417,16 +427,23 @@ _VERBS = (  # words that follow the letter A, and not the article
     r"based|if|when|while|then|not|no|it|only|ist|zeigt|und|oder|nicht|weil|est|et|ou|ne|n'est|montre|"
     r"parce|car|es|y|o|muestra|porque|mirrors?|over|vs|versus|correctly|wins"
 )
-_ARTICLE = re.compile(rf"(?<![\w\"'(\[])A(?=\s+(?!(?:{_VERBS})\b)[A-Za-zà-ÿ0-9\"'(])")
+_ARTICLE = re.compile(
+    rf"(?P<named>(?i:{_NOUN}))?(?<![\w\"'(\[])A(?=\s+(?!(?:(?i:{_VERBS})|[A-J])\b)[A-Za-zà-ÿ0-9])"
+)
 _TO_CASE = [  # small letters that are surely names of answers
     re.compile(rf"({_NOUN}|\b(?:is|ist|est|es|be)\s+|[:=]\s*)[\"'(\[]*[a-j][\"')\]]*(?=\s*(?:[.,;!?](?!\w)|$))",
                re.IGNORECASE | re.MULTILINE),
     re.compile(r"(?<![\w)])[(\[][a-j][)\]](?!\w)"),
-    re.compile(rf"{_NOUN}[bc](?=\s)", re.IGNORECASE),
+    re.compile(rf"{_NOUN}(?:[bc](?=\s)|a(?=\s+(?:is|shows|matches)\b))", re.IGNORECASE),
     re.compile(rf"(?:(?:{_OF_ANSWER})\s+is|{_CHOOSE})\s+[bc](?=\s)", re.IGNORECASE),
+    re.compile(rf"(?:{_BELIEF}){_THAT}[bc](?=\W*$|\s+because)|^\W*its\s+[bc](?=\W*$)", re.IGNORECASE | re.MULTILINE),
     re.compile(r"^\W*[a-j]\W*$", re.MULTILINE),
     re.compile(r"^\W*[bc](?=\s+(?:because|since|as|is|matches|shows)\b)"),
 ]  # fmt: skip
+_PLACE_OF_PICTURE = re.compile(  # "the second one, B", "the picture in the middle (B)"
+    r"\bthe\s+(?:(?:first|second|third|last|middle|left|right)\s+)?(?:one|picture|image|option|shape)"
+    rf"(?:\s+(?:in|on|at|to)\s+the\s+\w+)?\s*[,:(]\s*(?={_L})", re.IGNORECASE
+)
 _FILLER = re.compile(
     rf"{_NOUN}|{_words('only|just|definitely|clearly|sure|yes|hmm|ok|okay|final|both|either')}|[\W_]",
     re.IGNORECASE,
@@ -434,11 +451,11 @@ _FILLER = re.compile(
 _REFUSAL = re.compile(
     r"\bi(?:'m|\s+am)\s+(?:\w+\s+)?(?:sorry|unable|not\s+able)"
     r"|(?:\bi|^)\s*(?:can\s*not|can't|won't|could\s*n't|am\s+not\s+going\s+to)\s+(?!be\s+(?:\w+\s+)?"
-    r"(?:sure|certain)|say\s+for)"
+    r"(?:sure|certain)|say\s+for|choose|pick|select)"
     r"|\bi\s+(?:refuse|decline|must\s+decline)|unable\s+to\s+(?:see|view|determine|help|answer|"
     r"process|identify|assist)|no\s+images?\s+(?:was|were|is|are|has|have|provided|attached)|as\s+an?\s+"
-    r"(?:ai|language)\b|^\W*sorry\b|without\s+the\s+images?\s+provided|don't\s+(?:see|have)\s+(?:any|an|the)\s+"
-    r"(?:image|picture)|es\s+tut\s+mir\s+leid|ich\s+kann\s+(?:\w+\s+){0,4}?nicht|je\s+(?:suis\s+désolée?|ne\s+peux\s+pas)|"
+    r"(?:ai|language)\b|^\W*sorry\b|without\s+the\s+images?\s+provided|(?:don't|do\s+not)\s+(?:see|have)\s+(?:any\s+|an\s+|the\s+)?"
+    r"(?:image|picture|ability|access)|es\s+tut\s+mir\s+leid|ich\s+kann\s+(?:\w+\s+){0,4}?(?:nicht|kein\w*)\b|je\s+(?:suis\s+désolée?|ne\s+peux\s+pas)|"
     r"désolée?\b|lo\s+siento|no\s+puedo|抱歉|对不起|對不起|无法|無法|不能(?:看|回答|协助|提供)|"
     r"申し訳|すみません|ごめん|できません|お答えでき|죄송",
     re.IGNORECASE,
@@ -491,14 +508,19 @@ def _sentences(text: str) -> list[str]:
     text = re.sub(r"```\w*|[*_`$~#]|\\[()\[\]]|^[\s>]+", lambda m: "\n" if "\n" in m[0] else "", text, flags=re.MULTILINE)
     text = re.sub(rf"(?<={_CJK})(?=[A-Za-z(\"\[])|(?<=[A-Za-z)\"\]])(?={_CJK})", " ", text)
     text = re.sub(r"\b(fig|pic|opt|ans|img)\.(?=\s*\W?[A-Ja-j]\b)", r"\1", text, flags=re.IGNORECASE)
-    text = re.sub(r"^\s*(?:[-•·–—+]+\s*|\d+[.)]\s+)(?=\S)", "", text, flags=re.MULTILINE)
+    text = re.sub(r"^\s*(?:[-•·–—+]+\s*|\(?\d+[.)]\s+)(?=\S)", "", text, flags=re.MULTILINE)
+    text = _PLACE_OF_PICTURE.sub("", text)
     for pattern in _TO_CASE:
         text = pattern.sub(_with_capital, text)
     text = re.sub(r"\b([A-J])\?\s*(?=(?:yes|yep|correct|no|nope|wrong)\b)", r"\1: ", text, flags=re.IGNORECASE)
     text = re.sub(r"\b(?:anything|everything|everyone|all|any) but\b", "except", text, flags=re.IGNORECASE)
     text = re.sub(r"([:：])\s*\n\s*", r"\1 ", text)
     text = re.sub(r"^(\W{0,2}[A-J]\W?)[.)]+[ \t]+(?=\S)", r"\1: ", text, flags=re.MULTILINE)
-    text = _ARTICLE.sub("a", _HARMLESS.sub(" ", text))
+    text = re.sub(
+        r"\bon (?:second thoughts?|(?:\w+ )?(?:reflection|inspection))\b", "actually", text,
+        flags=re.IGNORECASE,
+    )  # fmt: skip
+    text = _ARTICLE.sub(lambda m: m[0] if m["named"] else "a", _HARMLESS.sub(" ", text))
     return [sentence for sentence in _SENTENCE_END.split(text) if sentence.strip()]
 
 
@@ -542,7 +564,7 @@ def _standing(before: str, after: str, label: bool, first: bool) -> str:
     tail = _BREAK.split(before)[-1]
     if _DENIAL.search(tail) or _EARLIER.search(_TURN.split(before)[-1]) or _BAD_WORD.search(head):
         return "denied"
-    ends = not head.strip(" .,:!?\"')]}%")
+    ends = not _FILLER.sub("", _BELIEF_WORDS.sub("", head))
     answer = _BEFORE_IS.search(before) and _ABOUT_ANSWER.search(before) and not _ASIDE.search(tail)
     if answer or _BEFORE_ANSWER.search(before) or _AFTER_ANSWER.search(head):
         return "declared"
@@ -554,6 +576,8 @@ def _standing(before: str, after: str, label: bool, first: bool) -> str:
         return "believed"
     if ends and not before.strip() and first:
         return "alone"
+    if ends and _GOOD_WORD.search(before) and not _ASIDE.search(before):
+        return "" if _DENIAL.search(before) else "said"  # "the reference matches B"
     if _GOOD_WORD.search(after) and not (_NOT_WORD.search(after) or _ASIDE.search(after)):
         return "said"
     return "label" if label else ""

@@ -1,37 +1,44 @@
 """Answers of models as they come: the letter, no letter, or several."""
 
+import json
 import time
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from model_replies import REPLIES
 
 from iqtt.vlm.reading import LETTERS, Reading, read_answer
 
+# A kind, what a careful person reads (a letter of A to C, "none" or "refusal"), and the reply. Forms
+# are those of the chat templates of open models, and those that parsers of harnesses look for.
+LINES = Path(__file__).with_name("replies.jsonl").read_text(encoding="utf-8").splitlines()
+REPLIES = [tuple(json.loads(line)) for line in LINES]
 A_PLAIN_TEXT = "Picture A shows a chain of cubes, and its arm turns left, but B is "
 
 
-@pytest.mark.parametrize("kind", REPLIES)
+@pytest.mark.parametrize("kind", sorted({kind for kind, _, _ in REPLIES}))
 def test_a_reply_is_read_as_a_careful_person_reads_it(kind: str) -> None:
-    read = {text: read_answer(text) for text, _ in REPLIES[kind]}
-    assert read == {
-        text: Reading(LETTERS.index(read_as), "answered")
-        if read_as in LETTERS
-        else Reading(None, read_as)
-        for text, read_as in REPLIES[kind]
-    }
+    expected = {text: read_as for its, read_as, text in REPLIES if its == kind}
+    assert {text: shown(read_answer(text)) for text in expected} == expected
 
 
-def test_the_table_is_large_enough() -> None:
-    texts = [text for replies in REPLIES.values() for text, _ in replies]
-    assert len(set(texts)) == len(texts) >= 200
+def test_the_table_of_replies_is_large_and_holds_each_once() -> None:
+    assert len({text for _, _, text in REPLIES}) == len(REPLIES) >= 200
+
+
+def shown(reading: Reading) -> str:
+    """Return a reading as the table of replies has it."""
+    if reading.answer is None:
+        return {"unparsed": "none", "refused": "refusal"}[reading.outcome]
+    return LETTERS[reading.answer]
 
 
 @pytest.mark.parametrize(
     ("text", "letter"),
     [
-        ("B", "B"), ("(B", "B"), ("The answer is B. Its arm turns", "B"), ("<answer>B</answer>", "B"),
+        ("B", "B"), ("(B", "B"), ("The answer is B. Its arm turns", "B"),
+        ("<answer>B</answer>", "B"),
         ("", ""), ("<think>The answer is A", ""), ("Picture A shows the same", ""),
         ("A is the same shape.", ""), ("B because", ""), ("A: same\nB: ", ""), ("Perhaps A", ""),
     ],
@@ -52,8 +59,8 @@ def test_any_text_has_a_reading_within_the_letters_offered(text: str, answers: i
 @pytest.mark.parametrize(
     "part",
     [
-        "<think>", "<answer>", "\\boxed{", "{", "A, ", A_PLAIN_TEXT, "[", " ", "<|channel|>", "not ",
-        '{"a":', "analysis", "\ud800", "A B ", "\n", "the answer ", "(", "it is ", "A", "<", "( ",
+        "<think>", "<answer>", "\\boxed{", "{", "A, ", A_PLAIN_TEXT, "[", " ", "<|channel|>",
+        "not ", '{"a":', "analysis", "\ud800", "A B ", "\n", "the answer ", "(", "it is ", "A", "<", "( ",
     ],
 )  # fmt: skip
 def test_long_texts_are_read_in_time_that_grows_with_their_length(part: str) -> None:
