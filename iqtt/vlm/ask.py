@@ -215,9 +215,7 @@ def _line(path: str | Path, number: int, line: bytes) -> dict[str, Any]:
     except ValueError:
         value = None
     if not isinstance(value, dict) or not ("format" in value or value.keys() >= NEEDED):
-        raise FileFormatError(
-            f"{path}: line {number}", "no reply", "a JSON object with id, letter, ..."
-        )
+        raise FileFormatError(f"{path}: line {number}", "no reply", "a reply with its id")
     return value
 
 
@@ -328,38 +326,50 @@ def _one_try(
             return text, None, None
         return text, _seconds(response.headers.get("retry-after", "0")), None
     try:
-        value = response.json()
-        choice = value["choices"][0]
-        message, ending = choice["message"], str(choice.get("finish_reason") or "").lower()
-        content, refusal = message.get("content"), message.get("refusal")
-        said = _text(content)
+        return "", 0.0, _message(response.json())
+    except AskError as error:
+        problem = error.found
     except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        return f"no chat completion: {response.text[:100]!r}", 0.0, None
-    if said is None or ("content" not in message and not refusal and not ending):
-        return "a message that is no text", 0.0, None
-    if choice.get("error") or ending in ("error", "abort"):
-        return f"a reply that failed: {choice.get('error') or ending!s:.200}", 0.0, None
-    usage = value.get("usage")
-    usage = usage if isinstance(usage, dict) else {}
-    refusal = refusal if isinstance(refusal, str) else ""
-    return "", 0.0, {"text": said, "refusal": refusal, "ending": ending, "usage": usage}
+        problem = f"no chat completion: {response.text[:100]!r}"
+    return problem, 0.0, None
 
 
-def _text(content: Any) -> str | None:
-    """Return the text of a message's content: a text, or parts, of which thoughts do not count.
+def _message(value: Any) -> dict[str, Any]:
+    """Return text, refusal, ending and usage of a chat completion.
 
-    None for what is neither.
+    Raises AskError for a reply that failed, and what Python raises for what is no completion.
     """
-    if content is None or isinstance(content, str):
-        return content or ""
-    if isinstance(content, dict):
-        if content.get("type") in ("thinking", "reasoning"):
-            return ""
-        return _text(content.get("text", content.get("refusal")))
-    if not isinstance(content, list):
-        return None
-    texts = [_text(part) for part in content]
-    return None if None in texts else "".join(filter(None, texts))
+    choice = value["choices"][0]
+    message, ending = choice["message"], str(choice.get("finish_reason") or "").lower()
+    if choice.get("error") or ending in ("error", "abort"):
+        raise AskError("", f"a reply that failed: {choice.get('error') or ending!s:.200}")
+    if not (message.keys() & {"content", "refusal"} or ending):
+        raise LookupError("content")
+    parts, usage = list(_parts(message.get("content"))), value.get("usage")
+    return {
+        "text": "".join(text for kind, text in parts if kind == "text"),
+        "refusal": str(message.get("refusal") or "")
+        + "".join(text for kind, text in parts if kind == "refusal"),
+        "ending": ending,
+        "usage": usage if isinstance(usage, dict) else {},
+    }
+
+
+def _parts(content: Any) -> Iterator[tuple[str, str]]:
+    """Yield kind, "text" or "refusal", and text of the parts of a message, without its thoughts."""
+    if isinstance(content, str):
+        yield "text", content
+    elif isinstance(content, list):
+        for part in content:
+            yield from _parts(part)
+    elif isinstance(content, dict):
+        kind = content.get("type")
+        if kind == "refusal":
+            yield "refusal", str(content.get("refusal"))
+        elif kind not in ("thinking", "reasoning"):
+            yield from _parts(content.get("text"))
+    elif content is not None:
+        raise AskError("", "a message that is no text")
 
 
 def _adapt(settings: dict[str, Any], sent: Mapping[str, Any], problem: str) -> bool:

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from iqtt.vlm.reading import LETTERS, Reading, read_answer
 
-# A kind, what a careful person reads (a letter of A to C, "none" or "refusal"), and the reply. Forms
+# Kind, what a careful person reads (a letter of A to C, "none" or "refusal"), and the reply. Forms
 # are those of the chat templates of open models, and those that parsers of harnesses look for.
 LINES = Path(__file__).with_name("replies.jsonl").read_text(encoding="utf-8").splitlines()
 REPLIES = [tuple(json.loads(line)) for line in LINES]
@@ -60,7 +60,8 @@ def test_any_text_has_a_reading_within_the_letters_offered(text: str, answers: i
     "part",
     [
         "<think>", "<answer>", "\\boxed{", "{", "A, ", A_PLAIN_TEXT, "[", " ", "<|channel|>",
-        "not ", '{"a":', "analysis", "\ud800", "A B ", "\n", "the answer ", "(", "it is ", "A", "<", "( ",
+        "not ", '{"a":', "analysis", "\ud800", "A B ", "\n", "the answer ", "(", "it is ", "A", "<",
+        "( ",
     ],
 )  # fmt: skip
 def test_long_texts_are_read_in_time_that_grows_with_their_length(part: str) -> None:
