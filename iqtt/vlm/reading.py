@@ -14,7 +14,7 @@ import json
 import re
 import unicodedata
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 Outcome = Literal["answered", "unparsed", "refused", "cut off"]
@@ -287,7 +287,7 @@ _NOUN = (
 )
 _OF_ANSWER = _words(
     r"answer|ans|solution|verdict|conclusion|final|choice|pick|selection|guess|decision|prediction|"
-    r"response|option|letter|bet|remaining|antwort|lösung|wahl|réponse|choix|respuesta|solución|elección|"
+    r"response|option|letter|bet|remain(?:s|ing)|antwort|lösung|wahl|réponse|choix|respuesta|solución|elección|"
     r"opción|risposta|scelta|resposta|antwoord|ответ|đáp\s+án",
     "الجواب|उत्तर|答案|答え|正解|回答|解答|选择|選択|选项|정답|답",
 )
@@ -302,8 +302,8 @@ _GOOD = _words(
 _BAD = _words(
     r"mirror\w*|reflect(?:ed|ions?|s)|flipped|inverted|wrong|incorrect\w*|different(?!\s+(?:\w+\s+)?"
     r"(?:angle|view\w*|orientation|perspective|direction|rotation|pose|position|side))|differs?|"
-    r"distinct|mismatch\w*|false|fails?|invalid|opposite|enantiomer\w*|runner-?up|second(?:\s+best|"
-    r"\s+choice|-best)|distractors?|decoys?|gespiegelt\w*|spiegel\w+|falsch\w*|anders|verschieden\w*|"
+    r"distinct|mismatch\w*|false|fails?|invalid|opposite|enantiomer\w*|runner-?up|(?:second|2nd|third|3rd|next|other|alternative)"
+    r"[\s-]+(?:best|choice|option|guess)|alternatives?|least|distractors?|decoys?|gespiegelt\w*|spiegel\w+|falsch\w*|anders|verschieden\w*|"
     r"unterscheidet|miroir|fausse?|faux|incorrecte?s?|différent\w*|espejo|espejad[oa]s?|"
     r"reflejad[oa]s?|incorrect[oa]s?|diferentes?|distint[oa]s?|equivocad[oa]s?|speculare|errat[oa]",
     "镜像|鏡像|错误|錯誤|不同|異な|違|間違|左右反|[✗✘❌✖]",
@@ -315,7 +315,8 @@ _NOT = _words(
 )
 _OTHER = _words(  # what stands before a letter that is compared with, or left out
     r"than|unlike|instead\s+of|opposed\s+to|over|versus|vs|except(?:\s+for)?|exclud\w*|"
-    r"eliminat\w*|reject\w*|rul\w+\s+out|discard\w*|dismiss\w*|avoid\w*|doubt\w*|unlikely|impossible|compared\s+(?:to|with)|"
+    r"eliminat\w*|reject\w*|rul\w+\s+out|discard\w*|dismiss\w*|avoid\w*|doubt\w*|unlikely|impossible|almost|nearly|least|"
+    r"(?:might|may|could)\s+(?:\w+\s+)?(?:choose|pick|select|say|think)|compared\s+(?:to|with)|"
     r"similar\s+to|resembl\w+|confus\w+|tempt\w+|statt|anstatt|außer|anstelle\s+von|au\s+lieu\s+"
     r"de|sauf|en\s+(?:lugar|vez)\s+de|excepto|salvo|if|suppose|assum\w+|wenn|si|could\s+be|"
     r"might\s+be|may\s+be|would\s+have\s+been|were|was|thought",
@@ -328,7 +329,7 @@ _EARLIER = re.compile(  # what a model thought before
 _TURN = re.compile(_words("but|however|now|aber|mais|pero"), re.IGNORECASE)
 _ASIDE = re.compile(  # what tells of something else than the shape, or not quite of the same one
     _words(r"number|count|colou?rs?|sizes?|lengths?|orientation|almost|nearly|partly|partially|"
-           r"roughly|similar|anzahl|farbe|nombre|couleur|número|color|each|every", "数|颜色"),
+           r"roughly|(?<!most\s)similar|anzahl|farbe|nombre|couleur|número|color|each|every", "数|颜色"),
     re.IGNORECASE,
 )  # fmt: skip
 _CHOOSE = _words(
@@ -355,9 +356,10 @@ _SO = _words(
     "因此|所以|故|于是|而是|よって|したがって|従って|なので|따라서",
 )
 _BELIEF = _words(
-    r"(?:i|we)(?:'d|'m|\s+would|\s+am)?\s+(?:think|believe|guess|say|suspect|feel|reckon|conclude|"
+    r"(?:i|we)(?:'d|'m|'ll|\s+would|\s+will|\s+am)?\s+(?:think|believe|guess|say|suspect|feel|reckon|conclude|"
     r"(?:pretty\s+|quite\s+|fairly\s+)?(?:sure|confident|certain))|to\s+(?:guess|choose|pick)|probably|likely|maybe|perhaps|"
-    r"presumably|definitely|clearly|certainly|only|just|looks\s+like|seems\s+(?:like|to\s+be)|"
+    r"presumably|definitely|clearly|certainly|surely|obviously|undoubtedly|by\s+(?:process\s+of\s+)?"
+    r"elimination|only|just|looks\s+like|seems\s+(?:like|to\s+be)|"
     r"appears\s+to\s+be|must\s+be|ich\s+(?:denke|glaube|meine)|vermutlich|wahrscheinlich|"
     r"je\s+(?:pense|crois)|probablement|creo|pienso|probablemente|penso|acho",
     "我认为|我觉得|我想|应该是|可能是|もちろん|おそらく|たぶん",
@@ -444,6 +446,7 @@ _PLACE_OF_PICTURE = re.compile(  # "the second one, B", "the picture in the midd
     r"\bthe\s+(?:(?:first|second|third|last|middle|left|right)\s+)?(?:one|picture|image|option|shape)"
     rf"(?:\s+(?:in|on|at|to)\s+the\s+\w+)?\s*[,:(]\s*(?={_L})", re.IGNORECASE
 )
+_IN_DOUBT = re.compile(r"\W*(?:(?:and|or|maybe|perhaps|possibly|probably)\W*)+|\s+|\s*,\s*", re.IGNORECASE)
 _FILLER = re.compile(
     rf"{_NOUN}|{_words('only|just|definitely|clearly|sure|yes|hmm|ok|okay|final|both|either')}|[\W_]",
     re.IGNORECASE,
@@ -505,6 +508,7 @@ def _sentences(text: str) -> list[str]:
     text = re.sub(r"<[^<>\n]{1,60}>", " ", text)
     text = re.sub(r"(?:\\|\t)(?:text(?:bf|rm|it)?|math(?:bf|rm|sf)|bf|rm|mbox)\s*\{([^{}]*)\}", r"\1", text)
     text = re.sub(r"\\n(?![a-z])", "\n", text)
+    text = re.sub(r"(?<=[A-Za-z])_(?=[A-J]\b)|\[[xX]\](?=\s*\W?[A-J]\b)", " ", text)
     text = re.sub(r"```\w*|[*_`$~#]|\\[()\[\]]|^[\s>]+", lambda m: "\n" if "\n" in m[0] else "", text, flags=re.MULTILINE)
     text = re.sub(rf"(?<={_CJK})(?=[A-Za-z(\"\[])|(?<=[A-Za-z)\"\]])(?={_CJK})", " ", text)
     text = re.sub(r"\b(fig|pic|opt|ans|img)\.(?=\s*\W?[A-Ja-j]\b)", r"\1", text, flags=re.IGNORECASE)
@@ -516,6 +520,10 @@ def _sentences(text: str) -> list[str]:
     text = re.sub(r"\b(?:anything|everything|everyone|all|any) but\b", "except", text, flags=re.IGNORECASE)
     text = re.sub(r"([:：])\s*\n\s*", r"\1 ", text)
     text = re.sub(r"^(\W{0,2}[A-J]\W?)[.)]+[ \t]+(?=\S)", r"\1: ", text, flags=re.MULTILINE)
+    text = re.sub(
+        r"\bif (?:i (?:had|have|must)(?: to)?|forced to) (?:guess|choose|pick|decide)\b", "probably",
+        text, flags=re.IGNORECASE,
+    )  # fmt: skip
     text = re.sub(
         r"\bon (?:second thoughts?|(?:\w+ )?(?:reflection|inspection))\b", "actually", text,
         flags=re.IGNORECASE,
@@ -530,28 +538,37 @@ def _with_capital(match: re.Match[str]) -> str:
     return found[:last] + found[last].upper() + found[last + 1 :]
 
 
-def _standings(sentence: str, offered: str, only: bool) -> Iterator[_Mention]:
-    """Yield the letters that a sentence names, in order, each with its standing."""
+def _standings(sentence: str, offered: str, only: bool) -> list[_Mention]:
+    """Return the letters that a sentence names, in order, each with its standing.
+
+    Args:
+        only: whether this is all of the text. Then "B?" is an answer.
+    """
     found = [m for m in _MENTION.finditer(sentence) if _named(m[0])]
     found = [m for m in found if not (len(_named(m[0])) > 1 and _named(m[0]) == set(offered))]
-    alone = not _FILLER.sub("", _MENTION.sub("", sentence)) and bool(found)
+    alone = not _FILLER.sub("", _MENTION.sub("", sentence))
     asked = sentence.rstrip().endswith("?") and not only
-    listed = False
+    mentions, listed, doubtful = list[_Mention](), False, False
     for i, mention in enumerate(found):
+        last = i + 1 == len(found)
         before = sentence[found[i - 1].end() if i else 0 : mention.start()]
-        after = sentence[mention.end() : found[i + 1].start() if i + 1 < len(found) else None]
-        letters = frozenset(_named(mention[0]))
+        after = sentence[mention.end() : None if last else found[i + 1].start()]
         label = bool(re.match(r"[A-J]?\s*(?::|-\s|[)\]])\s*\S", mention[0][-1] + after))
         if i and label and listed:
             before = ""  # the remark on another letter
         label = label and not before.strip()
         listed = listed or label
-        if i + 1 < len(found):
+        if not last:
             after = _DENIAL_AT_END.sub("", after)  # "B rather than A"
         standing = "" if asked else _standing(before, after, label, i == 0)
         if alone and not asked and standing not in ("declared", "denied", "said"):
             standing = "alone"
-        yield _Mention(letters, standing, label)
+        letters = frozenset(_named(mention[0]))
+        if doubtful and "denied" not in (standing, mentions[-1].standing):  # "B, or maybe A"
+            mentions[-1] = replace(mentions[-1], letters=mentions[-1].letters | letters)
+        doubtful = not last and _IN_DOUBT.fullmatch(after) is not None
+        mentions.append(_Mention(letters, standing, label))
+    return mentions
 
 
 def _named(mention: str) -> set[str]:
