@@ -8,6 +8,7 @@ from iqtt.vlm.words import (
     ABOUT_ANSWER,
     AFTER_ANSWER,
     ASIDE,
+    BAD,
     BAD_WORD,
     BEFORE_ANSWER,
     BEFORE_BELIEF,
@@ -21,9 +22,11 @@ from iqtt.vlm.words import (
     DENIAL_AT_END,
     EARLIER,
     FILLER,
+    GOOD,
     GOOD_WORD,
     HARMLESS,
     IN_DOUBT,
+    LEAD_IN,
     NOT_WORD,
     NOUN,
     OF_ANSWER,
@@ -76,6 +79,7 @@ _SMALL = [
     rf"(?:{OF_ANSWER}\s+is|{CHOOSE})\s+[bc](?=\s)",
     rf"{BELIEF}{THAT}[bc](?=\W*$|\s+because)|^\W*its\s+[bc](?=\W*$)",
     r"^\W*[a-j]\W*$",
+    rf"^\W*[a-c](?=\s*[):]\s)|(?<![\w'])[a-c](?=\s+is\s+(?:the\s+)?(?:{GOOD}|{BAD}))",
     r"^\W*[bc](?=\s+(?:because|since|as|is|matches|shows)\b)",
 ]
 # "the second one, B", "the picture in the middle (B)"
@@ -83,7 +87,7 @@ _PLACE = (
     r"\bthe\s+(?:(?:first|second|third|last|middle|left|right)\s+)?"
     r"(?:one|picture|image|option|shape)(?:\s+(?:in|on|at|to)\s+the\s+\w+)?\s*[,:(]\s*"
 )
-_YES = any_of("yes|yep|correct|no|nope|wrong")
+_YES = any_of("yes|yep|correct|no|nope|wrong|match|same|mirror(?:ed)?|different")
 # What makes plain sentences of a text: patterns with their replacements, in this order.
 _PLAIN: list[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]] = [
     (re.compile(r"<([A-J])>(?!.*</\1>)", re.DOTALL), r"(\1)"),
@@ -187,6 +191,7 @@ def _standing(before: str, after: str, label: bool, first: bool) -> str:
         ("denied", BAD_WORD.search(after)),
         ("believed", BEFORE_BELIEF.search(before) and ends),
         ("alone", ends and first and not before.strip()),
+        ("alone", ends and first and LEAD_IN.fullmatch(before) and not DENIAL.search(before)),
         ("said", same_before and not DENIAL.search(before)),  # "the reference matches B"
         ("said", same_after and not same_before),  # "B matches the reference"
         ("label", label),

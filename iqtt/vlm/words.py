@@ -38,7 +38,7 @@ NOUN = (
 # What declares that an answer follows: "the solution is", "Antwort:".
 OF_ANSWER = any_of(
     r"""answer|ans|solution|verdict|conclusion|final|choice|pick|selection|guess|decision
-    prediction|response|option|letter|bet|remain(?:s|ing)
+    prediction|response|result|output|label|option|letter|bet|remain(?:s|ing)
     antwort|lösung|wahl
     réponse|choix
     respuesta|solución|elección|opción
@@ -60,7 +60,7 @@ GOOD = any_of(
 BAD = any_of(
     r"""mirror\w*|reflect(?:ed|ions?|s)|flipped|inverted|wrong|incorrect\w*|differs?|distinct
     different(?! (?:\w+ )?(?:angle|view\w*|orientation|perspective|direction|rotation|pose|side))
-    mismatch\w*|false|fails?|invalid|opposite|enantiomer\w*|runner-?up|least|distractors?|decoys?
+    mismatch\w*|false|fails?|invalid|opposite|enantiomer\w*|runner-?up|least|odd|distractors?|decoys?
     (?:second|2nd|third|3rd|next|other|alternative)[\s-]+(?:best|choice|option|guess)|alternatives?
     gespiegelt\w*|spiegel\w+|falsch\w*|anders|verschieden\w*|unterscheidet
     miroir|fausse?|faux|incorrecte?s?|différent\w*
@@ -88,7 +88,8 @@ OTHER = any_of(
     "排除|比|而非|除了|如果|より",
 )
 CHOOSE = any_of(
-    r"""choos(?:e|es|ing)|chose|pick(?:s|ed|ing)?|select(?:s|ed|ing)?|go(?:ing)? (?:with|for)
+    r"""choos(?:e|es|ing)|chosen?|bet on|pick(?:s|ed|ing)?|select(?:s|ed|ing)?
+    go(?:ing)? (?:with|for)
     opt(?:s|ed|ing)? for|vote for|settl(?:e|ed|ing) (?:on|for)|decid(?:e|ed|ing) (?:on|for)
     (?:change|revise|correct|switch|update)d? (?:(?:my|the) )?(?:(?:answer|mind|choice) )?to
     i meant?|inclined to say|lean(?:ing)? towards?|prefer|switch(?:ing)? to|answer|ans|final
@@ -102,7 +103,7 @@ CHOOSE = any_of(
 SO = any_of(
     r"""therefore|thus|hence|so|then|consequently|accordingly|finally|overall|ultimately
     in conclusion|in summary|(?:that |which )?leaves|leaving|but(?: rather)?|sure|okay|ok
-    (?:so |then )?(?:it|this|that)(?:'?s| is| must be| has to be| would be| should be)
+    (?:so |then )?(?:it|this|that)(?:'?s| is| (?:must|has to|would|should|c(?:an|ould) only) be)
     actually|scratch that|correction|edit|no(?=,)|wait|(?:the )?(?:picture|image|figure) is
     daher|deshalb|folglich|also|somit|sondern|es ist|bleibt
     donc|ainsi|alors|c'est|mais
@@ -182,6 +183,7 @@ BREAK = compiled(  # between the clause of a letter and the next one
         "因为|因為|因|而|但",
     )
 )
+LEAD_IN = compiled(r"(?:[^\W\d_]+[\s'-]*){1,6},\s*")  # "As far as I can tell, "
 IN_DOUBT = compiled(r"\W*(?:(?:and|or|maybe|perhaps|possibly|probably)\W*)+|\s+|\s*,\s*")
 FILLER = compiled(
     rf"{NOUN}|{any_of('only|just|definitely|clearly|sure|yes|hmm|ok|okay|final|both|either')}|[\W_]"
