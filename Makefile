@@ -19,7 +19,7 @@ command -v chromium > /dev/null || echo "No Chromium: tests of pages are skipped
 $(PIP) --no-compile -e '.[$(1)]'; status=$$?; wait; exit $$status
 endef
 
-.PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results fuzz torture dist clean
+.PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results fuzz torture vlmevalkit dist clean
 
 demo: $(VENV)/.runtime
 	mkdir -p demo
@@ -86,6 +86,17 @@ docs: $(VENV)/.docs
 
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"
+
+# VLMEvalKit pins other versions, so it has an environment of its own, of 7 GB. `make test-all` runs
+# it where `make vlmevalkit` has made that, or where VLMEVALKIT_PYTHON names another one.
+VLMEVALKIT = .venv-vlmevalkit
+ifneq ($(wildcard $(VLMEVALKIT)/bin/python),)
+export VLMEVALKIT_PYTHON ?= $(CURDIR)/$(VLMEVALKIT)/bin/python
+endif
+
+vlmevalkit:
+	$(PYTHON) -m venv $(VLMEVALKIT)
+	$(VLMEVALKIT)/bin/python -m pip install -q --disable-pip-version-check ms-vlmeval==0.0.20
 
 test-all: $(VENV)/.dev check
 	$(BIN)/python -m pytest -q -n $(WORKERS)

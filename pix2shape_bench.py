@@ -26,6 +26,7 @@ from inspect_ai.scorer import (
 from inspect_ai.solver import TaskState, generate
 
 from iqtt.vlm import harness
+from iqtt.vlm.reading import ENDINGS
 
 
 @task
@@ -113,7 +114,9 @@ def letter() -> Scorer:
     """Score the letter that the model's text gives; see `iqtt.vlm.reading`."""
 
     async def score(state: TaskState, target: Target) -> Score:  # noqa: ARG001
-        row = harness.answered(state.metadata, state.output.completion)
+        output = state.output
+        ended = "refusal" if output.error else "" if output.empty else output.stop_reason
+        row = harness.answered(state.metadata, output.completion, ENDINGS.get(ended))
         return Score(
             value=row["score"],
             answer=row["letter"],

@@ -404,7 +404,11 @@ def _check_groups(scores: ScoreFile) -> None:
         right = np.sum([group.right for group in groups.values()], axis=0)
         total = scores.columns[ACCURACY].sum(axis=1)
         questions = sum(group.n for group in groups.values())
-        wrong = right > total if grouping == "by_circle" else right != total
-        if questions != len(scores.ids) or wrong.any():
+        of_all = len(scores.ids)
+        if grouping == "by_circle":  # of those that were asked in every order
+            wrong = (right > total) | (questions > of_all)
+        else:
+            wrong = (right != total) | (questions != of_all)
+        if wrong.any():
             found = f"{right} right of {questions} questions"
             raise refusal(place, found, f"{total} of {len(scores.ids)}, as in items")

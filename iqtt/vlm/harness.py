@@ -7,14 +7,18 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from iqtt.vlm.reading import LETTERS, read_answer
+from iqtt.vlm.reading import LETTERS, Outcome, read_reply
 
 Answered = Mapping[str, Any]
 
 
-def answered(row: Mapping[str, Any], text: str) -> dict[str, Any]:
-    """Return how a model's text answers a row of `questions.parquet`."""
-    reading = read_answer(text, len(row["choices"]))
+def answered(row: Mapping[str, Any], text: str, outcome: Outcome | None = None) -> dict[str, Any]:
+    """Return how a model's text answers a row of `questions.parquet`.
+
+    Args:
+        outcome: "refused" or "cut off" where the harness tells that.
+    """
+    reading = read_reply(text, len(row["choices"]), outcome)
     letter = None if reading.answer is None else LETTERS[reading.answer]
     kept = ("question_index", "rotation", "kind", "shape", "floor")
     return {
@@ -47,8 +51,8 @@ def skill(rows: Sequence[Answered]) -> float:
 
 
 def unparsed(rows: Sequence[Answered]) -> float:
-    """Return the share of rows without an answer: unparsed or refused."""
-    return float(sum(row["outcome"] != "answered" for row in rows) / len(rows))
+    """Return the share of rows without a letter."""
+    return float(sum(row["letter"] is None for row in rows) / len(rows))
 
 
 def doc_to_visual(doc: Mapping[str, Any]) -> list[Any]:

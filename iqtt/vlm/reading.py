@@ -1,52 +1,30 @@
-"""Which answer a model's text names: one function for every harness."""
+"""Which answer a model's text names: one function for every harness.
+
+1. `replies` takes away what is no reply: thoughts, other turns, marks of chat templates.
+2. Tags, boxes and JSON that declare their content to be the answer decide.
+3. Else every letter that is named has a standing by the words around it (`mentions`).
+4. The strongest standing decides. Where that names several letters, the text has no answer.
+
+A text that a careful person would call unclear stays unread.
+"""
 
 import json
-import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-Outcome = Literal["answered", "unparsed", "refused"]
+from iqtt.vlm.mentions import mentions
+from iqtt.vlm.replies import declared_parts, plain_characters, replies
+from iqtt.vlm.words import FILLER, REFUSAL
+
+Outcome = Literal["answered", "unparsed", "refused", "cut off"]
 LETTERS = "ABCDEFGHIJ"
-_THOUGHT = re.compile(r"<(think|thinking|reasoning)>.*?</\1>", re.DOTALL | re.IGNORECASE)
-_UNFINISHED = re.compile(r"<(think|thinking|reasoning)>.*", re.DOTALL | re.IGNORECASE)
-_BOXED = re.compile(r"\\boxed\s*\{\s*((?:[^{}]|\{[^{}]*\})*)\}")
-_LATEX = re.compile(r"\\(?:text|textbf|mathrm|mathbf|rm)\s*\{([^{}]*)\}")
-_NOUN = (
-    r"(?:the\s+)?(?:picture|pictures|image|option|choice|answer|figure|candidate|letter|shape)s?"
-)
-_LETTER = r"[\(\[\"'“‘]*([A-J])(?![A-Za-z'’])"
-# A letter that is said to be the answer. The article "a" is lower case, so letters are upper case.
-_STATED = re.compile(
-    r"(?:"
-    r"(?i:\banswer\s*(?:is|was|would\s+be|should\s+be|must\s+be|:|=|-|→|->)+)"
-    r"|(?i:\bfinal\s+answer\s*(?:is|:|=|-)*)"
-    r"|(?i:\b(?:choose|pick|select|chose|picked|selected|choosing|go\s+with|go\s+for)\b)"
-    r"|(?i:\b(?:correct|right|matching|best|same)\s+(?:one|answer|option|choice|picture|image|"
-    r"match|shape|figure)\s*(?:is|would\s+be|must\s+be|:|=)+)"
-    r"|(?i:\bit(?:'s|\s+is|\s+must\s+be)\b)"
-    r")\s*(?i:" + _NOUN + r"\s*)?:?\s*" + _LETTER
-)
-# "Picture B shows the same shape", "B is the correct answer", "B matches the reference".
-_SAID_OF = re.compile(
-    r"(?:\b(?i:" + _NOUN + r")\s+)?(?<![A-Za-z])" + _LETTER + r"[\)\]\"'”’]*\s+(?i:"
-    r"(?:is|shows|would\s+be|must\s+be|depicts)\s+(?:\w+\s+){0,4}?(?:answer|correct|right|match|same)"
-    r"|matches|is\s+the\s+one)"
-)
-_NEGATED = re.compile(r"(?i)\b(?:not|isn't|cannot|neither|never|n't)\b")
-_NAMED = re.compile(r"\b(?i:" + _NOUN + r")\s*:?\s*" + _LETTER)
-_ALONE = re.compile(r"^\W*(?:(?i:" + _NOUN + r")\W*)?([A-Ja-j])\W*$")
-_LEADING = re.compile(r"^[\s\(\[\"'*_#>]*([A-J])\s*[\)\].:,\-–—*]+(?:\s|$)")
-_OTHERS = re.compile(
-    r"^[\)\]\"'”’]*\s*(?:,|/|&|\||(?i:or|and|nor|vs\.?|both|as\s+well\s+as))\s*(?i:"
-    + _NOUN
-    + r"\s*)?[\(\[\"']*([A-J])(?![A-Za-z'’])"
-)
-_BEFORE = re.compile(r"([A-J])[\)\]]?\s*(?:,|/|&|or|and)\s*(?i:" + _NOUN + r"\s*)?[\(\[]?$")
-_REFUSAL = re.compile(
-    r"(?i)\b(?:i\s*(?:'|’)?\s*(?:m|am)\s+(?:sorry|unable|not\s+able)|i\s+(?:can\s*not|can(?:'|’)t"
-    r"|won(?:'|’)t|refuse|decline)|unable\s+to\s+(?:see|view|determine|help|answer|process)"
-    r"|no\s+image\s+(?:was|is|has)|as\s+an?\s+(?:ai|language)\b)"
-)
+# What servers and harnesses call the end of a reply, where it is no answer like others.
+ENDINGS: Mapping[str, Outcome] = {
+    **dict.fromkeys(("length", "max_tokens", "model_length", "max_output_tokens"), "cut off"),
+    **dict.fromkeys(("content_filter", "refusal", "safety", "prohibited_content"), "refused"),
+}
+QUOTED, QUOTE = 3, 80  # unread replies that are quoted, and their characters
 
 
 @dataclass(frozen=True)
@@ -54,106 +32,99 @@ class Reading:
     """What a text answers.
 
     Attributes:
-        answer: index of the letter, 0 for A; None unless `outcome` is "answered".
-        outcome: "unparsed" where the text names no letter, a letter that is not offered, or
-            several of them; "refused" where it says that the model does not answer.
+        answer: index of the letter, 0 for A; None where there is none.
+        outcome: "answered"; "unparsed" where the text names no letter, a letter that is not
+            offered, or several; "refused" where it says that the model does not answer; "cut off"
+            where the reply was ended by a limit of tokens, with its answer if it declares one.
     """
 
     answer: int | None
     outcome: Outcome
 
 
-def read_answer(text: str, answers: int = 3) -> Reading:
+def read_answer(text: str, answers: int = 3, *, cut_off: bool = False) -> Reading:
     """Return which of A, B, C ... a model's text gives as its answer.
 
-    Thoughts between `<think>` tags do not count. The last plain statement decides: a LaTeX box,
-    then "the answer is B", then a text, a first line or a last line that is a letter alone, then
-    the only letter that is named at all. A statement of two letters is no answer.
+    What is declared to be the answer wins over what is said of a picture, wherever it stands; the
+    last declaration counts. What is denied, compared or asked is no answer. Thoughts do not count.
 
     Args:
         answers: how many letters are offered, 1 to 10.
+        cut_off: whether the text ended because of a limit of tokens. Only a declared answer, or a
+            letter alone, counts then.
     """
-    text = _UNFINISHED.sub("", _THOUGHT.sub("", text)).strip()
-    for read in (_of_json, _of_box, _of_short_text, _of_statements, _of_lines, _of_names):
-        letters = read(text)
+    text = plain_characters(text)
+    letters: set[str] = set()
+    for reply in replies(text):
+        letters = _letters(reply, LETTERS[:answers], cut_off)
         if letters:
             break
-    else:
-        return Reading(None, "refused" if _REFUSAL.search(text) else "unparsed")
-    index = LETTERS.find(next(iter(letters)).upper()) if len(letters) == 1 else -1
-    return Reading(index, "answered") if 0 <= index < answers else Reading(None, "unparsed")
+    index = LETTERS.find(next(iter(letters))) if len(letters) == 1 else -1
+    answer = index if 0 <= index < answers else None
+    if cut_off:
+        return Reading(answer, "cut off")
+    if answer is not None:
+        return Reading(answer, "answered")
+    refused = not letters and any(map(REFUSAL.search, replies(text)))
+    return Reading(None, "refused" if refused else "unparsed")
 
 
-def _of_json(text: str) -> set[str]:
-    bare = re.sub(r"^```(?:json)?|```$", "", text).strip()
-    if not bare.startswith("{"):
+def read_reply(text: str, answers: int, outcome: Outcome | None) -> Reading:
+    """Return how a reply is read whose end a server or a harness tells, as ENDINGS has it."""
+    if outcome == "refused":
+        return Reading(None, "refused")
+    return read_answer(text, answers, cut_off=outcome == "cut off")
+
+
+def unread_note(unread: Sequence[tuple[str, str]], rows: int) -> str:
+    """Return the share of rows without a letter, and the first three of their texts.
+
+    Args:
+        unread: name of the row and text of the model, of each row without a letter.
+        rows: how many replies there are.
+    """
+    if not unread:
+        return f"all of {rows} replies name a letter"
+    quoted = [f"{name}: {_quoted(text)}" for name, text in unread[:QUOTED]]
+    share = f"{len(unread)} of {rows} replies name no letter ({len(unread) / rows:.0%})"
+    return f"{share}, such as {'; '.join(quoted)}"
+
+
+def _quoted(text: str) -> str:
+    """Return the end of a text, where an answer would stand, as one line that prints."""
+    line = " ".join(text.split()).encode(errors="replace").decode()
+    line = "".join(c if c.isprintable() else "?" for c in line)
+    return json.dumps(line if len(line) <= QUOTE else f"...{line[3 - QUOTE :]}", ensure_ascii=False)
+
+
+def is_thought_alone(text: str) -> bool:
+    """Return whether a text holds nothing outside of the model's thoughts."""
+    return not any(replies(plain_characters(text)))
+
+
+def _letters(text: str, offered: str, cut_off: bool) -> set[str]:
+    """Return the letters that a reply answers with: one, several where it is unclear, or none."""
+    for part in reversed(declared_parts(text)):
+        letters = _letters(part, offered, False)
+        if letters:
+            return letters
+    return _letters_in_prose(text, offered, cut_off)
+
+
+def _letters_in_prose(text: str, offered: str, cut_off: bool) -> set[str]:
+    found = mentions(text, offered)
+    declared = [i for i, mention in enumerate(found) if mention.standing == "declared"]
+    if declared:
+        last, later = found[declared[-1]], found[declared[-1] + 1 :]
+        taken_back = any(m.standing == "denied" and m.letters == last.letters for m in later)
+        return set(LETTERS) if taken_back else set(last.letters)
+    denied = {letter for m in found if m.standing == "denied" for letter in m.letters}
+    labels = {letter for m in found if m.labelled for letter in m.letters}
+    if cut_off and len(FILLER.sub("", text)) != 1:
         return set()
-    try:
-        value = json.loads(bare)
-    except ValueError:
-        return set()
-    said = next((value[key] for key in ("answer", "choice", "final_answer") if key in value), None)
-    return _of_short_text(said) if isinstance(said, str) else set()
-
-
-def _of_box(text: str) -> set[str]:
-    boxes = _BOXED.findall(text)
-    return _in_short(_LATEX.sub(r"\1", boxes[-1])) if boxes else set()
-
-
-def _of_short_text(text: str) -> set[str]:
-    """Return the letters of a text that is little more than a letter."""
-    lines = [line for line in text.splitlines() if line.strip()]
-    return _in_short(lines[0]) if len(lines) == 1 else set()
-
-
-def _in_short(line: str) -> set[str]:
-    line = re.sub(r"[*_`$]", "", line).strip()
-    alone = _ALONE.match(line)
-    if alone:
-        return {alone[1].upper()}
-    # "A or B", "A, C", "(A) and (B)": several letters and nothing else.
-    words = re.findall(r"[A-Za-z]+", line)
-    letters = {word for word in words if len(word) == 1 and word in LETTERS}
-    rest = {word.lower() for word in words} - {letter.lower() for letter in letters}
-    joining = {"or", "and", "either", "both", "picture", "pictures", "image", "images"}
-    return letters if len(letters) > 1 and rest <= joining else set()
-
-
-def _of_statements(text: str) -> set[str]:
-    """Return the letters of the last statement of an answer."""
-    plain = re.sub(r"[*_`$]", "", _LATEX.sub(r"\1", text))
-    statements = [(m.start(1), m) for m in _STATED.finditer(plain)]
-    statements += [(m.start(1), m) for m in _SAID_OF.finditer(plain) if not _negated(m[0])]
-    if not statements:
-        return set()
-    match = max(statements, key=lambda pair: pair[0])[1]
-    letters, end = {match[1]}, match.end(1)
-    before = plain[: match.start(1)]
-    joined = re.search(
-        r"([A-J])[\)\]]?\s*(?:,|/|&|or|and)\s*(?i:" + _NOUN + r"\s*)?[\(\[]?$", before
-    )
-    letters |= {joined[1]} if joined else set()
-    while other := _OTHERS.match(plain[end:]):
-        letters.add(other[1])
-        end += other.end(1)
-    return letters
-
-
-def _negated(sentence: str) -> bool:
-    return _NEGATED.search(sentence) is not None
-
-
-def _of_lines(text: str) -> set[str]:
-    """Return the letter of a last line, or of a first line, that begins or ends with it."""
-    lines = [re.sub(r"[*_`$]", "", line) for line in text.splitlines() if line.strip()]
-    for line in (lines[-1], lines[0]) if lines else ():
-        alone = _ALONE.match(line) or _LEADING.match(line)
-        if alone:
-            return {alone[1].upper()}
+    for standing in ("alone", "believed", "said", "label"):
+        letters = {letter for m in found if m.standing == standing for letter in m.letters}
+        letters = letters if len(letters) > 1 else letters - denied
+        if letters and (standing != "label" or len(labels) == 1):
+            return letters
     return set()
-
-
-def _of_names(text: str) -> set[str]:
-    """Return all letters that stand after a noun such as "picture"."""
-    return set(_NAMED.findall(re.sub(r"[*_`$]", "", text)))

@@ -56,7 +56,7 @@ SERVER = "http://127.0.0.1:8000/v1"
     type=click.IntRange(1, 1_000_000),
     default=1024,
     show_default=True,
-    help="Most tokens of a reply.",
+    help="Most tokens of a reply, with its thoughts.",
 )
 @click.option(
     "--timeout",
@@ -108,6 +108,7 @@ def ask(
     needs("bench ask", ("httpx",), "vlm")
     from iqtt.vlm.ask import Server, totals
     from iqtt.vlm.ask import ask as ask_rows
+    from iqtt.vlm.reading import unread_note
     from iqtt.vlm.rows import Asked, count_rows
     from metrics.intake.harness_logs import read_returned, write_returned
 
@@ -124,14 +125,27 @@ def ask(
         replies = ask_rows(asked, server, log, bar.update)
     sums = totals(replies)
     print_line(
-        f"{log}: {sums.rows} replies, {sums.unparsed} without a letter, {sums.refused} refused;"
-        f" {sums.input_tokens:,} + {sums.output_tokens:,} tokens"
+        f"{log}: {sums.rows} replies, {sums.unparsed} without a letter, {sums.refused} refused,"
+        f" {sums.cut_off} cut off; {sums.input_tokens:,} + {sums.output_tokens:,} tokens"
     )
+    unread = [(reply["id"], reply["text"]) for reply in replies if reply["letter"] is None]
+    print_line(f"{log}: {unread_note(unread, sums.rows)}")
+    if sums.cut_off:
+        spent = f", {sums.only_thoughts} of them in thoughts" if sums.only_thoughts else ""
+        advice = "give more, and a new --log"
+        print_line(
+            f"{log}: {sums.cut_off} of {sums.rows} replies were cut off at --max-tokens"
+            f" {server.max_tokens}{spent}; {advice}"
+        )
+    if any("temperature" not in reply.get("settings", {"temperature": 0}) for reply in replies):
+        print_line(f"{log}: the server has one temperature, and was asked without --temperature")
     if prices is not None:
         cost = (sums.input_tokens * prices[0] + sums.output_tokens * prices[1]) / 1e6
         print_line(f"{log}: cost {cost:.4f}, at {prices[0]:g} and {prices[1]:g} a million tokens")
     if sums.known:
-        print_line(f"{log}: {sums.right} of {sums.known} rows right")
+        print_line(
+            f"{log}: {sums.right} of {sums.known} rows right; {sums.unread / sums.rows:.0%} unread"
+        )
     if out is not None:
         write_returned(out, file, read_returned(log), part=part, overwrite=overwrite)
         print_line(f"{out}: answers of {name}; next: bench score {out}")

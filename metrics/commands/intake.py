@@ -116,10 +116,14 @@ def import_(
             log = read_returned(answers)
             texts["notes"] = notes or log.settings
             count = write_returned(out, truth, log, method=method or "", **texts)
+            for note in filter(None, (log.failure_note, log.unread_note)):
+                print_line(f"{answers}: {note}")
         else:
             stem = Path(answers).stem
             count = import_answers(answers, truth, out, method=method or stem, **texts)
-        print_line(f"{out}: answers to {count} questions")
+        total = count_rows(truth)
+        of_all = f" of {total}" if count < total else ""
+        print_line(f"{out}: answers to {count}{of_all} questions")
         return
     assert pattern is not None
     if unit and scale:

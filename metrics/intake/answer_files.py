@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from iqtt.questions.specs import LETTERS
+from iqtt.vlm.reading import read_answer
 from metrics.submissions.problems import JsonError
 from metrics.submissions.rules import MOST_ROWS
 from metrics.submissions.strict_json import parse_json, read_bytes
@@ -40,7 +41,7 @@ def import_answers(
     A CSV file has columns `question` (may be left out where all questions are answered in order)
     and `answer`, or a score of each answer: `A`, `B`, `C`. A line of JSON has the same keys, or
     `scores`. JSON is a list, or an object from question to answer. An answer is an index from 0, a
-    letter from A, or -1 or nothing to abstain.
+    letter from A, a text that `read_answer` reads, or -1 or nothing to abstain.
 
     Raises AnswerFileError, PredictionError, and OSError.
     """
@@ -169,6 +170,9 @@ def _value(value: Any, place: str) -> int | list[float]:
         return LETTERS.index(text)
     if re.fullmatch("-1|[0-2]|", text):
         return int(text or -1)
+    said = read_answer(value, len(LETTERS)).answer if isinstance(value, str) else None
+    if said is not None:  # "B<|im_end|>", or another reply of a model
+        return said
     expected = "an index from 0, a letter from A, or -1 to abstain"
     raise AnswerFileError(f"{place}: answer", f"{value!r:.40}", expected)
 

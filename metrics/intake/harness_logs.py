@@ -7,9 +7,10 @@ result sheets of VLMEvalKit (.tsv, .csv, .xlsx).
 import csv
 import json
 import re
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,12 +20,20 @@ from iqtt.files.reader import QuestionsFile
 from iqtt.vlm.ask import FORMAT as ASKED
 from iqtt.vlm.ask import read_heading, read_log
 from iqtt.vlm.export import CIRCULAR
-from iqtt.vlm.reading import Outcome, Reading, read_answer
-from metrics.submissions.rules import OUTCOMES
+from iqtt.vlm.reading import ENDINGS, Outcome, read_reply, unread_note
+from metrics.submissions.rules import NOT_ASKED, OUTCOMES
 from metrics.submissions.writer import write_answers
 from scenegen.common.errors import FileFormatError, SceneGenError
 
 ABSTAINED = -1
+REASONS, LONGEST_REASON = 3, 120  # reasons of failures that are told, and their characters
+# What lmms-eval and VLMEvalKit write in place of a reply that never came.
+FAILED = re.compile(r"\s*(?:\[LMMS_EVAL_REQUEST_FAILED|Fail(?:ed)? to obtain answer|Error: )")
+BLOCKED = "[SAFETY_BLOCKED"  # lmms-eval, where a server refuses
+NO_TEXT = ("nan", "NaN", "None", "<NA>")  # what Python and pandas write for nothing
+
+
+Place = tuple[int, int]  # question and rotation
 
 
 @dataclass(frozen=True)
@@ -35,8 +44,9 @@ class ReturnedAnswer:
         question: row of the question in its file.
         rotation: letter k showed the answer (k + rotation) mod K of the file.
         answer: of the file, from 0; ABSTAINED where there is none.
-        outcome: "answered", "unparsed" or "refused".
+        outcome: "answered", "unparsed", "refused" or "cut off".
         digest: of the table that was asked; "" where the log does not tell.
+        text: of the model.
     """
 
     question: int
@@ -44,6 +54,7 @@ class ReturnedAnswer:
     answer: int
     outcome: Outcome
     digest: str
+    text: str = ""
 
 
 @dataclass(frozen=True)
@@ -52,15 +63,40 @@ class Log:
 
     Attributes:
         path: of the log.
+        harness: its name.
         model: its name; "" where the log does not tell.
         settings: how the model was asked; no prompt and no key.
         answers: in the order of questions and rotations.
+        failures: why a row has no answer, by question and rotation: the model, or the harness,
+            failed. These rows are left out of `answers`.
     """
 
     path: Path
+    harness: str
     model: str
     settings: str
     answers: tuple[ReturnedAnswer, ...]
+    failures: Mapping[Place, str] = field(default_factory=dict)
+
+    @property
+    def failure_note(self) -> str:
+        """How many rows failed, and how often each reason came; "" where none failed."""
+        if not self.failures:
+            return ""
+        rows = len(self.answers) + len(self.failures)
+        reasons = Counter(self.failures.values()).most_common(REASONS)
+        told = "; ".join(f"{reason} ({count})" for reason, count in reasons)
+        return f"{len(self.failures)} of {rows} samples failed in {self.harness}: {told}"
+
+    @property
+    def unread_note(self) -> str:
+        """The share of answers without a letter, and the first texts of these."""
+        unread = [
+            (f"{answer.question}-{answer.rotation}", answer.text)
+            for answer in self.answers
+            if answer.answer == ABSTAINED
+        ]
+        return unread_note(unread, len(self.answers))
 
 
 def is_log(path: str | Path) -> bool:
@@ -81,8 +117,11 @@ def is_log(path: str | Path) -> bool:
 def read_returned(path: str | Path) -> Log:
     """Return the answers of a log.
 
-    Raises OSError; FileFormatError for a log that is damaged, of a task that is not ours, or with
-    two answers to a row.
+    Rows that failed are left out and counted. A failed row that was answered at another try is an
+    answer.
+
+    Raises OSError; FileFormatError for a log that is damaged, of a task that is not ours, in which
+    all rows failed, or with two answers to a row.
     """
     path = Path(path)
     readers = {".eval": _of_inspect, ".json": _of_inspect, ".jsonl": _of_lines}
@@ -100,9 +139,15 @@ def read_returned(path: str | Path) -> Log:
             found = f"two answers to question {row[0]}, rotation {row[1]}"
             raise FileFormatError(path, found, "one each")
         seen.add(row)
+    failed = {place: reason for place, reason in log.failures.items() if place not in seen}
+    log = replace(
+        log,
+        answers=tuple(sorted(log.answers, key=lambda a: (a.question, a.rotation))),
+        failures=failed,
+    )
     if not seen:
-        raise FileFormatError(path, "no answers", "at least one")
-    return replace(log, answers=tuple(sorted(log.answers, key=lambda a: (a.question, a.rotation))))
+        raise FileFormatError(path, log.failure_note or "no answers", "at least one answer")
+    return log
 
 
 def write_returned(
@@ -120,6 +165,7 @@ def write_returned(
 
     The answer to a question is that of rotation 0; where it has no letter it counts as wrong. The
     answers of all rotations are stored beside it, for circular accuracy, and so is the outcome.
+    A question whose rotation 0 failed is left out.
 
     Raises FileFormatError where the log is of other questions; else as `write_answers`.
     """
@@ -136,8 +182,11 @@ def write_returned(
             found = f"question {answer.question} in rotation {answer.rotation}"
             raise FileFormatError(log.path, found, f"rotations 0 to {offered - 1}")
     first = [answer for answer in log.answers if answer.rotation == 0]
+    if not first:
+        found = log.failure_note or "no question with its answers in the order of the file"
+        raise FileFormatError(log.path, found, "at least one answer to a question in rotation 0")
     order = {answer.question: i for i, answer in enumerate(first)}
-    rotated = np.full((len(first), offered), ABSTAINED)
+    rotated = np.full((len(first), offered), NOT_ASKED)
     for answer in log.answers:
         if answer.question in order:
             rotated[order[answer.question], answer.rotation] = answer.answer
@@ -154,50 +203,95 @@ def write_returned(
     return len(first)
 
 
-def _answer(row: Mapping[str, Any], text: str, answers: int) -> ReturnedAnswer:
-    return _from_reading(row, read_answer(text, answers), answers)
-
-
-def _from_reading(row: Mapping[str, Any], reading: Reading, answers: int) -> ReturnedAnswer:
-    rotation = int(row["rotation"])
+def _answer(
+    row: Mapping[str, Any], text: str, answers: int, ended: Outcome | None = None
+) -> ReturnedAnswer:
+    reading, rotation = read_reply(text, answers, ended), int(row["rotation"])
     shown = ABSTAINED if reading.answer is None else (reading.answer + rotation) % answers
-    digest = str(row.get("digest") or "")
-    return ReturnedAnswer(int(row["question_index"]), rotation, shown, reading.outcome, digest)
+    digest, question = str(row.get("digest") or ""), int(row["question_index"])
+    return ReturnedAnswer(question, rotation, shown, reading.outcome, digest, text)
+
+
+def _place(row: Mapping[str, Any]) -> Place:
+    return int(row["question_index"]), int(row["rotation"])
+
+
+def _reason(text: str) -> str:
+    """Return what went wrong as one short line."""
+    return " ".join(text.split()).encode(errors="replace").decode()[:LONGEST_REASON]
 
 
 def _of_inspect(path: Path) -> Log:
     from inspect_ai.log import read_eval_log
 
     log = read_eval_log(str(path))
-    answers = []
+    answers, failures = [], dict[Place, str]()
     for sample in log.samples or ():
-        row = sample.metadata
+        row, output = sample.metadata, sample.output
         if "question_index" not in row:
             raise FileFormatError(path, "samples of another task", "pix2shape_bench/iqtt")
-        answers.append(_answer(row, sample.output.completion, len(row["choices"])))
+        failure = _failure_in_inspect(sample)
+        if failure:
+            failures[_place(row)] = _reason(failure)
+            continue
+        ended = "refusal" if output.error else output.stop_reason
+        answers.append(_answer(row, output.completion, len(row["choices"]), ENDINGS.get(ended)))
+    if not (answers or failures) and log.error is not None:
+        raise FileFormatError(path, f"no sample: {_reason(log.error.message)}", "samples")
     settings = log.eval.model_generate_config.model_dump(exclude_none=True)
     kept = {name: settings[name] for name in ("temperature", "max_tokens") if name in settings}
-    return Log(path, log.eval.model, f"asked with Inspect, {json.dumps(kept)}", tuple(answers))
+    how = f"asked with Inspect, {json.dumps(kept)}"
+    return Log(path, "Inspect", log.eval.model, how, tuple(answers), failures)
+
+
+def _failure_in_inspect(sample: Any) -> str:
+    """Return why a sample of Inspect has no answer; "" where it has one.
+
+    Retries that came before the answer do not count.
+    """
+    if sample.error is not None:
+        return str(sample.error.message) or "error"
+    if sample.limit is not None:
+        return f"limit of {sample.limit.type}"
+    if sample.invalidation is not None:
+        return f"invalidated {sample.invalidation.reason or ''}"
+    return "no output" if sample.output.empty and not sample.output.error else ""
 
 
 def _of_lines(path: Path) -> Log:
     lines = path.read_bytes().splitlines()
     if lines and ASKED.encode() in lines[0]:
         return _of_ask(path)
-    answers = []
+    answers, failures = [], dict[Place, str]()
     for line in map(json.loads, filter(bytes.strip, lines)):
         # lmms-eval 0.7 leaves the row out, but for what `process_results` returned of it.
-        doc, text = line["doc"] if "doc" in line else line["accuracy"], line["filtered_resps"]
-        while isinstance(text, list):
-            text = text[0]
+        doc = line["doc"] if "doc" in line else line["accuracy"]
         if "question_index" not in doc:
             raise FileFormatError(path, "samples of another task", "the task iqtt")
-        answers.append(_answer(doc, text, len(doc["choices"])))
-    return Log(path, "", "asked with lmms-eval", tuple(answers))
+        # A text that is all thoughts is empty once they are filtered.
+        text = _first_text(line.get("filtered_resps")) or _first_text(line.get("resps"))
+        failure = _failure_in_text(text)
+        if failure:
+            failures[_place(doc)] = failure
+            continue
+        ended: Outcome | None = "refused" if text.startswith(BLOCKED) else None
+        answers.append(_answer(doc, text, len(doc["choices"]), ended))
+    return Log(path, "lmms-eval", "", "asked with lmms-eval", tuple(answers), failures)
+
+
+def _first_text(value: Any) -> str:
+    while isinstance(value, list):
+        value = value[0] if value else None
+    return value if isinstance(value, str) else ""
+
+
+def _failure_in_text(text: str) -> str:
+    """Return what a harness writes in place of a reply that never came; "" for a reply."""
+    return _reason(text) if FAILED.match(text) else "" if text.strip() else "no response"
 
 
 def _of_ask(path: Path) -> Log:
-    heading = read_heading(path)
+    heading, replies = read_heading(path), read_log(path)
     digest = str(heading["digest"])
     answers = tuple(
         ReturnedAnswer(
@@ -206,22 +300,31 @@ def _of_ask(path: Path) -> Log:
             ABSTAINED if line["answer"] is None else line["answer"],
             line["outcome"],
             digest,
+            line["text"],
         )
-        for line in read_log(path).values()
+        for line in replies.values()
     )
     names = ("temperature", "max_tokens", "layout", "size", "control")
-    kept = json.dumps({name: heading[name] for name in names})
-    return Log(path, str(heading["model"]), f"asked with bench ask, {kept}", answers)
+    kept = {name: heading[name] for name in names}
+    if any("temperature" not in line.get("settings", kept) for line in replies.values()):
+        kept["temperature"] = None  # the server has its own
+    how = f"asked with bench ask, {json.dumps(kept)}"
+    return Log(path, "bench ask", str(heading["model"]), how, answers)
 
 
 def _of_sheet(path: Path) -> Log:
-    answers = []
+    answers, failures = [], dict[Place, str]()
     for row in _sheet_rows(path):
-        question, rotation = int(row["index"]) % CIRCULAR, int(row["index"]) // CIRCULAR
+        rotation, question = divmod(int(row["index"]), CIRCULAR)
         offered = sum(letter in row and str(row[letter]).strip() != "" for letter in "ABC")
         place = {**row, "question_index": question, "rotation": rotation}
-        answers.append(_answer(place, str(row["prediction"] or ""), offered))
-    return Log(path, "", "asked with VLMEvalKit", tuple(answers))
+        text = "" if row["prediction"] is None else str(row["prediction"])
+        failure = "no response" if text in NO_TEXT else _failure_in_text(text)
+        if failure:
+            failures[question, rotation] = failure
+        else:
+            answers.append(_answer(place, text, offered))
+    return Log(path, "VLMEvalKit", "", "asked with VLMEvalKit", tuple(answers), failures)
 
 
 def _sheet_rows(path: Path) -> Iterator[Mapping[str, Any]]:

@@ -20,7 +20,7 @@ from metrics.scoring.runs import (
 )
 from metrics.scoring.truth_digests import answers_digest
 from metrics.submissions.reader import QuestionPredictions
-from metrics.submissions.rules import OUTCOMES
+from metrics.submissions.rules import NOT_ASKED, OUTCOMES
 from scenegen.common.errors import FileFormatError
 
 if TYPE_CHECKING:
@@ -114,9 +114,10 @@ def _groups_of_texts(
         labels = np.array(OUTCOMES)[outcome[place]]
         groups["by_outcome"] = _answer_groups(right, shapes, labels, bootstrap)
     if rotated is not None:
-        every = (rotated[place] == true[rows, None]).all(axis=1)[None].astype(np.float64)
-        label = np.full(len(rows), "every order")
-        groups["by_circle"] = _answer_groups(every, shapes, label, bootstrap)
+        asked = (rotated[place] != NOT_ASKED).all(axis=1)
+        every = (rotated[place] == true[rows, None]).all(axis=1)[None, asked].astype(np.float64)
+        label = np.full(len(shapes), "every order")
+        groups["by_circle"] = _answer_groups(every, shapes[asked], label[asked], bootstrap)
     return groups
 
 

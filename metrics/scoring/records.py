@@ -334,13 +334,21 @@ class ScoreFile:
 
     @cached_property
     def by_outcome(self) -> Groups:
-        """Scores by what became of a model's text: "answered", "unparsed" or "refused"."""
+        """Scores by what became of a model's text: "answered", "unparsed", "refused" or "cut off"."""
         return self._groups_of_answers("by_outcome")
 
     @cached_property
     def by_circle(self) -> Groups:
         """Circular accuracy, as "every order": right in each order of the answers."""
         return self._groups_of_answers("by_circle")
+
+    @cached_property
+    def unread(self) -> float | None:
+        """The share of a model's replies in which no letter was read; None where none was asked."""
+        if "by_outcome" not in self.answer_groups:
+            return None
+        none = self.answer_groups["by_answer"].get("none")
+        return (none.n if none else 0) / len(self.ids)
 
     @property
     def _bootstrap(self) -> Bootstrap:

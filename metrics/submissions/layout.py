@@ -92,8 +92,8 @@ COLUMNS = {
                meaning="what a model's text held: "
                + ", ".join(f"{i} {name}" for i, name in enumerate(OUTCOMES))),
         Column("rotated", (), "int8",
-               meaning="the answer, from 0, when answer r stood first, for r from 0; -1 abstains;"
-               " the first is `answer`", axes=("answer",)),
+               meaning="the answer, from 0, when answer r stood first, for r from 0; -1 abstains,"
+               " -2 was not asked; the first is `answer`", axes=("answer",)),
     ),
 }  # fmt: skip
 NEEDED = {"row": "", "question": "", **dict.fromkeys(KINDS, f"one of {', '.join(KINDS)}; "),

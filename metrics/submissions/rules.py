@@ -100,7 +100,8 @@ def _on_surface(wrong: Any, against: Against) -> Any:
     return wrong if against.surface is None else wrong & against.surface
 
 
-OUTCOMES = ("answered", "unparsed", "refused")  # of the text of a model that was asked
+OUTCOMES = ("answered", "unparsed", "refused", "cut off")  # of the text of a model that was asked
+NOT_ASKED = -2  # in this order of the answers, or the model failed
 IDS, SURFACE = ("row", "question"), "wherever the truth shows a surface"
 RULES = (
     Rule(IDS, "range", "0 or more", "negative", lambda ids, _: ids < 0),
@@ -127,8 +128,8 @@ RULES = (
         _no_answer,
     ),
     Rule(
-        ("rotated",), "range", "numbers of answers from 0, or -1", "that are no answers",
-        lambda answers, against: _no_answer(answers, against).any(axis=1),
+        ("rotated",), "range", "numbers of answers from 0, -1 or -2", "that are no answers",
+        lambda answers, against: (_no_answer(answers, against) & (answers != NOT_ASKED)).any(axis=1),
     ),
     Rule(
         ("rotated",), "agreement", "`answer`, in the first column", "that begin with another one",

@@ -235,7 +235,8 @@ def write_answers(
         scores: (Q, A) floats for A answers, 2 or 3 as the file offers: the highest wins, a tie for
             it abstains. Either or both; both must say the same.
         outcome: (Q,) what a model's text held, an index into `rules.OUTCOMES`.
-        rotated: (Q, A) the answers when answer r stood first, for r from 0; -1 abstains.
+        rotated: (Q, A) the answers when answer r stood first, for r from 0; -1 abstains, and -2 was
+            not asked.
         rows: (Q,) the questions that are answered, each once; scores of such a file are not
             comparable unless these are all.
 

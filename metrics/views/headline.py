@@ -22,6 +22,7 @@ from metrics.views.score_tables import (
     kind_skill,
     labels_of,
     score_cell,
+    unread_notes,
     what_the_floor_is,
 )
 from metrics.views.table import Cell, Table, make_table
@@ -80,7 +81,8 @@ def headline_section(files: Sequence[ScoreFile]) -> Section:
     cells = ([row[i] for i in kept] for row in rows)
     table = make_table("Headline", [head[i] for i in kept], cells)
     over = "scenes" if scores.task == "rooms" else "shapes or questions"
-    notes = [f"{SKILL} {what_the_floor_is(scores)}"] if scores.skills else []
+    notes = unread_notes(files)
+    notes += [f"{SKILL} {what_the_floor_is(scores)}"] if scores.skills else []
     notes += [
         f"[low, high]: {INTERVAL} over {over}. On its scale: the dot is this method with its"
         " interval, the solid line its floor, and dashed lines are the methods beside it.",

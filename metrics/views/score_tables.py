@@ -26,6 +26,7 @@ from scenegen.files.new_file import written_beside
 
 INTERVAL = f"{CONFIDENCE:.0%} interval"
 SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
+UNREAD = "replies that name no letter; they count as wrong"
 BY_KIND = "by kind of question"
 GROUP_TITLES = {
     "by_view_angle": "by degrees between the view and the scene's first one",
@@ -81,6 +82,8 @@ def headline_rows(scores: ScoreFile) -> Table:
         floor = floor_cell(scores, name)
         text = f"{floor.value}: {floor.rest}" if floor.rest else floor.value
         rows.append((name, *interval_cells(scores.metrics[name]), text))
+    if scores.unread is not None:
+        rows.append(("unread replies", number(scores.unread), "-", UNREAD))
     return make_table("", ("headline", "value", INTERVAL, "floor"), rows)
 
 
@@ -255,6 +258,15 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
     )
     runs = ", ".join(f"{run.path} {run.sha256[:12]}" for run in meta.submissions)
     yield f"submissions: {plain(runs)}"
+
+
+def unread_notes(files: Sequence[ScoreFile]) -> list[str]:
+    """Return the share of unread replies of each method that was asked in words."""
+    return [
+        f"{label}: {file.unread:.0%} unread {UNREAD}"
+        for file, label in zip(files, labels_of(files), strict=True)
+        if file.unread is not None
+    ]
 
 
 def few_clusters(scores: ScoreFile) -> list[str]:

@@ -16,8 +16,12 @@ Reply = Callable[[dict[str, Any], int], tuple[int, bytes]]
 
 
 def completion(text: Any, **usage: int) -> tuple[int, bytes]:
-    value = {"choices": [{"message": {"content": text}}], "usage": usage}
-    return 200, json.dumps(value).encode()
+    return choice({"message": {"content": text}}, **usage)
+
+
+def choice(value: dict[str, Any], **usage: int) -> tuple[int, bytes]:
+    """Return a whole choice: message, finish_reason and so on."""
+    return 200, json.dumps({"choices": [value], "usage": usage}).encode()
 
 
 @contextmanager

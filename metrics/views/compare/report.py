@@ -37,6 +37,7 @@ from metrics.views.score_tables import (
     labels_of,
     score_cell,
     too_few,
+    unread_notes,
     what_the_floor_is,
 )
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
@@ -65,7 +66,11 @@ def text_report(
     test = known_test(comparison.truth_digest)
     truth = test.name if test else comparison.truth_digest[:12]
     title = f"Against {comparison.reference}, over {_size(comparison)} (truth {truth}).{stamp}"
-    notes = [*_legend(comparison), *(f"note: {note}" for note in comparison.notes)]
+    notes = [
+        *unread_notes(files),
+        *_legend(comparison),
+        *(f"note: {note}" for note in comparison.notes),
+    ]
     write = to_markdown if as_markdown else to_text
     tables = [_text_table(comparison.reference, group) for group in _by_score(comparison)]
     return write(title, [skills_table(files), *tables], notes)
@@ -206,7 +211,7 @@ def html_report(
             "",
             remarks=[basis],
             tables=[skills_table(files)],
-            notes=[f"{SKILL} {what_the_floor_is(files[0])}"],
+            notes=[*unread_notes(files), f"{SKILL} {what_the_floor_is(files[0])}"],
         ),
         Section(
             "Differences",

@@ -419,6 +419,8 @@ def _label(file: ScoreFile, name: str, supervised: bool) -> str:
     if file.alignment != "none":
         claim = metric(f"rmse_after_{file.alignment}").title.partition(", ")[2]
         texts.append(f"scored {claim}")
+    if file.unread is not None:
+        texts.append(f"{file.unread:.0%} of replies unread")
     mark = "" if file.comparable else f" {INCOMPARABLE_MARK}"
     return name + (f" ({'; '.join(texts)})" if texts else "") + mark
 

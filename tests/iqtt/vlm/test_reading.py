@@ -1,51 +1,70 @@
 """Answers of models as they come: the letter, no letter, or several."""
 
+import json
+import time
+from pathlib import Path
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from iqtt.vlm.reading import LETTERS, Reading, read_answer
 
-A, B, C, NONE, REFUSED = "A", "B", "C", "unparsed", "refused"
-FORMS = [
-    ("B", B), ("b", B), ("B.", B), ("(B)", B), ("[B]", B), ("B)", B), ("**B**", B), ("*B*", B),
-    ("`C`", C), ('"A"', A), ("A\n", A), (" C ", C), ("Picture B", B), ("picture b.", B),
-    ("Option C", C), ("Image A", A), ("Answer: B", B), ("ANSWER: C", C), ("Answer - A", A),
-    ("**Answer:** B", B), ("**Answer: B**", B), ("The answer is B.", B),
-    ("The answer is picture C.", C), ("The correct answer is (A).", A),
-    ("The correct option is B", B), ("the final answer is **C**", C), ("Final answer: A", A),
-    (r"\boxed{A}", A), (r"$\boxed{\text{B}}$", B), (r"The answer is $\boxed{C}$.", C),
-    (r"So $\boxed{A}$? No: $\boxed{B}$", B), (r"\boxed{\text{Picture B}}", B),
-    ("I choose B because its arm turns left.", B), ("I would pick picture A.", A),
-    ("I'll go with C.", C), ("It is picture B.", B), ("It's A.", A),
-    ("B) It has the same arms.", B), ("C. The shape is turned by 90 degrees.", C),
-    ("A: same chain of cubes", A), ("Picture C shows the same shape as the reference.", C),
-    ("B is the correct answer.", B), ("Picture A matches the reference.", A),
-    ("Picture A is a mirror image. Picture C is not the same. The answer is B.", B),
-    ("At first I thought the answer is A, but the answer is C.", C),
-    ("<think>The answer is A.</think>B", B), ("<think>A or B?</think>\n\nThe answer is C.", C),
-    ("The reference has a long arm.\n\nB", B), ("Let me compare.\n...\n**C**", C),
-    ('{"answer": "B"}', B), ('```json\n{"answer": "C"}\n```', C), ("Only picture B fits.", B),
-    ("A or B", NONE), ("A and C", NONE), ("A/B", NONE), ("The answer is A or B.", NONE),
-    ("The answer is either A or C", NONE), ("Picture A and picture B both match.", NONE),
-    ("", NONE), ("The shape has 9 cubes.", NONE), ("D", NONE), ("The answer is D.", NONE),
-    ("A cube sticks out of a long chain.", NONE), ("1", NONE), ("None of them.", NONE),
-    ("<think>The answer is A", NONE), ("I cannot see any image.", REFUSED),
-    ("I'm sorry, but I can't help with that.", REFUSED), ("As an AI I cannot view it.", REFUSED),
-]  # fmt: skip
+# Kind, what a careful person reads (a letter of A to C, "none" or "refusal"), and the reply. Forms
+# are those of the chat templates of open models, and those that parsers of harnesses look for.
+LINES = Path(__file__).with_name("replies.jsonl").read_text(encoding="utf-8").splitlines()
+REPLIES = [tuple(json.loads(line)) for line in LINES]
+A_PLAIN_TEXT = "Picture A shows a chain of cubes, and its arm turns left, but B is "
 
 
-@pytest.mark.parametrize(("text", "expected"), FORMS)
-def test_forms_of_answers_that_models_give(text: str, expected: str) -> None:
-    reading = read_answer(text)
-    if expected in LETTERS:
-        assert reading == Reading(LETTERS.index(expected), "answered")
-    else:
-        assert reading == Reading(None, expected)
+@pytest.mark.parametrize("kind", sorted({kind for kind, _, _ in REPLIES}))
+def test_a_reply_is_read_as_a_careful_person_reads_it(kind: str) -> None:
+    expected = {text: read_as for its, read_as, text in REPLIES if its == kind}
+    assert {text: shown(read_answer(text)) for text in expected} == expected
 
 
-@given(st.text(max_size=200), st.integers(1, 4))
+def test_the_table_of_replies_is_large_and_holds_each_once() -> None:
+    assert len({text for _, _, text in REPLIES}) == len(REPLIES) >= 200
+
+
+def shown(reading: Reading) -> str:
+    """Return a reading as the table of replies has it."""
+    if reading.answer is None:
+        return {"unparsed": "none", "refused": "refusal"}[reading.outcome]
+    return LETTERS[reading.answer]
+
+
+@pytest.mark.parametrize(
+    ("text", "letter"),
+    [
+        ("B", "B"), ("(B", "B"), ("The answer is B. Its arm turns", "B"),
+        ("<answer>B</answer>", "B"),
+        ("", ""), ("<think>The answer is A", ""), ("Picture A shows the same", ""),
+        ("A is the same shape.", ""), ("B because", ""), ("A: same\nB: ", ""), ("Perhaps A", ""),
+    ],
+)  # fmt: skip
+def test_a_reply_that_was_cut_off_answers_only_by_a_declaration(text: str, letter: str) -> None:
+    answer = LETTERS.index(letter) if letter else None
+    assert read_answer(text, cut_off=True) == Reading(answer, "cut off")
+
+
+@given(st.text(max_size=200) | st.text("ABC<think>/answer:is not\\boxed{}\n", max_size=200),
+       st.integers(1, 10))  # fmt: skip
 def test_any_text_has_a_reading_within_the_letters_offered(text: str, answers: int) -> None:
     reading = read_answer(text, answers)
     assert (reading.answer is not None) == (reading.outcome == "answered")
     assert reading.answer is None or 0 <= reading.answer < answers
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        "<think>", "<answer>", "\\boxed{", "{", "A, ", A_PLAIN_TEXT, "[", " ", "<|channel|>",
+        "not ", '{"a":', "analysis", "\ud800", "A B ", "\n", "the answer ", "(", "it is ", "A", "<",
+        "( ",
+    ],
+)  # fmt: skip
+def test_long_texts_are_read_in_time_that_grows_with_their_length(part: str) -> None:
+    started = time.process_time()
+    read_answer(part * (20_000 // len(part)))
+    assert time.process_time() - started < 2

@@ -2,8 +2,10 @@
 
 import csv
 import json
+import os
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +22,7 @@ from iqtt.vlm.reading import LETTERS
 from iqtt.vlm.rows import Asked, Row, vlm_rows
 from metrics.intake.harness_logs import is_log, read_returned, write_returned
 from metrics.scoring.evaluate import score
+from metrics.scoring.runs import Settings
 from scenegen.common.errors import FileFormatError, SceneGenError
 
 TEXTS = ["The answer is {}.", "\\boxed{{{}}}", "I cannot see it.", "A or B"]
@@ -41,6 +44,14 @@ def rows(split: Path) -> list[Row]:
     return list(vlm_rows(Asked(split / "iqtt-val.h5", rotations=3, size=64)))
 
 
+# What lmms-eval and VLMEvalKit write where no reply came.
+NO_REPLY = [
+    None, "", "  ", "[LMMS_EVAL_REQUEST_FAILED after 5 retries] Connection error.",
+    "Failed to obtain answer via API.", "Failed to obtain answer: <class 'RuntimeError'> CUDA",
+    "Fail to obtain answer via API.", "Error: Bad Response Statuse Code. ",
+]  # fmt: skip
+
+
 def text_for(row: Row) -> str:
     """Right where the question is even; else a refusal or two letters, in some order."""
     if row.question_index % 2 == 0:
@@ -48,20 +59,23 @@ def text_for(row: Row) -> str:
     return TEXTS[2 + row.question_index % 4 // 2]
 
 
-def lmms_log(path: Path, rows: list[Row]) -> Path:
+Text = Callable[[Row], str | None]
+
+
+def lmms_log(path: Path, rows: list[Row], text: Text = text_for) -> Path:
     lines = []
     for number, row in enumerate(rows):
-        kept = process_results(row_values(row), [text_for(row)])
-        lines.append({"doc_id": number, "filtered_resps": text_for(row), **kept})
+        kept = process_results(row_values(row), [text(row) or ""])
+        lines.append({"doc_id": number, "filtered_resps": text(row), **kept})
     path.write_text("".join(json.dumps(line) + "\n" for line in lines))
     return path
 
 
-def sheet(path: Path, rows: list[Row]) -> Path:
+def sheet(path: Path, rows: list[Row], text: Text = text_for) -> Path:
     heading = ["index", "question", "A", "B", "C", "prediction"]
     table = [
         [row.question_index + row.rotation * CIRCULAR, row.question, "picture A", "picture B",
-         "picture C", text_for(row)]
+         "picture C", text(row)]
         for row in rows
     ]  # fmt: skip
     if path.suffix == ".xlsx":
@@ -86,7 +100,11 @@ from inspect_ai.model import ModelOutput, ModelUsage, get_model
 folder, logs, texts = sys.argv[1], sys.argv[2], json.loads(sys.argv[3])
 
 def output(messages, *_):
-    out = ModelOutput.from_content("mockllm", texts[messages[-1].text])
+    text = texts[messages[-1].text]
+    if text == "error":
+        raise RuntimeError("the server is gone")
+    ended = text if text in ("content_filter", "max_tokens") else "stop"
+    out = ModelOutput.from_content("mockllm", text, stop_reason=ended)
     return out.model_copy(update={"usage": ModelUsage(input_tokens=1, output_tokens=1)})
 
 from inspect_ai._util.registry import registry_lookup
@@ -94,41 +112,123 @@ task = registry_lookup("task", "pix2shape_bench/iqtt")(folder)
 for sample in task.dataset:  # so that the model knows which row it sees
     sample.input[0].content[-1].text = sample.id
 model = get_model("mockllm/model", custom_outputs=output)
-(log,) = inspect_ai.eval(task, model=model, log_dir=logs, display="none")
+(log,) = inspect_ai.eval(task, model=model, log_dir=logs, display="none", fail_on_error=False)
 assert log.status == "success", log.error
-print(json.dumps({n: m.value for s in log.results.scores for n, m in s.metrics.items()}))
+scores = log.results.scores if log.results else []
+print(json.dumps({n: m.value for s in scores for n, m in s.metrics.items()}))
 """
 
 
-def inspect_log(path: Path, rows: list[Row], split: Path) -> Path:
-    """Run Inspect as its users do: by the name of the task, in a process of its own."""
+def inspect_run(path: Path, rows: list[Row], split: Path, text: Text) -> tuple[Path, dict]:
+    """Run Inspect as its users do, in a process of its own; return its log and its scores."""
     pytest.importorskip("inspect_ai")
     export_for_models(Asked(split / "iqtt-val.h5", rotations=3, size=64), path / "in")
-    texts = json.dumps({row.id: text_for(row) for row in rows})
+    texts = json.dumps({row.id: text(row) for row in rows})
     done = subprocess.run(
         [sys.executable, "-c", INSPECT, str(path / "in"), str(path), texts],
         capture_output=True, text=True, check=False, cwd=path,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr[:3000]
-    scores = json.loads(done.stdout.splitlines()[-1])
+    return next(path.glob("*.eval")), json.loads(done.stdout.splitlines()[-1])
+
+
+def inspect_log(path: Path, rows: list[Row], split: Path) -> Path:
+    log, scores = inspect_run(path, rows, split, text_for)
     assert (scores["accuracy"], scores["circular_accuracy"], scores["unparsed"]) == (0.5, 0.5, 0.5)
     floor = np.mean([row.facts["floor"] for row in rows])
     assert scores["skill"] == pytest.approx((0.5 - floor) / (1 - floor))
     assert 0 < scores["stderr"] < 0.5
     kinds = {row.facts["kind"] for row in rows}
     assert kinds < set(scores)
-    return next(path.glob("*.eval"))
+    return log
+
+
+@pytest.mark.slow
+def test_samples_that_failed_in_inspect_are_no_answers(
+    split: Path, rows: list[Row], tmp_path: Path
+) -> None:
+    ended = {0: "error", 1: "content_filter", 2: "max_tokens"}
+    path, scores = inspect_run(
+        tmp_path, rows, split, lambda row: ended.get(row.question_index, row.answer)
+    )
+    assert scores["unparsed"] == pytest.approx(6 / 21)  # of the samples that were scored
+    log = read_returned(path)
+    assert set(log.failures) == {(0, 0), (0, 1), (0, 2)}
+    outcomes = {answer.question: answer.outcome for answer in log.answers}
+    assert outcomes == {1: "refused", 2: "cut off"} | dict.fromkeys(range(3, 8), "answered")
+
+    from inspect_ai.log import EvalSampleLimit, ProvenanceData, read_eval_log, write_eval_log
+
+    whole = read_eval_log(str(path))
+    by_id = {sample.id: sample for sample in whole.samples or ()}
+    by_id["3-0"].limit = EvalSampleLimit(type="time", limit=1)
+    by_id["4-0"].invalidation = ProvenanceData(author="a", reason="wrong picture")
+    by_id["5-0"].output.choices = []
+    write_eval_log(whole, str(tmp_path / "limits.json"))
+    places = {(0, 0), (0, 1), (0, 2), (3, 0), (4, 0), (5, 0)}
+    assert set(read_returned(tmp_path / "limits.json").failures) == places
+
+    for sample in by_id.values():
+        sample.error = by_id["0-0"].error
+    write_eval_log(whole, str(tmp_path / "failed.json"))
+    with pytest.raises(FileFormatError) as info:
+        read_returned(tmp_path / "failed.json")
+    assert "24 of 24" in info.value.found
+
+
+VLMEVALKIT = """
+import os, sys
+folder, out, texts = sys.argv[1], sys.argv[2], __import__("json").loads(sys.argv[3])
+os.environ["LMUData"] = folder
+from vlmeval.dataset import build_dataset
+from vlmeval.inference import infer_data_job
+from vlmeval.vlm.base import BaseModel
+
+class Told(BaseModel):
+    def generate_inner(self, message, dataset=None):
+        return texts.pop(0)
+
+for name in ("iqtt-val", "iqtt-val_circular"):
+    infer_data_job(Told(), out, "told", build_dataset(name))
+"""
+
+
+def vlmevalkit_log(path: Path, rows: list[Row], split: Path) -> Path:
+    """Run VLMEvalKit with a model that is told what to say; return its sheet of all rows."""
+    python = os.environ.get("VLMEVALKIT_PYTHON", sys.executable)
+    probe = "import importlib.util, sys; sys.exit(importlib.util.find_spec('vlmeval') is None)"
+    if subprocess.run([python, "-c", probe], check=False).returncode:
+        pytest.skip("VLMEvalKit is not installed; see CONTRIBUTING.md")
+    export_for_models(Asked(split / "iqtt-val.h5", rotations=3, size=64), path / "in")
+    first = [text_for(row) for row in rows if row.rotation == 0]
+    texts = json.dumps([*first, *map(text_for, rows)])
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run(
+        [python, "-W", "ignore", "-c", VLMEVALKIT, str(path / "in"), str(path), texts],
+        capture_output=True, text=True, check=False, cwd=path,
+        env=environment | {"HF_HUB_OFFLINE": "1"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    alone = read_returned(path / "told_iqtt-val.xlsx")
+    assert [answer.outcome == "answered" for answer in alone.answers] == [True, False] * 4
+    return path / "told_iqtt-val_circular.xlsx"
+
+
+SLOW_LOGS = {"inspect": inspect_log, "vlmevalkit": vlmevalkit_log}
 
 
 @pytest.mark.parametrize(
     "kind",
-    ["samples.jsonl", "out.tsv", "out.xlsx", pytest.param("inspect", marks=pytest.mark.slow)],
-)
+    [
+        "samples.jsonl", "out.tsv", "out.xlsx",
+        *(pytest.param(kind, marks=pytest.mark.slow) for kind in SLOW_LOGS),
+    ],
+)  # fmt: skip
 def test_answers_come_back_from_every_harness(
     split: Path, rows: list[Row], tmp_path: Path, kind: str
 ) -> None:
-    if kind == "inspect":
-        log = inspect_log(tmp_path, rows, split)
+    if kind in SLOW_LOGS:
+        log = SLOW_LOGS[kind](tmp_path, rows, split)
     else:
         log = (lmms_log if kind.endswith("jsonl") else sheet)(tmp_path / kind, rows)
     assert is_log(log)
@@ -142,6 +242,63 @@ def test_answers_come_back_from_every_harness(
         "answered": 4, "refused": 2, "unparsed": 2,
     }  # fmt: skip
     assert groups["by_answer"]["none"].n == 4
+
+
+@pytest.mark.parametrize("name", ["log.jsonl", "out.tsv", "out.xlsx"])
+def test_a_row_that_failed_has_no_answer(
+    split: Path, rows: list[Row], tmp_path: Path, name: str
+) -> None:
+    failed = ["1-0", "2-1", "3-0", "3-1", "3-2", "4-1", "4-2", "5-2"]
+    nothing = dict(zip(failed, NO_REPLY, strict=True))
+    write = lmms_log if name.endswith("jsonl") else sheet
+    log = read_returned(write(tmp_path / name, rows, lambda r: nothing.get(r.id, r.answer)))
+    assert sorted(f"{question}-{rotation}" for question, rotation in log.failures) == failed
+    assert len(log.answers) == len(rows) - len(failed)
+    out = tmp_path / "p.h5"
+    assert write_returned(out, split / "iqtt-val.h5", log, method="m") == 6
+    with pytest.raises(SceneGenError):
+        score([out], split / "iqtt-val.h5")
+    scores = score([out], split / "iqtt-val.h5", Settings(allow_partial=True))
+    assert scores.metrics["iqtt_accuracy"].value == 1.0
+    assert (len(scores.ids), scores.unread, scores.comparable) == (6, 0.0, False)
+    circle = scores.by_circle["every order"]["iqtt_accuracy"]
+    assert (circle.n, circle.value) == (3, 1.0)  # the other three were not answered in all orders
+
+
+@pytest.mark.parametrize("name", ["log.jsonl", "out.tsv", "out.xlsx"])
+def test_a_log_in_which_all_rows_failed_is_refused(
+    rows: list[Row], tmp_path: Path, name: str
+) -> None:
+    write = lmms_log if name.endswith("jsonl") else sheet
+    path = write(tmp_path / name, rows, lambda _: "Failed to obtain answer via API.")
+    with pytest.raises(FileFormatError) as info:
+        read_returned(path)
+    assert f"{len(rows)} of {len(rows)}" in info.value.found
+
+
+def test_a_row_that_was_answered_at_another_try_is_an_answer(
+    rows: list[Row], tmp_path: Path
+) -> None:
+    path, again = tmp_path / "log.jsonl", tmp_path / "again.jsonl"
+    lmms_log(path, rows, lambda row: "" if row.rotation else row.answer)
+    path.write_bytes(path.read_bytes() + lmms_log(again, rows[1:2]).read_bytes())
+    log = read_returned(path)
+    assert (1, 1) in log.failures
+    assert (0, 1) not in log.failures
+    assert len(log.answers) + len(log.failures) == len(rows)
+
+
+def test_lmms_eval_keeps_refusals_and_texts_before_its_filters(
+    rows: list[Row], tmp_path: Path
+) -> None:
+    path = lmms_log(tmp_path / "log.jsonl", rows[:3], lambda row: "B")
+    lines = [json.loads(line) for line in path.read_text().splitlines()]
+    lines[0]["filtered_resps"] = "[SAFETY_BLOCKED:finish_reason is 2]"
+    lines[1] |= {"filtered_resps": "", "resps": [["<think>A"]]}
+    path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    log = read_returned(path)
+    assert [answer.outcome for answer in log.answers] == ["refused", "unparsed", "answered"]
+    assert not log.failures
 
 
 def returned_score(log: Path, questions: Path) -> None:
