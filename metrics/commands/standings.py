@@ -167,7 +167,7 @@ def leaderboard(
     the methods, without a rank.
     """
     from metrics.score_file import read_scores
-    from metrics.views.leaderboard.cards import read_cards
+    from metrics.views.leaderboard.cards import read_cards, unmatched
     from metrics.views.leaderboard.ranking import leaderboard as rank
     from metrics.views.table import to_latex, to_markdown, without_rests
     from scenegen.files.new_file import check_writable, write_text
@@ -178,6 +178,8 @@ def leaderboard(
         check_writable(Path(out), overwrite)
     cards = read_cards(cards_path) if cards_path else None
     files = [read_scores(path) for path in scores]
+    for sentence in unmatched(cards or {}, files):
+        print_line(f"warning: {cards_path}: {sentence}", err=True)
     shown: Any = "none" if no_paper else paper
     if folder is not None:
         from metrics.views.leaderboard.site import write_site

@@ -12,7 +12,7 @@ from iqtt.floors import Floor
 from metrics.score_file import Skill
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
-from metrics.views.leaderboard.cards import HEAD, read_cards
+from metrics.views.leaderboard.cards import HEAD, read_cards, unmatched
 from metrics.views.leaderboard.floors import FloorError
 from metrics.views.leaderboard.ranking import LeaderboardError, leaderboard, rankings
 from metrics.views.leaderboard.site import lead_of
@@ -149,11 +149,28 @@ def test_cards_stand_beside_the_scores(tmp_path):
     ]
     assert [cell.link for cell in table.rows[0].cells[-3:]] == ["", "https://a.b", ""]
     assert values(table)["b"][-6:] == ["-", "-", "the scored one", "-", "-", "-"]
-    for text in ("a: {shoes: 3}", "a: [", "[1]", "a: &x {}\nb: *x", "[" * 5000):
+    twice = ("a: {}\na: {}", "a: {paper: P, paper: Q}")
+    for text in ("a: {shoes: 3}", "a: [", "[1]", "a: &x {}\nb: *x", "[" * 5000, *twice,
+                 "a: {supervised: perhaps}", "? [a]\n: {}"):  # fmt: skip
         path.write_text(text)
         with pytest.raises(SpecError) as refusal:
             read_cards(path)
         assert refusal.value.where.startswith(str(path))
+
+
+def test_names_of_cards_are_taken_as_written_and_the_others_told(tmp_path):
+    names = ["42", "False", "1e3", "007", "2026-01-02", "null", "0x1F", "NO", "~", "1_000", "12:30"]
+    path = tmp_path / "cards.yaml"
+    path.write_text("".join(f"{name}: {{told: 1.0, supervised: yes}}\n" for name in names))
+    cards = read_cards(path)
+    assert list(cards) == names
+    assert {(card.told, card.supervised) for card in cards.values()} == {("1.0", True)}
+    assert unmatched(cards, [rooms(name) for name in names]) == []
+    path.write_text("my-metod: {}\nother: {}\nmine: {}\n")
+    told = unmatched(read_cards(path), [rooms("my-method"), rooms("mine")])
+    assert ["my-metod" in told[0], "my-method?" in told[0], "other" in told[1]] == [True] * 3
+    path.write_text("# none yet\n")
+    assert read_cards(path) == {}
 
 
 def skilled(name, chamfer=0.2, **other):
