@@ -21,6 +21,8 @@ from metrics.scoring.metric_names import OBJECT_SCORES, SKILLED, metric
 Array = NDArray[Any]
 CONFIDENCE = 0.95  # of all intervals
 ACCURACY = "iqtt_accuracy"
+# Of skills: what rounding of predictions to single precision makes of a method that is the floor.
+ROUNDING = 1e-5
 
 
 class Bootstrap(NamedTuple):
@@ -55,7 +57,8 @@ class Skill:
     """A score between that of a method that sees nothing, the floor, and a perfect one.
 
     Attributes:
-        value: 1 is perfect, 0 is the floor, below 0 is worse than it; see `measures.skill`.
+        value: 1 is perfect, 0 is the floor, below 0 is worse than it; see `measures.skill`. It and
+            its ends are 0 where all are that but for rounding.
         low, high: ends of the interval at `CONFIDENCE`; None where there is none. That of
             rooms is paired: it resamples the scenes of score and floor together.
         floor: the floor's score on the same items, in the unit of the score; 0 where it is less.
@@ -67,6 +70,11 @@ class Skill:
     high: float | None
     floor: float
     floor_name: str
+
+    @property
+    def is_floor(self) -> bool:
+        """Whether nothing but rounding tells the method from its floor."""
+        return not any((self.value, self.low, self.high))
 
 
 Scores = Mapping[str, Score]
@@ -168,6 +176,9 @@ def skills(items: Mapping[str, Array], scene: Array, bootstrap: Bootstrap) -> di
             column = SKILLED[name] + name
             # The ends belong to the value but for rounding; min and max keep what is not a number.
             span = finite(min(low, value)), finite(max(high, value))
+            if all(abs(end) <= ROUNDING for end in (value, *span) if end is not None):
+                value = 0.0
+                span = None if span[0] is None else 0.0, None if span[1] is None else 0.0
             skill_of[name] = Skill(value, *span, float(floor[k]), column)
     return {name: skill_of[name] for name in names if name in skill_of}
 

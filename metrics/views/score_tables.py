@@ -208,20 +208,22 @@ def interval_cells(score: Score | Skill) -> tuple[str, str]:
     return with_interval(score.value, score.low, score.high)
 
 
-def score_cell(score: Score | Skill | None, best: str = "", floor: float | None = None) -> Cell:
+def score_cell(score: Score | Skill | None, best: bool = False, floor: float | None = None) -> Cell:
     """Return a value, with standard deviation over runs, interval, and a floor of its own.
 
     Args:
-        best: the best value of the column, as it is shown.
+        best: whether it is the best value of its column.
     """
     if score is None:
         return Cell()
+    if isinstance(score, Skill) and score.is_floor:
+        return Cell("0", "is the floor")
     value, interval = interval_cells(score)
     std, ends = getattr(score, "std", None), (score.low, score.high)
     rest = [] if std is None else [f"± {number(std, ends)}"]
     rest += [] if interval == "-" else [interval]
     rest += [] if floor is None else [f"floor {number(floor, ends)}"]
-    return Cell(value, " ".join(rest), value == best)
+    return Cell(value, " ".join(rest), best)
 
 
 def labels_of(files: Sequence[ScoreFile]) -> list[str]:
@@ -241,6 +243,7 @@ def title_of(scores: ScoreFile) -> str:
 def notes_of(scores: ScoreFile) -> Iterator[str]:
     """Yield what has to be known to read the tables, and where the scores come from."""
     meta = scores.meta
+    yield from is_floor_of(scores)
     for warning in (*scores.warnings, *few_clusters(scores)):
         yield f"warning: {warning}"
     if scores.skills:
@@ -276,6 +279,13 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
     )
     runs = ", ".join(f"{run.path} {run.sha256[:12]}" for run in meta.submissions)
     yield f"submissions: {plain(runs)}"
+
+
+def is_floor_of(scores: ScoreFile) -> list[str]:
+    """Return a sentence where a method scores what its floor does; else none."""
+    names = [name for name, skill in scores.skills.items() if skill.is_floor]
+    floors = dict.fromkeys(" ".join(floor_text(scores, name).split()) for name in names)
+    return [f"this method is the floor ({', '.join(floors)}) of {', '.join(names)}"] * bool(names)
 
 
 def few_clusters(scores: ScoreFile) -> list[str]:
