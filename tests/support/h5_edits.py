@@ -96,7 +96,9 @@ def edit_scene(row, change):
     def edit(file):
         scene = json.loads(file["scene"][row])
         change(scene)
-        file["scene"][row] = json.dumps(scene, separators=(",", ":"))
+        text = json.dumps(scene, separators=(",", ":")).encode()
+        assert len(text) <= file["scene"].dtype.itemsize, "HDF5 would cut it"
+        file["scene"][row] = text
 
     return edit
 
