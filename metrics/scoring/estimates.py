@@ -16,7 +16,7 @@ from metrics.measures.statistics import (
     clustered_wilson_interval,
     linearised_means,
 )
-from metrics.scoring.metric_names import OBJECT_SCORES, SKILLED, metric
+from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE, SKILLED, metric
 
 Array = NDArray[Any]
 CONFIDENCE = 0.95  # of all intervals
@@ -73,8 +73,12 @@ class Skill:
 
     @property
     def is_floor(self) -> bool:
-        """Whether nothing but rounding tells the method from its floor."""
-        return not any((self.value, self.low, self.high))
+        """Whether nothing but rounding tells the method from its floor.
+
+        The floor of a relief is the method itself, against another scene, and so none of these.
+        """
+        own = self.floor_name.startswith(OTHER_SCENE)
+        return not own and not any((self.value, self.low, self.high))
 
 
 Scores = Mapping[str, Score]

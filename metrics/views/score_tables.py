@@ -50,11 +50,14 @@ ALIGNMENT_SCORES = ("abs_rel", "rmse", "delta_1")
 GROUP_SCORES = {"rooms": HEADLINE["rooms"], "iqtt": ("iqtt_accuracy",)}
 
 
-def text_report(scores: ScoreFile, as_markdown: bool = False, whole: bool = False) -> str:
+def text_report(
+    scores: ScoreFile, as_markdown: bool = False, whole: bool = False, width: int | None = None
+) -> str:
     """Return the headline, as aligned text or Markdown, and accuracy by kind of question.
 
     Args:
         whole: whether all scores, and the main ones by group, stand there as well.
+        width: characters of a line, to which sentences are wrapped.
     """
     tables, notes = [headline_rows(scores)], list(notes_of(scores))
     if whole:
@@ -62,7 +65,7 @@ def text_report(scores: ScoreFile, as_markdown: bool = False, whole: bool = Fals
     else:
         tables += [table for table in group_tables(scores) if table.title == BY_KIND]
         notes.append("--all prints all scores and groups")
-    return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes)
+    return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes, width)
 
 
 def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> None:
@@ -283,7 +286,8 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
 
 def is_floor_of(scores: ScoreFile) -> list[str]:
     """Return a sentence where a method scores what its floor does; else none."""
-    names = [name for name, skill in scores.skills.items() if skill.is_floor]
+    headline = [name for name in HEADLINE[scores.task] if name in scores.skills]
+    names = [name for name in headline if scores.skills[name].is_floor]
     floors = dict.fromkeys(" ".join(floor_text(scores, name).split()) for name in names)
     return [f"this method is the floor ({', '.join(floors)}) of {', '.join(names)}"] * bool(names)
 
