@@ -3,8 +3,8 @@
 Images are compressed here, by isal, and handed to HDF5 as finished chunks: that is faster than its
 own filter and any HDF5 library reads it.
 
-Texts have the length of the longest one of their column, as PyTables, MATLAB and R read no others.
-It is known at the end, so they are kept until then.
+Texts have the length of the longest one of their column, as PyTables reads no others. It is known
+at the end, so they are kept until then.
 """
 
 import os
