@@ -124,7 +124,7 @@ def file_parts(path: Path) -> Iterator[tuple[str, str, Any]]:
                     yield "text", f"{name}@{key}", repr(value)
                 if isinstance(file[name], h5py.Dataset):
                     array = np.asarray(file[name][()])
-                    if array.dtype.kind == "O":
+                    if array.dtype.kind in "OS":
                         yield "text", name, repr(array.tolist())
                     else:
                         head = f"{array.dtype} {array.shape}".encode()

@@ -25,7 +25,7 @@ from metrics.scoring.runs import Settings
 from metrics.submissions.inspection import Inspection
 from metrics.submissions.layout import KINDS
 from metrics.submissions.reader import PredictedView, RoomPredictions
-from metrics.submissions.rules import as_doubles
+from metrics.submissions.rules import as_doubles, refuse_behind_camera
 from metrics.submissions.truths import TrueView
 from scenegen.common.errors import SpecError
 from scenegen.common.threads import one_thread
@@ -62,11 +62,12 @@ def evaluate_room(
         non_finite: "error", or "penalise" as `image_scores.score_view`.
 
     Raises OutputError for what is no prediction, SpecError for kind or alignment, and
-    PredictionError for values that are not finite where the truth shows a surface.
+    PredictionError for values that are not finite where the truth shows a surface, or that lie
+    behind the camera.
     """
     height, width = truth.depth.shape
     geometry = _geometry(prediction, normal, height, width, kind, alignment, frame)
-    values = _stored(geometry)
+    values = _stored(geometry, truth.depth, "prediction")
     predicted = PredictedView(
         geometry.kind,
         geometry.alignment,
@@ -174,7 +175,7 @@ def _content(
             geometry = _geometry(prediction, normal, height, width, **how)
         except OutputError as error:
             raise error.inside(f"row {row}") from error
-        values = _stored(geometry)
+        values = _stored(geometry, truth.read("depth", row), f"row {row}")
         first = first or geometry
         if (geometry.kind, geometry.alignment) != (first.kind, first.alignment) or (
             arrays and values.keys() != arrays.keys()
@@ -212,10 +213,13 @@ def _geometry(
     return fitted_to(geometry, height, width, frame=frame, missing="refuse")
 
 
-def _stored(geometry: Geometry) -> dict[str, Array]:
-    """Return the values in the precision of a submission."""
+def _stored(geometry: Geometry, true_depth: Array, where: str) -> dict[str, Array]:
+    """Return the values in the precision of a submission. Raises PredictionError as its writer."""
     with np.errstate(over="ignore"):
-        return {
+        values = {
             name: np.asarray(value, np.float64 if name == "fov_y_degrees" else np.float32)
             for name, value in geometry.values.items()
         }
+    kind, alignment = geometry.kind, geometry.alignment
+    refuse_behind_camera(where, kind, alignment, values[kind], np.isfinite(true_depth))
+    return values

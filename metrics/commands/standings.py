@@ -9,7 +9,7 @@ import click
 from metrics.commands.options import MARKDOWN, SEED
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import OVERWRITE
-from scenegen.command_line.output import print_line
+from scenegen.command_line.output import line_width, print_line
 from scenegen.command_line.paths import InputPath, OutputFolder, OutputPath
 
 
@@ -88,7 +88,7 @@ def compare(
             page = html_report(comparison, files, Path(truth) if truth else None, paths)
             write_text(html_path, page, overwrite)
     finally:
-        click.echo(text_report(comparison, files, markdown))
+        click.echo(text_report(comparison, files, markdown, line_width()))
 
 
 @click.command(
@@ -103,7 +103,7 @@ def compare(
 @click.option(
     "--format",
     "form",
-    type=click.Choice(["markdown", "html", "latex"]),
+    type=click.Choice(["markdown", "text", "html", "latex"]),
     default="markdown",
     show_default=True,
     help="Format of the tables.",
@@ -167,9 +167,9 @@ def leaderboard(
     the methods, without a rank.
     """
     from metrics.score_file import read_scores
-    from metrics.views.leaderboard.cards import read_cards
+    from metrics.views.leaderboard.cards import read_cards, unmatched
     from metrics.views.leaderboard.ranking import leaderboard as rank
-    from metrics.views.table import to_latex, to_markdown, without_rests
+    from metrics.views.table import to_latex, to_markdown, to_text, without_rests
     from scenegen.files.new_file import check_writable, write_text
 
     if (caption or label) and form != "latex":
@@ -178,6 +178,8 @@ def leaderboard(
         check_writable(Path(out), overwrite)
     cards = read_cards(cards_path) if cards_path else None
     files = [read_scores(path) for path in scores]
+    for sentence in unmatched(cards or {}, files):
+        print_line(f"warning: {cards_path}: {sentence}", err=True)
     shown: Any = "none" if no_paper else paper
     if folder is not None:
         from metrics.views.leaderboard.site import write_site
@@ -196,8 +198,11 @@ def leaderboard(
         from metrics.views.leaderboard.site import to_html
 
         text = to_html(tables)
+    elif form == "latex":
+        text = to_latex(tables, label)
     else:
-        text = to_latex(tables, label) if form == "latex" else to_markdown("", tables)
+        in_form = to_text if form == "text" else to_markdown
+        text = in_form("", tables, width=line_width() if out is None else None)
     if out is None:
         click.echo(text)
         return

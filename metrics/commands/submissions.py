@@ -8,7 +8,7 @@ import click
 from metrics.commands.options import MARKDOWN, SEED
 from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import MESHES, MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
-from scenegen.command_line.output import on_scheduler, print_line, progress_bar
+from scenegen.command_line.output import line_width, on_scheduler, print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputPath, refuse_inputs
 from scenegen.commands.viewing import OPEN, host_options
 
@@ -122,7 +122,7 @@ def score(
             truth_path, paths = Path(scores.meta.truth_path), [Path(path) for path in submissions]
             write_text(html_path, html_report(scores, truth_path, paths, others), overwrite)
     finally:  # a page that cannot be made loses no score
-        click.echo(text_report(scores, markdown, whole))
+        click.echo(text_report(scores, markdown, whole, line_width()))
 
 
 @click.command(epilog=EXAMPLE + "bench validate predictions.h5 --truth rooms.h5")

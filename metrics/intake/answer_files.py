@@ -147,11 +147,22 @@ def _entry(place: str, content: Mapping[str, Any]) -> tuple[str, Any, Any]:
 
 
 def _index(value: Any, place: str) -> int:
-    if isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MOST_ROWS:
-        return value
-    if isinstance(value, str) and re.fullmatch(" *[0-9]{1,8} *", value):
-        return int(value)
+    index = _whole(value)
+    if index is not None and 0 <= index <= MOST_ROWS:
+        return index
     raise AnswerFileError(f"{place}: question", f"{value!r:.40}", "the index of a question, from 0")
+
+
+def _whole(value: Any) -> int | None:
+    """Return a whole number, also one that is written 1.0; None for anything else.
+
+    pandas writes whole numbers so where a value of their column is missing.
+    """
+    if isinstance(value, str) and re.fullmatch(r"\s*[-+]?[0-9]{1,8}(\.0*)?\s*", value):
+        value = float(value)
+    if isinstance(value, float) and value.is_integer():
+        return int(value)
+    return value if isinstance(value, int) and not isinstance(value, bool) else None
 
 
 def _value(value: Any, place: str) -> int | list[float]:
@@ -161,15 +172,14 @@ def _value(value: Any, place: str) -> int | list[float]:
             return [_number(score) for score in value]
         except ValueError as error:
             raise AnswerFileError(f"{place}: scores", f"{value!r:.60}", "numbers") from error
-    if value is None:
-        return -1
-    if isinstance(value, int) and not isinstance(value, bool) and -1 <= value < len(LETTERS):
-        return value
     text = value.strip().upper() if isinstance(value, str) else "?"
+    if value is None or text in ("", "NAN"):  # what pandas writes where a value is missing
+        return -1
+    index = _whole(value)
+    if index is not None and -1 <= index < len(LETTERS):
+        return index
     if text in LETTERS and len(text) == 1:
         return LETTERS.index(text)
-    if re.fullmatch("-1|[0-2]|", text):
-        return int(text or -1)
     said = read_answer(value, len(LETTERS)).answer if isinstance(value, str) else None
     if said is not None:  # "B<|im_end|>", or another reply of a model
         return said

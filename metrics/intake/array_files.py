@@ -5,7 +5,7 @@ Sizes are taken from headers before anything is unpacked. Values come as stored:
 
 import re
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ from scenegen.description.specs import MAX_PIXELS
 Array = NDArray[Any]
 MOST_CHANNELS = 4
 DEPTH_CHANNELS = ("Z", "depth", "Depth", "D", "Y", "V")  # of EXR files with several
+ANY_NUMBER = ("Y", "V")  # of them, those that other numbers have, too
 VECTOR_CHANNELS = (("X", "Y", "Z"), ("R", "G", "B"), ("N.X", "N.Y", "N.Z"))
 
 
@@ -31,8 +32,8 @@ def read_array(path: Path, name: str | None = None, vectors: bool = False) -> Ar
     Of NPY and NPZ files any other shape, too; integers from 0 of PNG and TIFF, and floats.
 
     Args:
-        name: of the array in an NPZ file, or of the channel in an EXR file; needed where there are
-            several and none has a usual name.
+        name: of the array in an NPZ file, or of the channel in an EXR file, with that of its
+            part before it where there are several; needed where names do not tell which it is.
         vectors: whether three channels are wanted.
 
     Raises ArrayFileError, and OSError for the path.
@@ -153,28 +154,70 @@ def _channels(path: Path, values: Array, vectors: bool) -> Array:
 
 
 def _exr(path: Path, name: str | None, vectors: bool) -> Array:
+    channels = _exr_channels(path)
+    if vectors:
+        return np.dstack([channels[channel] for channel in _three_of(channels, name, path)])
+    if name is None and set(channels) in ({"R", "G", "B"}, {"R", "G", "B", "A"}):
+        return _channels(path, np.dstack([channels[c] for c in "RGB"]), vectors)
+    chosen = [name] if name else _depths_of(channels)
+    if len(chosen) != 1 or chosen[0] not in channels:
+        expected = repr(name) if name else f"one that ends in {', '.join(DEPTH_CHANNELS)}"
+        raise ArrayFileError(path, _listed(channels), expected, "name one with --array")
+    return channels[chosen[0]]
+
+
+def _exr_channels(path: Path) -> dict[str, Array]:
+    """Return all channels by name; before it stands that of the part, where there are several."""
     import OpenEXR
 
-    header = OpenEXR.File(str(path), header_only=True).header()
-    low, high = header["dataWindow"]
-    _check_size(path, (int(high[1] - low[1]) + 1, int(high[0] - low[0]) + 1), MAX_PIXELS)
-    channels = OpenEXR.File(str(path), separate_channels=True).channels()
-    listed = f"the channels {', '.join(list(channels)[:12])}"
-    if vectors:
-        triples = [tuple(name.split(","))] if name else VECTOR_CHANNELS
-        for triple in triples:
-            if all(channel in channels for channel in triple):
-                return np.dstack([channels[channel].pixels for channel in triple])
-        expected = " or ".join(",".join(triple) for triple in triples)
-        raise ArrayFileError(path, listed, expected, "name three with --array X,Y,Z")
-    if name is None and set(channels) in ({"R", "G", "B"}, {"R", "G", "B", "A"}):
-        return _channels(path, np.dstack([channels[c].pixels for c in "RGB"]), vectors)
-    usual = tuple(channels) if len(channels) == 1 else DEPTH_CHANNELS
-    chosen = name or next((channel for channel in usual if channel in channels), "")
-    if chosen not in channels:
-        expected = repr(name) if name else f"one of {', '.join(DEPTH_CHANNELS)}"
-        raise ArrayFileError(path, listed, expected, "name one with --array")
-    return np.asarray(channels[chosen].pixels)
+    with OpenEXR.File(str(path), header_only=True) as file:
+        for part in file.parts:
+            low, high = part.header["dataWindow"]
+            size = (int(high[1] - low[1]) + 1, int(high[0] - low[0]) + 1)
+            _check_size(path, size, MAX_PIXELS)
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        several = len(file.parts) > 1
+        return {
+            f"{part.name()}.{name}" if several else name: np.asarray(channel.pixels)
+            for part in file.parts
+            for name, channel in part.channels.items()
+        }
+
+
+def _depths_of(channels: Mapping[str, Array]) -> list[str]:
+    """Return the channels that hold depth, by their names: those of the best kind of name.
+
+    The last word of a name is that of a channel, those before it are of part and layer. Y and V are
+    any number; they are depth if there is nothing else, or a word before them says so.
+    """
+    if len(channels) == 1:
+        return list(channels)
+    for wanted in DEPTH_CHANNELS:
+        found = []
+        for name in channels:
+            before, _, last = name.rpartition(".")
+            if last == wanted and (wanted not in ANY_NUMBER or "depth" in before.lower()):
+                found.append(name)
+        if found:
+            return found
+    return []
+
+
+def _three_of(channels: Mapping[str, Array], name: str | None, path: Path) -> list[str]:
+    """Return the names of three channels that are a vector. Raises ArrayFileError."""
+    triples = [tuple(name.split(","))] if name else VECTOR_CHANNELS
+    for x, *others in triples:
+        layers = [c.removesuffix(x) for c in channels if c.endswith(f".{x}")]
+        named = [[layer + last for last in (x, *others)] for layer in ["", *layers]]
+        found = [three for three in named if channels.keys() >= set(three)]
+        if found and (found[0][0] == x or len(found) == 1):
+            return found[0]
+    expected = " or ".join(",".join(triple) for triple in triples)
+    raise ArrayFileError(path, _listed(channels), expected, "name three with --array X,Y,Z")
+
+
+def _listed(channels: Mapping[str, Array]) -> str:
+    return f"the channels {', '.join(list(channels)[:12])}"
 
 
 Reader = Callable[[Path, str | None, bool], Array]

@@ -43,11 +43,20 @@ def files_of(pattern: str) -> list[Path]:
                 expected = f"files that end in {', '.join(READERS)}"
                 raise MatchError(folder, f"{path.name:.80}", expected, hint)
     else:
-        paths = [Path(name) for name in glob.glob(pattern)]
+        paths = [Path(name) for name in glob.glob(_with_names_escaped(pattern))]
     paths = sorted(path for path in paths if path.is_file())
     if not paths:
         raise MatchError(pattern, "no file", "one for each row")
     return paths
+
+
+def _with_names_escaped(pattern: str) -> str:
+    """Return a pattern in which the names of folders and files that exist mean themselves."""
+    place, escaped = Path(), Path()
+    for part in Path(pattern).parts:
+        place /= part
+        escaped /= glob.escape(part) if place.exists() else part
+    return str(escaped)
 
 
 def match_files(

@@ -16,12 +16,21 @@ from metrics.measures.statistics import (
     clustered_wilson_interval,
     linearised_means,
 )
-from metrics.scoring.metric_names import BEHIND, OBJECT_SCORES, SHOWN_AS_MUCH, SKILLED, metric
+from metrics.scoring.metric_names import (
+    BEHIND,
+    OBJECT_SCORES,
+    OTHER_SCENE,
+    SHOWN_AS_MUCH,
+    SKILLED,
+    metric,
+)
 from metrics.submissions.layout import Shown
 
 Array = NDArray[Any]
 CONFIDENCE = 0.95  # of all intervals
 ACCURACY = "iqtt_accuracy"
+# Of skills: what rounding of predictions to single precision makes of a method that is the floor.
+ROUNDING = 1e-5
 
 
 class Bootstrap(NamedTuple):
@@ -56,7 +65,8 @@ class Skill:
     """A score between that of a method that sees nothing, the floor, and a perfect one.
 
     Attributes:
-        value: 1 is perfect, 0 is the floor, below 0 is worse than it; see `measures.skill`.
+        value: 1 is perfect, 0 is the floor, below 0 is worse than it; see `measures.skill`. It and
+            its ends are 0 where all are that but for rounding.
         low, high: ends of the interval at `CONFIDENCE`; None where there is none. That of
             rooms is paired: it resamples the scenes of score and floor together.
         floor: the floor's score on the same items, in the unit of the score; 0 where it is less.
@@ -68,6 +78,15 @@ class Skill:
     high: float | None
     floor: float
     floor_name: str
+
+    @property
+    def is_floor(self) -> bool:
+        """Whether nothing but rounding tells the method from its floor.
+
+        The floor of a relief is the method itself, against another scene, and so none of these.
+        """
+        own = self.floor_name.startswith(OTHER_SCENE)
+        return not own and not any((self.value, self.low, self.high))
 
 
 Scores = Mapping[str, Score]
@@ -185,6 +204,9 @@ def skills(
             assert value is not None
             # The ends belong to the value but for rounding; min and max keep what is not a number.
             span = finite(min(low, value)), finite(max(high, value))
+            if all(abs(end) <= ROUNDING for end in (value, *span) if end is not None):
+                value = 0.0
+                span = None if span[0] is None else 0.0, None if span[1] is None else 0.0
             skill_of[name] = Skill(value, *span, float(floor[k]), str(column_of[name]))
     return {name: skill_of[name] for name in names if name in skill_of}
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from metrics.measures.answers import ABSTAINED, MOST_CANDIDATES
 from metrics.measures.checks import LARGEST_MAGNITUDE
-from metrics.submissions.problems import Problem, first_ids
+from metrics.submissions.problems import PredictionError, Problem, first_ids
 from scenegen.common.errors import SceneGenError
 from scenegen.description.specs import MAX_PIXELS
 from scenegen.files.schema import Column
@@ -186,12 +186,27 @@ def refuse_pixels(
         raise kind(where, found, rule.expected)
 
 
-def faces_away(depth: Array, surface: Mask) -> bool:
-    """Return whether more than half of a depth map (H, W) is at or behind the camera.
+def refuse_behind_camera(
+    where: object, kind: str, alignment: str, geometry: Array, surface: Mask
+) -> None:
+    """Raise PredictionError where more than half of an image is at or behind the camera.
 
-    Such values can be scored, so this breaks no rule, but it is the mark of a wrong sign.
+    Such values can be scored, so this breaks no rule, but it is the mark of a wrong sign. What is
+    known up to a shift has no sign.
+
+    Args:
+        kind, alignment: as in `layout.KINDS`.
+        geometry: (H, W), or points (H, W, 3).
+        surface: where the truth shows a surface, (H, W).
     """
-    return 2 * int(np.count_nonzero(depth[surface] <= 0.0)) > int(np.count_nonzero(surface))
+    if kind == "disparity" or alignment == "scale_shift":
+        return
+    depth = geometry if kind == "depth" else -geometry[..., 2]
+    if 2 * np.count_nonzero(depth[surface] <= 0.0) > np.count_nonzero(surface):
+        expected = "planar depth, which is positive in front of the camera"
+        if kind == "points":
+            expected = "points whose depth, -z, is positive in front of the camera"
+        raise PredictionError(f"{where}: {kind}", "most of it at or below 0", expected)
 
 
 def array_problem(

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from metrics.submissions.hints.no_value import no_value_hints
 from metrics.submissions.hints.questions import answer_hints
 from metrics.submissions.hints.rooms import room_hints
 from metrics.submissions.problems import HINT, MOST_IDS, Problem
@@ -68,7 +69,7 @@ def hints(predictions: Predictions, truth: Any) -> list[Problem]:
     Raises FileFormatError where the truth is damaged.
     """
     if isinstance(predictions, RoomPredictions):
-        return room_hints(predictions, truth)
+        return no_value_hints(predictions, truth) + room_hints(predictions, truth)
     assert isinstance(predictions, QuestionPredictions)
     return answer_hints(predictions, truth.read("answers", slice(None)))
 

@@ -150,14 +150,7 @@ class RoomPredictionWriter:
         if alignment not in allowed:
             expected = f"{' or '.join(allowed)}, for {kind}"
             raise PredictionError(f"{where}: alignment", repr(alignment), expected)
-        if kind == "disparity" or alignment == "scale_shift":
-            return
-        depth = values["depth"] if kind == "depth" else -values["points"][..., 2]
-        if rules.faces_away(depth, surface):
-            expected = "planar depth, which is positive in front of the camera"
-            if kind == "points":
-                expected = "points whose depth, -z, is positive in front of the camera"
-            raise PredictionError(f"{where}: {kind}", "most of it at or below 0", expected)
+        rules.refuse_behind_camera(where, kind, alignment, values[kind], surface)
 
     @contextmanager
     def _opened(self) -> Iterator[None]:

@@ -24,6 +24,9 @@ from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 SHOWN = 6  # examples in a list, where there are enough
+# Orders scenes. An object that is not predicted at all scores 0, while its errors of depth, which
+# the headline has, may be small. Others follow where no image has a number for it.
+AS_SEEN = "relief_correlation"
 ANSWERS_ENDING = "-answers"  # of the name of the file of answers, beside that of the questions
 
 
@@ -56,8 +59,8 @@ def examples_of(scores: ScoreFile, truth: Path, submission: Path) -> Lists:
 
 
 def shown_score(scores: ScoreFile) -> str:
-    """Return the first score of the headline that any image has a number for; else ""."""
-    for name in (*HEADLINE[scores.task], *scores.metrics):
+    """Return the score that orders scenes: the first that any image has a number for; else ""."""
+    for name in (AS_SEEN, *HEADLINE[scores.task], *scores.metrics):
         if name in scores.items and np.isfinite(np.asarray(scores.items[name], float)).any():
             return name
     return ""
@@ -156,7 +159,7 @@ def entry_name(scores: ScoreFile, entry: int) -> str:
 def _entry_scores(scores: ScoreFile, entry: int) -> str:
     return ", ".join(
         f"{metric(name).title} {number(float(scores.items[name][entry]))}"
-        for name in HEADLINE["rooms"]
+        for name in (AS_SEEN, *HEADLINE["rooms"])
         if name in scores.items and np.isfinite(scores.items[name][entry])
     )
 

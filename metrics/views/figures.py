@@ -19,7 +19,7 @@ from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import Score, ScoreFile
 from metrics.submissions.reader import RoomPredictions, open_predictions
 from metrics.views.by_angle import angle_floors
-from metrics.views.plots import KINDS, LINE, kind_of
+from metrics.views.plots import KINDS, LINE, kind_of, load_matplotlib
 from scenegen.common.errors import SceneGenError
 from scenegen.common.names import did_you_mean
 from scenegen.files.new_file import written_beside
@@ -288,7 +288,7 @@ def _figure(
     table: tuple[int, int] | None = None,
 ) -> Iterator[Any]:
     """Give axes, or a table of them, of a figure that is written when the block ends well."""
-    import matplotlib
+    matplotlib = load_matplotlib()
     from matplotlib.figure import Figure
 
     suffix = Path(path).suffix.lower()

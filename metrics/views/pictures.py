@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from metrics.measures.normals import normals_from_depth
+from metrics.views.plots import load_matplotlib
 from scenegen.common.text_table import number
 from scenegen.rooms.preview import srgb_bytes
 
@@ -114,10 +115,8 @@ def data_url(pixels: NDArray[np.uint8]) -> str:
 
 def _coloured(shares: Array, bar: str) -> NDArray[np.uint8]:
     """Return the colours of a map at shares from 0 to 1."""
-    import matplotlib
-
     clipped = np.clip(np.nan_to_num(shares), 0, 1)
-    return np.array(matplotlib.colormaps[COLOUR_MAPS[bar]](clipped, bytes=True)[..., :3])
+    return np.array(load_matplotlib().colormaps[COLOUR_MAPS[bar]](clipped, bytes=True)[..., :3])
 
 
 def _normals(normal: Array) -> NDArray[np.uint8]:

@@ -7,6 +7,7 @@ tables and never in a drawing. The same numbers give the same bytes.
 import base64
 import io
 import math
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -201,6 +202,7 @@ def strip(
         others: further values that the line shall hold.
         limits: which values are possible; the line goes no farther.
     """
+    load_matplotlib()
     from matplotlib.ticker import MaxNLocator
 
     ends = [point.value, point.low, point.high, *others, *(at for _, at in marks)]
@@ -223,6 +225,21 @@ def strip(
     return picture, f"{low:.4g} to {high:.4g}"
 
 
+def load_matplotlib() -> Any:
+    """Return matplotlib. A backend in the environment does not count: none is used here.
+
+    Notebooks and IDEs leave MPLBACKEND behind, and a name that matplotlib does not know would end
+    its import.
+    """
+    backend = os.environ.pop("MPLBACKEND", None)
+    try:
+        import matplotlib
+    finally:
+        if backend is not None:
+            os.environ["MPLBACKEND"] = backend
+    return matplotlib
+
+
 @contextmanager
 def _drawing(
     width: float = 3.6,
@@ -230,7 +247,7 @@ def _drawing(
     layout: Literal["constrained"] | None = "constrained",
 ) -> Iterator[tuple[Any, "Axes"]]:
     """Give a figure of that many inches and its axes; settings of the user do not count."""
-    import matplotlib
+    matplotlib = load_matplotlib()
     from matplotlib.figure import Figure
 
     with matplotlib.rc_context():

@@ -43,11 +43,14 @@ ALIGNMENT_SCORES = ("abs_rel", "rmse", "delta_1")
 GROUP_SCORES = {"rooms": HEADLINE["rooms"], "iqtt": ("iqtt_accuracy",)}
 
 
-def text_report(scores: ScoreFile, as_markdown: bool = False, whole: bool = False) -> str:
+def text_report(
+    scores: ScoreFile, as_markdown: bool = False, whole: bool = False, width: int | None = None
+) -> str:
     """Return the headline, as aligned text or Markdown, and accuracy by kind of question.
 
     Args:
         whole: whether all scores, and the main ones by group, stand there as well.
+        width: characters of a line, to which sentences are wrapped.
     """
     tables, notes = [headline_rows(scores)], list(notes_of(scores))
     if whole:
@@ -55,7 +58,7 @@ def text_report(scores: ScoreFile, as_markdown: bool = False, whole: bool = Fals
     else:
         tables += [table for table in group_tables(scores) if table.title == BY_KIND]
         notes.append("--all prints all scores and groups")
-    return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes)
+    return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes, width)
 
 
 def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> None:
@@ -202,20 +205,22 @@ def interval_cells(score: Score | Skill) -> tuple[str, str]:
     return with_interval(score.value, score.low, score.high)
 
 
-def score_cell(score: Score | Skill | None, best: str = "", floor: float | None = None) -> Cell:
+def score_cell(score: Score | Skill | None, best: bool = False, floor: float | None = None) -> Cell:
     """Return a value, with standard deviation over runs, interval, and a floor of its own.
 
     Args:
-        best: the best value of the column, as it is shown.
+        best: whether it is the best value of its column.
     """
     if score is None:
         return Cell()
+    if isinstance(score, Skill) and score.is_floor:
+        return Cell("0", "is the floor")
     value, interval = interval_cells(score)
     std, ends = getattr(score, "std", None), (score.low, score.high)
     rest = [] if std is None else [f"± {number(std, ends)}"]
     rest += [] if interval == "-" else [interval]
     rest += [] if floor is None else [f"floor {number(floor, ends)}"]
-    return Cell(value, " ".join(rest), value == best)
+    return Cell(value, " ".join(rest), best)
 
 
 def labels_of(files: Sequence[ScoreFile]) -> list[str]:
@@ -235,6 +240,7 @@ def title_of(scores: ScoreFile) -> str:
 def notes_of(scores: ScoreFile) -> Iterator[str]:
     """Yield what has to be known to read the tables, and where the scores come from."""
     meta = scores.meta
+    yield from is_floor_of(scores)
     for warning in (*scores.warnings, *few_clusters(scores)):
         yield f"warning: {warning}"
     if scores.skills:
@@ -267,6 +273,14 @@ def unread_notes(files: Sequence[ScoreFile]) -> list[str]:
         for file, label in zip(files, labels_of(files), strict=True)
         if file.unread is not None
     ]
+
+
+def is_floor_of(scores: ScoreFile) -> list[str]:
+    """Return a sentence where a method scores what its floor does; else none."""
+    headline = [name for name in scores.headline if name in scores.skills]
+    names = [name for name in headline if scores.skills[name].is_floor]
+    floors = dict.fromkeys(" ".join(floor_text(scores, name).split()) for name in names)
+    return [f"this method is the floor ({', '.join(floors)}) of {', '.join(names)}"] * bool(names)
 
 
 def few_clusters(scores: ScoreFile) -> list[str]:

@@ -6,6 +6,7 @@ within its cell and does nothing else.
 
 import itertools
 import re
+import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
@@ -93,27 +94,82 @@ def make_table(title: str, head: Sequence[str], rows: Iterable[Iterable[Cell | s
     return Table(title, tuple(head), tuple(map(make_row, rows)))
 
 
-def to_text(title: str, tables: Iterable[Table], notes: Iterable[str] = ()) -> str:
-    """Return tables with aligned columns, each below its title, and the notes as lines."""
-    lines = [title]
+def to_text(
+    title: str, tables: Iterable[Table], notes: Iterable[str] = (), width: int | None = None
+) -> str:
+    """Return tables with aligned columns, each below its title, and the notes, each once.
+
+    Args:
+        width: characters of a line. Notes are wrapped to it, and the heads of tables that are
+            wider; without it nothing is.
+    """
+    lines, told = [title] if title else [], set[str]()
     for table in tables:
         rows = [[printable(str(cell)) for cell in row.cells] for row in table.rows]
+        shown = aligned([table.head, *rows])
+        if width is not None and max(map(len, shown)) + 2 > width:
+            shown = aligned([*_narrow_head(table.head, rows), *rows])
         lines += ["", *filter(None, [table.title])]
-        lines += ["  " + line for line in aligned([table.head, *rows])]
-        lines += table.notes
-    return "\n".join(map(printable, [*lines, "", *notes]))
+        lines += ["  " + line for line in shown]
+        lines += [line for n in _once(table.notes, told) for line in _wrapped(n, width)]
+    text = [*lines, "", *(line for n in _once(notes, told) for line in _wrapped(n, width))]
+    return "\n".join(map(printable, text)).strip("\n")
 
 
-def to_markdown(title: str, tables: Iterable[Table], notes: Iterable[str] = ()) -> str:
-    """Return Markdown tables, with notes as lists."""
-    parts = [_markdown(title)] if title else []
+def to_markdown(
+    title: str, tables: Iterable[Table], notes: Iterable[str] = (), width: int | None = None
+) -> str:
+    """Return Markdown tables, with notes as lists, each note once; `width` is as in `to_text`."""
+    parts, told = [_markdown(title)] if title else [], set[str]()
     for table in tables:
         rows = [
             [_markdown_cell(table, row, i) for i in range(len(row.cells))] for row in table.rows
         ]
         parts += [f"**{_markdown(table.title)}**"] if table.title else []
-        parts += ["\n".join(piped([[*map(_markdown, table.head)], *rows])), _listed(table.notes)]
-    return "\n\n".join(filter(None, [*parts, _listed(notes)]))
+        parts.append("\n".join(piped([[*map(_markdown, table.head)], *rows])))
+        parts.append(_listed(table.notes, told, width))
+    return "\n\n".join(filter(None, [*parts, _listed(notes, told, width)]))
+
+
+def _once(notes: Iterable[str], told: set[str]) -> list[str]:
+    """Return those notes that are not told yet, and take them for told."""
+    new = [note for note in dict.fromkeys(notes) if note not in told]
+    told.update(new)
+    return new
+
+
+def _wrapped(text: str, width: int | None, first: str = "", rest: str = "") -> list[str]:
+    """Return a text as lines of so many characters, where its words allow that.
+
+    No line but the first begins with what Markdown would take for a list or a heading.
+    """
+    if width is None:
+        return [first + text]
+    lines = textwrap.wrap(
+        text, max(width, 20), initial_indent=first, subsequent_indent=rest,
+        break_long_words=False, break_on_hyphens=False,
+    )  # fmt: skip
+    safe: list[str] = []
+    for line in lines:
+        if safe and re.match(r"[-+*#>=~|]|[0-9]+[.)]", line.strip()):
+            safe[-1] += f" {line.strip()}"
+        else:
+            safe.append(line)
+    return safe or [first]
+
+
+def _narrow_head(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """Return lines of heads that are no wider than their columns, where their words allow that."""
+    widths = (
+        [max(map(len, column)) for column in zip(*rows, strict=True)] if rows else [0] * len(head)
+    )
+    lines = [
+        textwrap.wrap(text, max(width, 1), break_long_words=False) or [""]
+        for text, width in zip(head, widths, strict=True)
+    ]
+    most = max(map(len, lines))
+    padded = [[""] * (most - len(one)) + one for one in lines]
+    return [list(line) for line in zip(*padded, strict=True)]
 
 
 def _markdown(text: str) -> str:
@@ -127,8 +183,9 @@ def _markdown_cell(table: Table, row: Row, column: int) -> str:
     return " ".join(filter(None, (f"{mark}{value}{mark}", _markdown(cell.rest))))
 
 
-def _listed(notes: Iterable[str]) -> str:
-    return "\n".join(f"- {_markdown(note)}" for note in notes)
+def _listed(notes: Iterable[str], told: set[str], width: int | None) -> str:
+    new = (_markdown(note) for note in _once(notes, told))
+    return "\n".join(line for note in new for line in _wrapped(note, width, "- ", "  "))
 
 
 def without_rests(table: Table) -> Table:

@@ -1,5 +1,6 @@
 """What commands show: lines, progress, and the notes of a scheduler."""
 
+import shutil
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -17,6 +18,11 @@ if TYPE_CHECKING:
 def print_line(text: str, err: bool = False) -> None:
     """Print one line, whatever names from files it holds."""
     click.echo(printable(text), err=err)
+
+
+def line_width() -> int:
+    """Return the characters of a line of the terminal; 100 where there is none."""
+    return shutil.get_terminal_size((100, 24)).columns
 
 
 def print_checks(what: str, checks: "Sequence[Check]") -> int:

@@ -188,6 +188,7 @@ def render(
     seconds = time.perf_counter() - started
     megabytes = _set_bytes(out) / 1e6
     print_line(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
+    _print_exposure(out)
     for line in source.notes(spec.own_reflectance):
         print_line(line, err=True)
 
@@ -205,6 +206,25 @@ def _truth_place(out: str, overwrite: bool) -> str:
     check("://" not in out, "--withhold-truth", out, "a path of this machine")
     check_writable(Path(out), overwrite)
     return str(truth_path(out))
+
+
+def _print_exposure(out: str) -> None:
+    """Say how much of 8-bit images is saturated or black, from some rows of a file."""
+    from scenegen.files.places import as_place, is_remote
+    from scenegen.files.verify import spread_rows
+    from scenegen.rooms.exposure import clipped_shares, exposure_text, exposure_warnings
+    from scenegen.rooms.info import SAMPLED
+    from scenegen.rooms.reader import RoomsFile
+
+    place = as_place(out)
+    if is_remote(place):  # whose rows would have to be fetched
+        return
+    with RoomsFile(place) as rooms:
+        shares = clipped_shares(rooms, spread_rows(len(rooms), SAMPLED))
+    if shares is not None:
+        print_line(f"{out}: {exposure_text(shares)}")
+        for text in exposure_warnings(shares):
+            print_line(f"warning: {out}: {text}", err=True)
 
 
 def _set_bytes(out: str) -> int:

@@ -36,7 +36,7 @@ def column_lines(file: RowFile) -> list[str]:
             (
                 name,
                 f"({', '.join(map(str, values.shape[1:]))})",
-                "text" if values.dtype.kind == "O" else str(values.dtype),
+                "text" if values.dtype.kind in "OS" else str(values.dtype),
                 _shortened(file.unit(name), LONGEST),
                 f"{size_text(stored):>9}",
                 f"{raw / stored:6.1f}" if stored else f"{'-':>6}",

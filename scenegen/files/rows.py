@@ -157,14 +157,14 @@ class RowFile:
     def stored_bytes(self) -> dict[str, tuple[int, int]]:
         """Return the bytes on disk and in memory of each column, by name.
 
-        HDF5 does not tell the size of the heaps that hold texts. The last column of texts is said
-        to take what all others leave of the file.
+        HDF5 does not tell the size of the heaps that hold texts of any length, as other writers
+        have them. The last column of these is said to take what all others leave of the file.
         """
         sizes, texts = {}, ""
         with reading(self.path):
             for name, stored in self._stored.items():
                 disk = sum(piece.id.get_storage_size() for piece in stored.pieces())
-                is_text = h5py.check_string_dtype(stored.dtype) is not None
+                is_text = h5py.check_vlen_dtype(stored.dtype) is not None
                 sizes[name] = (disk, disk if is_text else stored.dataset.nbytes)
                 texts = name if is_text else texts
         if texts:

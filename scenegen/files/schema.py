@@ -10,6 +10,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from scenegen.common.records import LONGEST_JSON
 from scenegen.files.content import SHA256, dataset_digest
 
 DIGEST = "[0-9a-f]{64}"  # SHA-256 as hex
@@ -86,8 +87,10 @@ def column_problems(group: h5py.Group, columns: Sequence[Column], count: int) ->
             problems.append(f"{column.name}: shape {dataset.shape}, expected {expected}")
         if column.dtype != "text" and dataset.dtype != np.dtype(column.dtype):
             problems.append(f"{column.name}: type {dataset.dtype}, expected {column.dtype}")
-        if column.dtype == "text" and h5py.check_string_dtype(dataset.dtype) is None:
-            problems.append(f"{column.name}: type {dataset.dtype}, expected strings")
+        if column.dtype == "text":
+            kind = h5py.check_string_dtype(dataset.dtype)
+            if kind is None or (kind.length or 0) > LONGEST_JSON:
+                problems.append(f"{column.name}: type {dataset.dtype}, expected strings")
         problems += other_attributes(dataset, column.name, column.more)
     return problems
 

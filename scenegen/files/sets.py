@@ -125,19 +125,21 @@ def _show_part(
     files: Sequence[h5py.File], folder: Path, part: Part, shards: Sequence[Sequence[Shard]]
 ) -> dict[str, str]:
     """Show the columns of a part of all shards of each file; return their digests by name."""
-    joined = [_joined_digests(folder, of_file) for of_file in shards]
+    joined = [_joined_columns(folder, of_file) for of_file in shards]
     digests = {}
     for sheet in part.sheets:
         group = _group(files[sheet.file], sheet)
         for path, column in sheet.paths.items():
-            dataset = _show(group, column, path, shards[sheet.file])
-            dataset.attrs[SHA256] = digests[column.name] = joined[sheet.file][path]
+            digest, dtype = joined[sheet.file][path]
+            dataset = _show(group, column, path, shards[sheet.file], dtype)
+            dataset.attrs[SHA256] = digests[column.name] = digest
     return digests
 
 
-def _show(group: h5py.Group, column: Column, path: str, shards: Sequence[Shard]) -> h5py.Dataset:
+def _show(
+    group: h5py.Group, column: Column, path: str, shards: Sequence[Shard], dtype: Any
+) -> h5py.Dataset:
     """Write a virtual data set that shows a column of all shards."""
-    dtype = h5py.string_dtype() if column.dtype == "text" else np.dtype(column.dtype)
     layout = h5py.VirtualLayout((sum(shard.rows for shard in shards), *column.shape), dtype)
     layout.dcpl.set_obj_track_times(False)  # the same bytes at any time
     start = 0
@@ -249,12 +251,15 @@ def _write_row_digests(file: h5py.File, digests: Mapping[str, bytes]) -> None:
     dataset.attrs[SHA256] = dataset_digest(values)
 
 
-def _joined_digests(folder: Path, shards: Sequence[Shard]) -> dict[str, str]:
-    """Return the `column_digest` of each data set over all shards.
+def _joined_columns(folder: Path, shards: Sequence[Shard]) -> dict[str, tuple[str, Any]]:
+    """Return the `column_digest` of each data set over all shards, and its type.
+
+    Texts are as long as in the shard where they are longest.
 
     Raises FileFormatError where a shard is not the one that was recorded.
     """
     hashes: dict[str, hashlib._Hash] = {}
+    types: dict[str, Any] = {}
     for shard in shards:
         with opened(folder / shard.file) as file:
             if file.attrs.get(CONTENT_DIGEST) != shard.content_digest:
@@ -265,12 +270,15 @@ def _joined_digests(folder: Path, shards: Sequence[Shard]) -> dict[str, str]:
             values = digests[()]
             for i, name in enumerate(digests.attrs["names"]):
                 hashes.setdefault(name, hashlib.sha256()).update(values[:, i].tobytes())
-    return {name: digest.hexdigest() for name, digest in hashes.items()}
+                dtype = file[name].dtype
+                types[name] = max(types.get(name, dtype), dtype, key=lambda kind: kind.itemsize)
+    return {name: (digest.hexdigest(), types[name]) for name, digest in hashes.items()}
 
 
 def _write_list(file: h5py.File, shards: Sequence[Shard]) -> None:
     """Write the list of all shards of a set, those of each part in their order."""
-    lines = np.array([json.dumps(vars(shard)) for shard in shards], object)
-    listed = file.create_dataset(SHARDS, data=lines, dtype=h5py.string_dtype())
+    lines = np.array([json.dumps(vars(shard)).encode() for shard in shards])
+    dtype = h5py.string_dtype(length=lines.dtype.itemsize)
+    listed = file.create_dataset(SHARDS, data=lines.astype(dtype))
     listed.attrs["meaning"] = "the files beside this one that hold the values, in their order"
     listed.attrs[SHA256] = dataset_digest(lines)

@@ -2,6 +2,9 @@
 
 Images are compressed here, by isal, and handed to HDF5 as finished chunks: that is faster than its
 own filter and any HDF5 library reads it.
+
+Texts have the length of the longest one of their column, as PyTables reads no others. It is known
+at the end, so they are kept until then.
 """
 
 import os
@@ -32,6 +35,7 @@ PACK_ROWS = 4  # whose images a thread compresses in one go
 MOST_PACKING = 128  # rows that may wait to be written; bounds the memory
 MOST_PACKERS = 8  # threads that compress
 BLOCK_ROWS = 1024  # rows of the small datasets that are kept and written together
+TEXT_BYTES = 2**20  # of a chunk of texts, at most, unless one row has more
 Rows = Mapping[str, Sequence[Any] | Array]  # values of as many rows for each column
 
 
@@ -47,7 +51,7 @@ class Table:
         count, rows: numbers of rows, in all and written so far.
         file: that holds them.
         columns, compression: as given.
-        datasets: by name.
+        datasets: by name; those of texts are there when all rows are written.
     """
 
     def __init__(
@@ -68,13 +72,16 @@ class Table:
         self.count, self.rows, self._given = count, 0, 0
         self.columns, self.compression = tuple(columns), compression
         self._images = [column for column in columns if column.own_chunk]
-        self.datasets = {column.name: self._create(group, column) for column in columns}
+        self.datasets = {
+            column.name: self._create(group, column) for column in columns if column.dtype != "text"
+        }
         self._block: dict[str, list[Any]] = {c.name: [] for c in columns if not c.own_chunk}
-        self.file: h5py.File = group.file
+        self._texts: dict[str, list[bytes]] = {c.name: [] for c in columns if c.dtype == "text"}
+        self._group, self.file = group, group.file
         self._digests = {column.name: ColumnDigest(row_digests) for column in columns}
         self._packing: deque[Future[PackedRows]] = deque()
         if not count:
-            self._write_digests()
+            self._finish()
 
     def append(self, row: Mapping[str, Any]) -> None:
         """Write the next row: one value for each column."""
@@ -110,7 +117,7 @@ class Table:
             if self.rows % BLOCK_ROWS == 0 or self.rows == self.count:
                 self._flush()
         if self.rows == self.count:
-            self._write_digests()
+            self._finish()
 
     def _write_chunks(self, images: Sequence[tuple[bytes, Any]]) -> None:
         for column, (digest, chunk) in zip(self._images, images, strict=True):
@@ -121,7 +128,11 @@ class Table:
             else:
                 dataset.id.write_direct_chunk((self.rows, *(0 for _ in column.shape)), chunk)
 
-    def _write_digests(self) -> None:
+    def _finish(self) -> None:
+        """Write what is written when all rows are there: texts, and the digests."""
+        for column in self.columns:
+            if column.dtype == "text":
+                self.datasets[column.name] = self._write_texts(column)
         for name, digest in self._digests.items():
             self.datasets[name].attrs[SHA256] = digest.hex
 
@@ -130,18 +141,39 @@ class Table:
         kept = {self.datasets[name].name: digest.rows for name, digest in self._digests.items()}
         return {name.lstrip("/"): bytes(rows or b"") for name, rows in kept.items()}
 
-    def _create(self, group: h5py.Group, column: Column) -> h5py.Dataset:
-        text = column.dtype == "text"
+    def _write_texts(self, column: Column) -> h5py.Dataset:
+        """Write a column of texts, padded with zeros to the longest one."""
+        texts = self._texts.pop(column.name)
+        values = np.array(texts, f"S{max(1, *map(len, texts), 1)}")
+        values = values.reshape(self.count, *column.shape)
+        rows = max(1, TEXT_BYTES // values[:1].nbytes) if self.count else 1
+        rows = min(self.count, BLOCK_ROWS, rows)
+        dtype = h5py.string_dtype(length=values.dtype.itemsize)
+        dataset = self._create(self._group, column, dtype, rows)
+        for start in range(0, self.count, rows or 1):
+            if self.compression == "gzip":
+                chunk = np.zeros((rows, *column.shape), values.dtype)
+                some = values[start : start + rows]
+                chunk[: len(some)] = some
+                dataset.id.write_direct_chunk((start, *(0 for _ in column.shape)), deflated(chunk))
+            else:
+                dataset[start : start + rows] = values[start : start + rows].astype(dtype)
+        return dataset
+
+    def _create(
+        self, group: h5py.Group, column: Column, dtype: Any = None, chunk: int = 0
+    ) -> h5py.Dataset:
+        """Create a data set; `dtype` and `chunk` rows are those of texts."""
         options: dict[str, Any] = {}
         if self.count:
-            chunk = 1 if column.own_chunk else min(self.count, BLOCK_ROWS)
+            chunk = chunk or (1 if column.own_chunk else min(self.count, BLOCK_ROWS))
             options["chunks"] = (chunk, *column.shape)
-        if self.count and column.own_chunk and self.compression != "none":
+        if self.count and (column.own_chunk or dtype) and self.compression != "none":
             options["compression"] = self.compression
-            options["shuffle"] = _is_shuffled(column)
+            options["shuffle"] = dtype is None and _is_shuffled(column)
             if self.compression == "gzip":
                 options["compression_opts"] = DEFLATE_LEVEL
-        dtype = h5py.string_dtype() if text else column.dtype
+        dtype = dtype or column.dtype
         dataset = group.create_dataset(column.name, (self.count, *column.shape), dtype, **options)
         dataset.attrs.update(column.attributes)
         if column.axes is not None:
@@ -151,10 +183,13 @@ class Table:
     def _flush(self) -> None:
         for name, rows in self._block.items():
             if rows:
-                dataset = self.datasets[name]
-                text = h5py.check_string_dtype(dataset.dtype) is not None
-                values = np.array(rows, object) if text else np.stack(rows).astype(dataset.dtype)
-                dataset[self.rows - len(rows) : self.rows] = values
+                if name in self._texts:
+                    values = np.array(rows, object)
+                    self._texts[name] += [_utf8(text) for text in values.reshape(-1).tolist()]
+                else:
+                    dataset = self.datasets[name]
+                    values = np.stack(rows).astype(dataset.dtype)
+                    dataset[self.rows - len(rows) : self.rows] = values
                 self._digests[name].update(values)
                 rows.clear()
 
@@ -210,6 +245,10 @@ def pack_rows(rows: Rows, columns: Sequence[Column], compression: str) -> Packed
             row.append((row_digest(raw), packed))
     others = {column.name: rows[column.name] for column in columns if not column.own_chunk}
     return PackedRows(count, images, others)
+
+
+def _utf8(text: str | bytes) -> bytes:
+    return text.encode() if isinstance(text, str) else bytes(text)
 
 
 def _is_shuffled(column: Column) -> bool:

@@ -131,7 +131,7 @@ def _read_structure() -> None:
             return
         if is_virtual(item):
             virtual_sources(item)
-        elif h5py.check_string_dtype(item.dtype) is not None:
+        elif h5py.check_vlen_dtype(item.dtype) is not None:
             for first in range(0, len(item) if item.shape else 0, BLOCK_ROWS):
                 item[first : first + BLOCK_ROWS]
 

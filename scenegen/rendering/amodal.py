@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.camera import pixel_size
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.renderer import launch_fields
 
@@ -35,18 +36,52 @@ def amodal_masks(batch: SceneBatch, device: str = "auto") -> NDArray[np.bool_]:
     return masks
 
 
-def _alone(batch: SceneBatch, image: Array, slot: Array) -> SceneBatch:
-    """Return images (n,) of the batch that show the object of one slot each, (n,)."""
+def wide_masks(batch: SceneBatch, device: str = "auto") -> NDArray[np.bool_]:
+    """Return `amodal_masks` on a canvas of three by three images, (B, K, 3H, 3W).
+
+    The image itself is in the middle. Raises BackendError as `renderer.render`.
+    """
+    count, spec = len(batch), batch.spec
+    down, right = np.divmod(np.arange(9), 3) - np.ones((2, 1), int)
+    tiles = _beside(
+        _chosen(batch, np.tile(np.arange(count), 9)), *np.repeat([right, down], count, 1)
+    )
+    masks = amodal_masks(tiles, device).reshape(3, 3, count, -1, spec.height, spec.width)
+    return masks.transpose(2, 3, 0, 4, 1, 5).reshape(count, -1, 3 * spec.height, 3 * spec.width)
+
+
+def _beside(batch: SceneBatch, right: Array, down: Array) -> SceneBatch:
+    """Return images that adjoin those of a batch, so many widths to the right and heights down.
+
+    They have the same image plane. So the matrix of such a camera is a shear: its third column
+    points away from the middle of the adjoining image.
+    """
+    spec, matrix = batch.spec, batch.world_from_camera.copy()
+    pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
+    offsets = np.stack([right * spec.width, -down * spec.height], axis=1) * pixel[:, None]
+    matrix[:, :3, 2] -= np.einsum("bic,bc->bi", matrix[:, :3, :2], offsets)
+    return replace(batch, world_from_camera=matrix)
+
+
+def _chosen(batch: SceneBatch, image: Array) -> SceneBatch:
+    """Return images (n,) of the batch."""
     arrays: dict[str, Any] = {
         field.name: value[image]
         for field in fields(batch)
         if isinstance(value := getattr(batch, field.name), np.ndarray)
     }
+    return replace(batch, **arrays)
+
+
+def _alone(batch: SceneBatch, image: Array, slot: Array) -> SceneBatch:
+    """Return images (n,) of the batch that show the object of one slot each, (n,)."""
+    chosen = _chosen(batch, image)
     each = np.arange(len(image))
+    arrays: dict[str, Any] = {}
     for name in _SLOTS:
-        lone = np.full_like(arrays[name], -1 if name == "shape" else 0)
-        lone[:, 0] = arrays[name][each, slot]
-        arrays[name] = lone
-    arrays["object_count"] = np.ones_like(arrays["object_count"])
-    arrays["has_room"] = np.zeros_like(arrays["has_room"])
-    return replace(batch, cubes_only=False, **arrays)
+        values = getattr(chosen, name)
+        arrays[name] = np.full_like(values, -1 if name == "shape" else 0)
+        arrays[name][:, 0] = values[each, slot]
+    arrays["object_count"] = np.ones_like(chosen.object_count)
+    arrays["has_room"] = np.zeros_like(chosen.has_room)
+    return replace(chosen, cubes_only=False, **arrays)

@@ -12,6 +12,7 @@ from scenegen.files.info import column_lines, fact_lines, setting_lines, size_te
 from scenegen.files.verify import spread_rows
 from scenegen.layout import TRUTH_DIGEST
 from scenegen.rendering.backend import renderer_text
+from scenegen.rooms.exposure import clipped_shares, exposure_text, exposure_warnings
 from scenegen.rooms.reader import RoomsFile
 
 SAMPLED = 64  # rows that are read to tell the ranges of values
@@ -37,6 +38,8 @@ def describe(path: str | Path) -> str:
         }
         sampled = spread_rows(len(rooms), SAMPLED)
         ranges, shapes = _ranges(rooms, sampled)
+        shares = clipped_shares(rooms, sampled)
+        ranges |= {} if shares is None else {"exposure": exposure_text(shares)}
         parts = (
             fact_lines(facts),
             setting_lines(spec),
@@ -46,6 +49,8 @@ def describe(path: str | Path) -> str:
         lines = [f"{path}: {len(rooms)} images of {spec.height}x{spec.width}, {size}"]
         for part in parts:
             lines += ["", *(f"  {line}" for line in part)]
+        warnings = exposure_warnings(shares or (0.0, 0.0))
+        lines += ["", *(f"warning: {text}" for text in warnings)] if warnings else []
     return "\n".join(map(printable, lines))
 
 

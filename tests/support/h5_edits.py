@@ -2,6 +2,10 @@
 
 import json
 
+import h5py
+
+from scenegen.files.schema import name_axes
+
 
 def attribute(name, value):
     return lambda file: file.attrs.update({name: value})
@@ -96,9 +100,22 @@ def edit_scene(row, change):
     def edit(file):
         scene = json.loads(file["scene"][row])
         change(scene)
-        file["scene"][row] = json.dumps(scene, separators=(",", ":"))
+        text = json.dumps(scene, separators=(",", ":")).encode()
+        if len(text) > file["scene"].dtype.itemsize:  # HDF5 would cut it
+            _lengthen(file, "scene", len(text))
+        file["scene"][row] = text
 
     return edit
+
+
+def _lengthen(file, name, length):
+    """Let a column of texts of one axis hold longer ones."""
+    kept = {key: value for key, value in file[name].attrs.items() if "DIMENSION" not in key}
+    values = file[name][()].astype(h5py.string_dtype(length=length))
+    del file[name]
+    dataset = file.create_dataset(name, data=values, chunks=values.shape)
+    dataset.attrs.update(kept)
+    name_axes(file, dataset, ("row",))
 
 
 def swap_rows(a, b, *names):

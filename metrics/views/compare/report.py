@@ -59,9 +59,15 @@ class AtHandError(SceneGenError):
 
 
 def text_report(
-    comparison: Comparison, files: Sequence[ScoreFile], as_markdown: bool = False
+    comparison: Comparison,
+    files: Sequence[ScoreFile],
+    as_markdown: bool = False,
+    width: int | None = None,
 ) -> str:
-    """Return the skills of all methods, then a table of differences in each score; and a legend."""
+    """Return the skills of all methods, then a table of differences in each score; and a legend.
+
+    Sentences are wrapped to lines of `width` characters, where it is given.
+    """
     stamp = "" if comparison.comparable else " NOT COMPARABLE, compared all the same."
     test = known_test(comparison.truth_digest)
     truth = test.name if test else comparison.truth_digest[:12]
@@ -73,7 +79,7 @@ def text_report(
     ]
     write = to_markdown if as_markdown else to_text
     tables = [_text_table(comparison.reference, group) for group in _by_score(comparison)]
-    return write(title, [skills_table(files), *tables], notes)
+    return write(title, [skills_table(files), *tables], notes, width)
 
 
 def skills_table(files: Sequence[ScoreFile]) -> Table:

@@ -1,15 +1,18 @@
 """Cards of methods: what a leaderboard says of them beside their scores, from a YAML file."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import yaml
+from yaml.constructor import SafeConstructor
 
 from metrics.scoring.records import ScoreFile
 from metrics.views.table import Cell
 from scenegen.common.errors import SpecError
+from scenegen.common.names import did_you_mean
 from scenegen.common.records import from_json
 
 LARGEST = 1_000_000  # characters of a file of cards
@@ -42,19 +45,53 @@ class Card:
 
 
 def read_cards(path: str | Path) -> dict[str, Card]:
-    """Return cards by name of the method. Raises SpecError for other content, and OSError."""
+    """Return cards by name of the method. Raises SpecError for other content, and OSError.
+
+    Names and texts are taken as they are written, whatever else YAML makes of 1e3, NO or a date.
+    """
     text = Path(path).read_text(encoding="utf-8", errors="replace")
     if len(text) > LARGEST:
         raise SpecError(path, f"{len(text):,} characters", f"at most {LARGEST:,}")
     try:
         if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text)):
             raise SpecError(path, "an alias", "YAML without aliases")  # they may unfold without end
-        content = json.dumps(yaml.safe_load(text) or {}, default=str)
-        return from_json(dict[str, Card], content, str(path))
+        root = yaml.compose(text, yaml.SafeLoader)
+        content = {} if root is None else _as_written(root, path)
+        return from_json(dict[str, Card], json.dumps(content), str(path))
     except (yaml.YAMLError, RecursionError, TypeError, ValueError) as error:
         if isinstance(error, SpecError):
             raise error.inside(path) from error
         raise SpecError(path, "no YAML that can be read", "cards by name of the method") from error
+
+
+def _as_written(node: yaml.Node, path: str | Path) -> Any:
+    """Return a node of YAML as texts, lists and dicts; of `supervised` the truth value."""
+    if isinstance(node, yaml.SequenceNode):
+        return [_as_written(item, path) for item in node.value]
+    if not isinstance(node, yaml.MappingNode):
+        return node.value
+    content: dict[Any, Any] = {}
+    for key, value in node.value:
+        name = _as_written(key, path)
+        if not isinstance(name, str) or name in content:
+            raise SpecError(
+                f"{path}: line {key.start_mark.line + 1}", f"{name!r:.60}", "a new name"
+            )
+        content[name] = _as_written(value, path)
+        if name == "supervised" and value.tag == "tag:yaml.org,2002:bool":
+            content[name] = SafeConstructor.bool_values[value.value.lower()]
+    return content
+
+
+def unmatched(cards: Mapping[str, Card], files: Sequence[ScoreFile]) -> list[str]:
+    """Return a sentence for each card whose method none of the files has."""
+    methods = sorted({file.method for file in files})
+    return [
+        "; ".join(filter(None, (f"no score file has the method {name!r:.80}", hint)))
+        for name in cards
+        if name not in methods
+        for hint in [did_you_mean(name, methods)]
+    ]
 
 
 def card_cells(card: Card, file: ScoreFile) -> Mapping[str, Cell]:

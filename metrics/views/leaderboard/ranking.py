@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from metrics.scoring.known_tests import known_test
-from metrics.scoring.metric_names import HEADLINE, metric
+from metrics.scoring.metric_names import HEADLINE, OBJECT_SCORES, metric
 from metrics.scoring.records import ID_COLUMNS, Score, ScoreFile, Skill
 from metrics.submissions.layout import Shown
 from metrics.views.by_angle import angle_floors
@@ -44,7 +44,9 @@ from metrics.views.score_tables import (
     INTERVAL,
     SKILL,
     few_clusters,
+    is_floor_of,
     labels_of,
+    too_few,
     what_the_floor_is,
 )
 from metrics.views.table import Table
@@ -77,6 +79,7 @@ class Ranking:
         tables: the ranking; where it would be too wide, that of skills, then the scores.
         groups: scores by view angle, or by kind of question.
         comparison: of the comparable methods with the first one, where it was asked for.
+        mute: why the test set cannot tell methods apart, so that none has a rank; or empty.
     """
 
     title: str
@@ -84,6 +87,7 @@ class Ranking:
     tables: tuple[Table, ...]
     groups: tuple[Table, ...]
     comparison: Comparison | None = None
+    mute: str = ""
 
     @property
     def files(self) -> list[ScoreFile]:
@@ -234,6 +238,7 @@ def _ranking(
     ranked = [members[i] for i in order]
     comparison = compared_with_first(ranked) if tested else None
     key = next(iter(columns))
+    mute = _why_none_is_told_apart(ranked[0], key)
     entries = tuple(
         Entry(
             _label(members[i], labels[i], cards.get(members[i].method, Card()).supervised),
@@ -244,15 +249,15 @@ def _ranking(
             links.get(id(members[i]), ""),
             card_cells(cards.get(members[i].method, Card()), members[i]) if cards else {},
         )
-        for i, rank in zip(order, _ranks(ranked, key), strict=True)
+        for i, rank in zip(order, [""] * len(order) if mute else _ranks(ranked, key), strict=True)
     )
     title, first = _title(ranked[0]), ranked[0]  # comparable, if any is
     names = [key for key in columns if not key.startswith(SKILL_OF)]
-    notes = [*_notes(ranked), *_same_request_notes(members, files)]
+    notes = [*filter(None, [mute]), *_notes(ranked, key), *_same_request_notes(members, files)]
     placed = [f for f in figures if f.view_angle is None and f.metric in columns]
     floors = floor_cells(first, names)
     skill = SKILL_OF + key.removeprefix(SKILL_OF)
-    line = next((label for label, row in floors.items() if skill in row), "")
+    line = next((label for label, row in floors.items() if skill in row and not mute), "")
     tables = [
         build_table(
             f"{title}: scores" if i else title,
@@ -263,6 +268,7 @@ def _ranking(
             [AS_RANKED] if i else notes,
             line,
             ranked=not i,
+            differ=lambda a, b, k: not mute and bool(_differ(a.file, b.file, k)),
         )
         for i, part in enumerate(_parts(columns))
     ]
@@ -271,7 +277,7 @@ def _ranking(
         for table, used in _group_tables(title, entries, name, figures):
             groups.append(table)
             placed += used
-    return Ranking(title, entries, tuple(tables), tuple(groups), comparison), placed
+    return Ranking(title, entries, tuple(tables), tuple(groups), comparison, mute), placed
 
 
 def _order(files: Sequence[ScoreFile], columns: Mapping[str, Column]) -> list[int]:
@@ -311,7 +317,16 @@ def _ranks(files: Sequence[ScoreFile], key: str) -> list[str]:
 
 
 def _told_apart(file: ScoreFile, first: ScoreFile, key: str) -> bool:
-    """Return whether two files differ in a column, by the interval of their paired difference.
+    """Return whether two files differ in a column; without intervals, whether they are not equal.
+
+    See `_differ`.
+    """
+    differ = _differ(first, file, key)
+    return _by_key(first)[key].value != _by_key(file)[key].value if differ is None else differ
+
+
+def _differ(first: ScoreFile, file: ScoreFile, key: str) -> bool | None:
+    """Return whether the interval of a paired difference does not hold 0; None without intervals.
 
     Skills over a floor that the files do not share, and files that cannot be paired, are told apart
     where their own intervals do not meet.
@@ -324,16 +339,32 @@ def _told_apart(file: ScoreFile, first: ScoreFile, key: str) -> bool:
             pass
         else:
             low, high = apart.low, apart.high
-            return apart.difference != 0 if low is None or high is None else not low <= 0 <= high
+            return None if low is None or high is None else not low <= 0 <= high
     a, b = (_by_key(f)[key] for f in (first, file))
     if a.low is None or a.high is None or b.low is None or b.high is None:
-        return a.value != b.value
+        return None
     return a.low > b.high or b.low > a.high
 
 
 def _by_key(file: ScoreFile) -> dict[str, Score | Skill]:
     """Return the scores of a file, and their skills, by the keys of their columns."""
     return {**file.metrics, **{SKILL_OF + name: skill for name, skill in file.skills.items()}}
+
+
+def _why_none_is_told_apart(file: ScoreFile, key: str) -> str:
+    """Return in a sentence why a test set cannot tell methods apart by a column; or nothing."""
+    name = key.removeprefix(SKILL_OF)
+    if file.task != "rooms" or name not in file.metrics:
+        return ""
+    of_objects = [name for name in OBJECT_SCORES if name in file.items]
+    scenes, scored = len(np.unique(file.clusters)), file.metrics[name].n
+    if of_objects and not file.metrics.keys() & set(of_objects):
+        why = "no image shows an object that counts, so the empty room is the truth"
+    elif scored < 2:
+        why = f"only {scored} of {scenes} scenes has a score of {metric(name).title}"
+    else:
+        return ""
+    return f"This test set cannot tell methods apart: {why}. No method has a rank."
 
 
 def compared_with_first(files: Sequence[ScoreFile]) -> Comparison | None:
@@ -425,8 +456,8 @@ def _label(file: ScoreFile, name: str, supervised: bool) -> str:
     return name + (f" ({'; '.join(texts)})" if texts else "") + mark
 
 
-def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
-    first = files[0]
+def _notes(files: Sequence[ScoreFile], key: str) -> Iterator[str]:
+    first, name = files[0], key.removeprefix(SKILL_OF)
     truth = f", truth {first.meta.truth_digest[:12]}"
     if first.task == "rooms":
         yield f"{len(first.ids):,} images of {len(np.unique(first.clusters)):,} scenes{truth}."
@@ -442,10 +473,14 @@ def _notes(files: Sequence[ScoreFile]) -> Iterator[str]:
     over = "shapes" if "shape" in first.items else "questions"
     yield (
         f"[low, high]: {INTERVAL} over {'scenes' if first.task == 'rooms' else over}."
-        " ±: standard deviation over training runs. Best in bold, which is no test of a difference."
+        " ±: standard deviation over training runs. Bold: better than the next best method, and the"
+        " 95% interval of their paired difference does not hold 0."
     )
     yield SHARED
-    yield from (f"Warning: {text}." for text in few_clusters(first))
+    yield from (f"{file.method}: {text}." for file in files for text in is_floor_of(file))
+    scored = first.metrics[name].n if first.task == "rooms" and name in first.metrics else 0
+    warnings = too_few(scored, f"scenes with a score of {metric(name).title}") if scored else []
+    yield from (f"Warning: {text}." for text in few_clusters(first) or warnings)
 
 
 def _same_request_notes(members: Sequence[ScoreFile], files: Sequence[ScoreFile]) -> Iterator[str]:

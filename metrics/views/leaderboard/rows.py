@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Score, ScoreFile, Skill
 from metrics.views.paper import REPORTED, SOURCE, Figure, PaperTable
-from metrics.views.score_tables import interval_cells, score_cell
+from metrics.views.score_tables import score_cell
 from metrics.views.table import Cell, Row, Table, make_row
 
 REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"
@@ -61,17 +61,20 @@ def build_table(
     notes: Sequence[str],
     line: str = "",
     ranked: bool = False,
+    differ: Callable[[Entry, Entry, str], bool] | None = None,
 ) -> Table:
     """Return a table of the scored methods, then of floors, then of the paper's figures.
 
     Args:
         columns: the columns by their keys.
         entries: the methods, best first.
+        differ: tells whether two methods differ in a column by more than chance; by default, where
+            their intervals do not meet.
         notes: stand below the table, before those on marks of its rows.
         line: label of the floor that stands right below the methods with a rank.
         ranked: whether the first column shows the ranks.
     """
-    best = {key: _best(entries, key, column) for key, column in columns.items()}
+    best = {k: _best(entries, k, column, differ or _apart) for k, column in columns.items()}
     about = tuple(dict.fromkeys(head for e in entries for head in e.card)) if ranked else ()
     rows = [
         make_row(
@@ -79,11 +82,7 @@ def build_table(
                 entry.rank if ranked else "",
                 entry.label,
                 *(
-                    score_cell(
-                        entry.scores.get(key),
-                        best[key] if entry.file.comparable else "",
-                        entry.floors.get(key),
-                    )
+                    score_cell(entry.scores.get(key), entry is best[key], entry.floors.get(key))
                     for key in columns
                 ),
                 *(entry.card.get(head, Cell()) for head in about),
@@ -117,15 +116,34 @@ def unranked_rows(kind: str, cells: Cells, keys: Sequence[str]) -> list[Row]:
     ]
 
 
-def _best(entries: Sequence[Entry], key: str, column: Column) -> str:
-    """Return the best of the comparable scores of a column as it is shown; empty without any.
+def _best(
+    entries: Sequence[Entry],
+    key: str,
+    column: Column,
+    differ: Callable[[Entry, Entry, str], bool],
+) -> Entry | None:
+    """Return the method that is better in a column than all others; None without one.
 
-    A skill of 0 or less is the best of nothing.
+    There must be another one, and the next best must differ from it. A skill of 0 or less is the
+    best of nothing.
     """
-    scores = [e.scores[key] for e in entries if e.file.comparable and key in e.scores]
-    scores = [score for score in scores if isinstance(score, Score) or score.value > 0.0]
-    better = max if column.higher_is_better else min
-    return interval_cells(better(scores, key=lambda score: score.value))[0] if scores else ""
+    sign = -1.0 if column.higher_is_better else 1.0
+    there = [e for e in entries if e.file.comparable and key in e.scores]
+    there.sort(key=lambda e: sign * e.scores[key].value)
+    if len(there) < 2:
+        return None
+    first, second, *_ = there
+    score = first.scores[key]
+    is_better = isinstance(score, Score) or score.value > 0.0
+    return first if is_better and differ(first, second, key) else None
+
+
+def _apart(first: Entry, second: Entry, key: str) -> bool:
+    """Return whether the intervals of two methods' scores do not meet."""
+    a, b = first.scores[key], second.scores[key]
+    if a.low is None or a.high is None or b.low is None or b.high is None:
+        return False
+    return a.low > b.high or b.low > a.high
 
 
 def score_column(name: str) -> Column:

@@ -1,11 +1,14 @@
 """A data set of BOP: images, depth, poses, masks, and models as PLY files.
 
-Lengths are millimetres; one scene unit, the edge of the room, is one metre. Models have z up, and
-are rigid: an object of another size is another model. Cameras are x right, y down, looking along
-+z; the centre of the first pixel is (0, 0).
+Lengths are millimetres; one scene unit, the edge of the room, is one metre. Models have z up and
+the middle of their bounding box as origin. They are rigid: an object of another size is another
+model. Cameras are x right, y down, looking along +z; the centre of the first pixel is (0, 0).
+
+Fields have the meaning of BOP's document of formats and of the scripts `calc_gt_info`,
+`calc_gt_masks` and `enumerate_test_targets` of its toolkit (T. Hodan et al., ECCV 2018).
 """
 
-from collections.abc import Sequence
+from collections import Counter
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -15,12 +18,10 @@ from numpy.typing import NDArray
 
 from scenegen.camera import intrinsics
 from scenegen.description.scenes import PlacedObject
-from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.scene_mesh import welded, world_from_object
-from scenegen.rendering.amodal import amodal_masks
+from scenegen.rendering.amodal import wide_masks
 from scenegen.rendering.packing import pack
-from scenegen.rooms.export.coco import box
 from scenegen.rooms.export.colmap import FLIP
 from scenegen.rooms.export.encoding import write_json, write_png
 from scenegen.rooms.export.nerfstudio import Z_UP
@@ -29,6 +30,7 @@ from scenegen.rooms.reader import Room
 Array = NDArray[Any]
 MILLIMETRES = 1000.0  # of a scene unit
 SPLIT = "test"
+LEAST_VISIBLE = 0.1  # visible fraction of an instance that a pose estimator has to find
 
 
 def write(source: Any, folder: Path) -> dict[str, Any]:
@@ -39,6 +41,7 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
     spec, encoding = source.rooms.spec, source.encoding
     objects = source.objects or objects_of(spec)
     models: dict[tuple[str, float], int] = {}
+    middles: dict[str, Array] = {}  # of the bounding boxes of unit shapes
     targets = []
     for scene, views in source.views():
         place = folder / SPLIT / f"{scene:06d}"
@@ -46,8 +49,11 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
             (place / name).mkdir(parents=True)
         for item in views[0].scene.objects:
             models.setdefault((item.shape, item.scale), len(models) + 1)
+            if item.shape not in middles:
+                middles[item.shape] = welded(objects.shape(item.shape)).bounds.mean(axis=0)
         ids = [models[item.shape, item.scale] for item in views[0].scene.objects]
-        masks = _silhouettes(spec, views, objects, source.device)
+        numbers = [room.view_index for room in views]
+        masks = wide_masks(pack(spec, [views[0].scene], numbers, objects), source.device)
         cameras, poses, infos = {}, {}, {}
         for room, whole in zip(views, masks, strict=True):
             name, key = f"{room.index:06d}", str(room.index)
@@ -55,15 +61,15 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
             write_png(place / "depth" / f"{name}.png", encoding.depth_steps(room), 16)
             cameras[key] = _camera(room, encoding.depth_unit)
             poses[key] = [
-                {"obj_id": i, **_pose(room, item)}
+                {"obj_id": i, **_pose(room, item, middles[item.shape])}
                 for i, item in zip(ids, room.scene.objects, strict=True)
             ]
             infos[key] = [
                 _write_masks(place, room, k, whole[k]) for k in range(len(room.scene.objects))
             ]
             targets += [
-                {"scene_id": scene, "im_id": room.index, "obj_id": i, "inst_count": ids.count(i)}
-                for i in sorted(set(ids))
+                {"scene_id": scene, "im_id": room.index, "obj_id": i, "inst_count": count}
+                for i, count in sorted(_visible_instances(ids, infos[key]).items())
             ]
         write_json(place / "scene_camera.json", cameras)
         write_json(place / "scene_gt.json", poses)
@@ -78,7 +84,10 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
         "camera": "x right, y down, looks along +z",
         "pixel_centers": "0: the centre of the first pixel is (0, 0)",
         "models": {str(i): {"shape": shape, "scale": s} for (shape, s), i in models.items()},
-        "masks": "silhouettes within the image; boxes count whole pixels",
+        "masks": "silhouettes within the image",
+        "scene_gt_info": "as BOP's calc_gt_info: px_count_all, visib_fract and bbox_obj include"
+        " what lies up to one image beyond the edge; boxes are from first to last pixel centre",
+        "targets": f"instances with visib_fract of {LEAST_VISIBLE} or more",
         "pictures": {
             "image": {**encoding.pictures()["image"], "bits": 8},
             "depth": {"millimetres": encoding.depth_unit * MILLIMETRES, "nothing": 0},
@@ -86,14 +95,10 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
     }
 
 
-def _silhouettes(
-    spec: DatasetSpec, views: Sequence[Room], objects: Objects, device: str
-) -> Sequence[Array]:
-    """Return the whole silhouettes of each view, (K, H, W): as stored, or else rendered."""
-    if "amodal" in spec.truth:
-        return [room.truth["object/amodal_mask"] > 0 for room in views]
-    numbers = [room.view_index for room in views]
-    return list(amodal_masks(pack(spec, [views[0].scene], numbers, objects), device))
+def _visible_instances(ids: list[int], infos: list[dict[str, Any]]) -> Counter[int]:
+    """Return how many instances of each model an image shows well enough to be found."""
+    pairs = zip(ids, infos, strict=True)
+    return Counter(i for i, info in pairs if info["visib_fract"] >= LEAST_VISIBLE)
 
 
 def _camera(room: Room, depth_unit: float) -> dict[str, Any]:
@@ -116,9 +121,13 @@ def _sensor(spec: Any, fov: float, depth_unit: float) -> dict[str, Any]:
     return {**names, **size, "depth_scale": depth_unit * MILLIMETRES}
 
 
-def _pose(room: Room, item: PlacedObject) -> dict[str, Any]:
-    """Return the rigid transform from an object's model to the camera, in millimetres."""
+def _pose(room: Room, item: PlacedObject, middle: Array) -> dict[str, Any]:
+    """Return the rigid transform from an object's model to the camera, in millimetres.
+
+    `middle` is that of the bounding box of the unit shape.
+    """
     world = world_from_object(item.position, item.rotation, 1.0)
+    world[:3, 3] += world[:3, :3] @ middle * item.scale
     camera_from_world = np.linalg.inv(room.world_from_camera)
     camera = camera_from_world @ world
     rotation = FLIP @ camera[:3, :3] @ Z_UP[:3, :3].T
@@ -128,20 +137,35 @@ def _pose(room: Room, item: PlacedObject) -> dict[str, Any]:
     }
 
 
-def _write_masks(place: Path, room: Room, k: int, whole: Array) -> dict[str, Any]:
-    """Write both masks of the object of slot `k`; return their counts and boxes."""
+def _write_masks(place: Path, room: Room, k: int, wide: Array) -> dict[str, Any]:
+    """Write both masks of the object of slot `k`; return their counts and boxes.
+
+    `wide` is its whole silhouette on a canvas of three by three images, (3H, 3W).
+    """
+    height, width = room.depth.shape
+    whole = wide[height : 2 * height, width : 2 * width]
     visible = room.object_id == k + 1
     for name, mask in (("mask", whole), ("mask_visib", visible)):
         write_png(place / name / f"{room.index:06d}_{k:06d}.png", mask * 255.0, 8)
-    count, shown = int(whole.sum()), int(visible.sum())
+    count, shown = int(wide.sum()), int(visible.sum())
     return {
-        "bbox_obj": box(whole),
-        "bbox_visib": box(visible),
+        "bbox_obj": _box(wide, (width, height)) if shown else [-1] * 4,
+        "bbox_visib": _box(visible) if shown else [-1] * 4,
         "px_count_all": count,
         "px_count_valid": int((whole & np.isfinite(room.depth)).sum()),
         "px_count_visib": shown,
         "visib_fract": shown / count if count else 0.0,
     }
+
+
+def _box(mask: Array, origin: tuple[int, int] = (0, 0)) -> list[int]:
+    """Return x, y, width and height of a mask that is not empty, as BOP's `calc_2d_bbox`.
+
+    The width is the last column minus the first one. `origin` is the pixel (0, 0), x and y.
+    """
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    x, y = int(columns[0]), int(rows[0])
+    return [x - origin[0], y - origin[1], int(columns[-1]) - x, int(rows[-1]) - y]
 
 
 def _write_models(folder: Path, models: dict[tuple[str, float], int], objects: Objects) -> None:
@@ -150,6 +174,7 @@ def _write_models(folder: Path, models: dict[tuple[str, float], int], objects: O
     for (shape, scale), number in models.items():
         mesh = welded(objects.shape(shape))
         mesh.apply_transform(Z_UP)
+        mesh.apply_translation(-mesh.bounds.mean(axis=0))
         mesh.apply_scale(scale * MILLIMETRES)
         mesh.export(folder / f"obj_{number:06d}.ply", vertex_normal=True)
         low, size = mesh.bounds[0].tolist(), mesh.extents.tolist()

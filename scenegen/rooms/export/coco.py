@@ -1,6 +1,7 @@
 """A data set of COCO: images, and annotations.json with a mask, a box and an area of each object.
 
-Masks show what is visible. Boxes count whole pixels: x and y of the first, width and height.
+Masks show what is visible. Boxes count whole pixels: x and y of the first, width and height. An
+object of which nothing is visible has no annotation.
 """
 
 from pathlib import Path
@@ -38,6 +39,8 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
             )
             for k, item in enumerate(room.scene.objects, start=1):
                 mask = room.object_id == k
+                if not mask.any():
+                    continue
                 annotations.append(
                     {
                         "id": len(annotations) + 1,
@@ -53,7 +56,10 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
     about = {
         "info": {"description": f"rooms of {source.rooms.path.name}, pix2shape-bench"},
         "licenses": [],
-        "categories": [{"id": i, "name": name} for i, name in enumerate(names, start=1)],
+        "categories": [
+            {"id": i, "name": name, "supercategory": "object"}
+            for i, name in enumerate(names, start=1)
+        ],
         "images": images,
         "annotations": annotations,
     }
@@ -75,9 +81,7 @@ def run_lengths(mask: Array) -> dict[str, list[int]]:
 
 
 def box(mask: Array) -> list[int]:
-    """Return x, y, width and height of a mask (H, W) in pixels; -1 each if it is empty."""
+    """Return x, y, width and height of a mask (H, W) that is not empty, in pixels."""
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    if not len(rows):
-        return [-1] * 4
     x, y = int(columns[0]), int(rows[0])
     return [x, y, int(columns[-1]) - x + 1, int(rows[-1]) - y + 1]

@@ -1,8 +1,9 @@
 """A data set of MoGe: for each row a folder with image.jpg, depth.png and meta.json.
 
 Depth is planar and coded by its logarithm: with near and far as texts of the PNG file, code c from
-1 to 65534 is near (far / near)^((c - 1) / 65533); 0 is nothing. Steps are therefore the same share
-of the depth everywhere, and no depth is out of range.
+1 to 65534 is near (far / near)^((c - 1) / 65533). Steps are therefore the same share of the depth
+everywhere, and no depth is out of range. MoGe's reader takes 0 for unknown and 65535 for infinite;
+where a ray hits nothing, depth is infinite.
 """
 
 import json
@@ -19,6 +20,7 @@ from scenegen.rooms.export.encoding import write_json, write_png
 from scenegen.rooms.reader import Room
 
 STEPS = 65533  # between near and far
+INFINITE = 65535
 QUALITY = 95  # of JPEG files
 
 
@@ -48,9 +50,10 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
         "unit": "scene unit: the edge of the room",
         "camera": "intrinsics are divided by width and height; x right, y down, looks along +z",
         "pixel_centers": "+0.5, so that the middle of an image is 0.5",
-        "depth": "planar; near (far / near)^((code - 1) / 65533), 0 for nothing",
+        "depth": "planar; near (far / near)^((code - 1) / 65533), 65535 for nothing",
         "normal": "code / 65535 * 2 - 1: x right, y up, z to the viewer; 0 0 0 for nothing",
-        "segmentation": "0 nothing, 1 the room, k + 1 the k-th object; the PNG's text has labels",
+        "segmentation": "0 background (nothing), 1 the room, k + 1 the k-th object; the PNG's text"
+        " has labels",
         "pictures": {"image": {**source.encoding.pictures()["image"], "jpeg_quality": QUALITY}},
     }
 
@@ -61,7 +64,7 @@ def write_log_depth(path: Path, depth: NDArray[Any]) -> None:
     near = float(depth[known].min()) if known.any() else 1.0
     far = max(1.1 * near, float(depth[known].max())) if known.any() else 1.1
     share = np.log(np.where(known, depth, near).astype(float) / near) / np.log(far / near)
-    codes = np.where(known, 1 + np.rint(share * STEPS), 0).astype(np.uint16)
+    codes = np.where(known, 1 + np.rint(share * STEPS), INFINITE).astype(np.uint16)
     texts = PngInfo()
     texts.add_text("near", repr(near))
     texts.add_text("far", repr(far))
@@ -71,5 +74,5 @@ def write_log_depth(path: Path, depth: NDArray[Any]) -> None:
 def _write_segmentation(path: Path, room: Room) -> None:
     names = {f"object_{k}_{item.name}": k + 1 for k, item in enumerate(room.scene.objects, start=1)}
     texts = PngInfo()
-    texts.add_text("labels", json.dumps({"nothing": 0, "room": 1, **names}))
+    texts.add_text("labels", json.dumps({"background": 0, "room": 1, **names}))
     Image.fromarray((room.object_id + 1).astype(np.uint8)).save(path, "PNG", pnginfo=texts)

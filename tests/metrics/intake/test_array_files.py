@@ -14,6 +14,7 @@ from metrics.intake.array_files import ArrayFileError, read_array
 DEPTH = (np.arange(6 * 8).reshape(6, 8) * 1000 + 7).astype("u2")
 FLOATS = DEPTH.astype("f4") / 8
 VECTORS = np.random.default_rng(1).random((6, 8, 3)).astype("f4")
+GREY = np.repeat(FLOATS[..., None], 3, axis=2) / 3
 BYTES = (VECTORS * 255).astype("u1")
 WORDS = (VECTORS * 65535).astype("u2")
 
@@ -21,6 +22,15 @@ WORDS = (VECTORS * 65535).astype("u2")
 def exr(path, channels):
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(header, {k: np.ascontiguousarray(v) for k, v in channels.items()}).write(str(path))
+
+
+def parts(path, **named):
+    """Parts of an EXR file, by name; "A_B" stands for the channel "A.B"."""
+    made = []
+    for name, values in named.items():
+        channels = {c.replace("_", "."): np.ascontiguousarray(v) for c, v in values.items()}
+        made.append(OpenEXR.Part({}, channels, name))
+    OpenEXR.File(made).write(str(path))
 
 
 def pfm(path, values, order="<"):
@@ -43,6 +53,15 @@ SCALARS = {
     "tiff": (lambda p: Image.fromarray(FLOATS).save(p), FLOATS),
     "lzw.tif": (lambda p: Image.fromarray(DEPTH).save(p, compression="tiff_lzw"), DEPTH),
     "exr": (lambda p: exr(p, {"R": VECTORS[..., 0], "G": VECTORS[..., 1], "Z": FLOATS}), FLOATS),
+    "parts.exr": (lambda p: parts(p, rgb={"RGB": GREY}, d={"Z": FLOATS}), FLOATS),
+    "three.exr": (
+        lambda p: parts(p, rgb={"RGB": GREY}, n={"N_X": GREY[..., 0]}, Depth={"V": FLOATS}),
+        FLOATS,
+    ),
+    "layers.exr": (
+        lambda p: exr(p, {"View.Combined.R": FLOATS + 1, "View.Depth.Z": FLOATS}),
+        FLOATS,
+    ),
     "one.exr": (lambda p: exr(p, {"any": FLOATS}), FLOATS),
     "half.exr": (lambda p: exr(p, {"Z": FLOATS.astype("f2")}), FLOATS.astype("f2")),
     "pfm": (lambda p: pfm(p, FLOATS), FLOATS),
@@ -69,6 +88,15 @@ def test_an_image_of_numbers(name, tmp_path):
         ("x.exr", lambda p: exr(p, dict(zip("XYZ", np.moveaxis(VECTORS, -1, 0)))), VECTORS),
         ("x.pfm", lambda p: pfm(p, VECTORS), VECTORS),
         ("n.exr", lambda p: exr(p, {"RGB": VECTORS}), VECTORS),
+        (
+            "parts.exr",
+            lambda p: parts(
+                p,
+                rgb={"RGB": GREY},
+                n=dict(zip(("N_X", "N_Y", "N_Z"), np.moveaxis(VECTORS, -1, 0))),
+            ),
+            VECTORS,
+        ),
     ],
 )
 def test_an_image_of_vectors(name, write, expected, tmp_path):
@@ -111,6 +139,9 @@ BROKEN = {
     "two.npz": lambda p: np.savez(p, a=FLOATS, b=FLOATS),
     "picture.jpg": lambda p: Image.fromarray(BYTES).save(p),
     "channels.exr": lambda p: exr(p, {"a": FLOATS, "b": FLOATS}),
+    "luminance.exr": lambda p: exr(p, {"Y": FLOATS, "RY": FLOATS, "BY": FLOATS}),
+    "grey.exr": lambda p: parts(p, rgb={"RGB": GREY}, more={"A": FLOATS}),
+    "depths.exr": lambda p: parts(p, left={"Z": FLOATS}, right={"Z": FLOATS}),
 }
 
 

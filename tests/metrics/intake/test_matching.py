@@ -81,6 +81,14 @@ def test_files_of_a_folder_or_a_pattern(tmp_path):
     for nothing in (str(tmp_path / "deeper.png"), str(tmp_path / "*.exr"), ""):
         with pytest.raises(MatchError):
             files_of(nothing)
+    for name in ("[ab]", "run[1]", "a*b"):  # what exists means itself
+        (tmp_path / name / "in").mkdir(parents=True)
+        for file in ("0.png", "[1].png"):
+            (tmp_path / name / "in" / file).touch()
+        for pattern in (f"{name}/in", f"{name}/in/*.png", f"{name}/i?/*"):
+            assert len(files_of(str(tmp_path / pattern))) == 2, pattern
+        assert len(files_of(str(tmp_path / name / "in" / "[1].png"))) == 1
+    assert len(files_of(str(tmp_path / "[a-z]*" / "in" / "0.png"))) == 2
     (tmp_path / "notes.txt").touch()
     with pytest.raises(MatchError, match=r"notes\.txt"):
         files_of(str(tmp_path))

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from metrics.scoring.estimates import Bootstrap, skills
+from metrics.scoring.estimates import ROUNDING, Bootstrap, skills
 from metrics.scoring.metric_names import SKILLED
 
 SCENES = 6
@@ -37,7 +37,7 @@ def test_a_relief_that_goes_against_other_scenes_wins_nothing(own, other):
     if found is None:
         assert np.mean(other) == 1.0
     else:
-        assert found.value <= np.mean(own) + 1e-12
+        assert found.value <= np.mean(own) + ROUNDING
         assert found.floor == pytest.approx(max(np.mean(other), 0.0), abs=1e-12)
         if found.low is None or found.high is None:
             assert max(other) == 1.0, "some resample has perfect scenes alone, and so no skill"
@@ -54,6 +54,15 @@ def test_below_a_floor_of_0_the_floor_has_no_part_in_the_interval():
     first, other = (one["relief_correlation"] for one in told)
     assert first == other
     assert first.value == pytest.approx(0.2)
+
+
+def test_what_rounding_explains_is_0():
+    floor = np.linspace(0.1, 0.3, SCENES)
+    single = (floor.astype(np.float32) * np.float32(3)).astype(float) / 3
+    for chamfer, is_floor in ((single, True), (floor * 0.999, False), (floor * 1.001, False)):
+        found = skills_of(columns(chamfer=chamfer, empty_room_chamfer=floor))["chamfer"]
+        assert found.is_floor is is_floor
+        assert (found.value == 0.0) is is_floor
 
 
 def test_rows_without_objects_leave_the_other_skills_as_they_were():

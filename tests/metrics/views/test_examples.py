@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
-from metrics.views.examples import chosen_questions, chosen_scenes
+from metrics.measures.empty_room import empty_room
+from metrics.prediction_writer import RoomPredictionWriter
+from metrics.scoring.evaluate import score
+from metrics.views.examples import chosen_questions, chosen_scenes, examples_of
+from scenegen.rooms.reader import RoomsFile
 
 
 def test_scenes_stand_by_their_mean_with_the_view_nearest_to_it():
@@ -40,3 +44,26 @@ def test_questions_are_spread_over_the_file():
     assert chosen["right"] == [0, 20, 40, 58, 78, 98]
     assert all(not right[i] for i in chosen["wrong"])
     assert chosen_questions(np.array([True])) == {"right": [0]}
+
+
+def test_the_best_scenes_are_not_those_in_which_nothing_is_predicted(truths, tmp_path):
+    """Half of the scenes are noisy truth, half the empty room, whose errors may be less."""
+    path = tmp_path / "p.h5"
+    noise = np.random.default_rng(0)
+    with (
+        RoomsFile(truths.rooms) as rooms,
+        RoomPredictionWriter(path, rooms.path, method="m") as out,
+    ):
+        empty = {int(scene) for scene in np.unique(rooms.read("scene_index", slice(None)))[::2]}
+        for row, room in enumerate(rooms):
+            depth = room.depth + noise.normal(0, 0.05, room.depth.shape)
+            if room.scene.index in empty:
+                depth, _ = empty_room(room.world_from_camera, room.fov_y_degrees, *depth.shape)
+            out.add(row, depth=np.nan_to_num(depth, nan=1.0))
+    lists = examples_of(score([path], truths.rooms), truths.rooms, path)
+    by_place = {title.split()[0]: examples for title, examples in lists}
+    assert all("Relief correlation" in title for title, _ in lists)
+    shown = {int(example.name.split()[1].strip(",")) for example in by_place["Best"]}
+    assert not shown & empty
+    worst = {int(example.name.split()[1].strip(",")) for example in by_place["Worst"]}
+    assert worst <= empty

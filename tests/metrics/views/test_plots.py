@@ -1,6 +1,9 @@
 """Charts: whole SVG of any number, the same bytes each time, with a table of the same numbers."""
 
 import base64
+import os
+import subprocess
+import sys
 from xml.etree import ElementTree
 
 import numpy as np
@@ -52,6 +55,16 @@ def test_the_same_numbers_give_the_same_bytes(monkeypatch):
         __import__("matplotlib").rcParams, "axes.linewidth", 9
     )  # as a user may have
     assert curves([MINE, FLOOR], "t", "u") == first
+
+
+@pytest.mark.parametrize("backend", ["Qt4Agg", "module://matplotlib_inline.backend_inline", "no"])
+def test_a_backend_that_an_ide_left_behind_does_not_count(backend):
+    code = "from metrics.views import plots; print(plots.bars([1, 2], 't', 'u', 'c').picture[:9])"
+    result = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "MPLBACKEND": backend}, text=True,
+        capture_output=True, check=False,
+    )  # fmt: skip
+    assert (result.returncode, result.stdout.strip()) == (0, "data:imag"), result.stderr
 
 
 @pytest.mark.parametrize(

@@ -72,7 +72,7 @@ def test_markdown_rows_have_all_their_cells_and_no_markup_of_others(hostile):
     assert {len(re.findall(r"(?<!\\)(?:\\\\)*\|", row)) for row in rows} == {4}
     assert r"\[link\](javascript:alert(1)) !\[x\]" in text
     assert r"\*\*bold\*\* \`code\`" in text
-    assert text.count("\n- ") == 2 * len(HOSTILE)
+    assert text.count("\n- ") == len(HOSTILE), "each note once"
 
 
 def test_latex_has_balanced_braces_and_all_its_cells(hostile):
@@ -106,7 +106,7 @@ def test_latex_compiles(hostile, tmp_path):
 def test_text_stays_within_its_lines(hostile):
     lines = to_text(HOSTILE[4], [hostile], HOSTILE).splitlines()
     assert all(line.isprintable() for line in lines)
-    assert len(lines) == 1 + 2 + 1 + len(hostile.rows) + len(HOSTILE) + 1 + len(HOSTILE)
+    assert len(lines) == 1 + 2 + 1 + len(hostile.rows) + len(HOSTILE), "each note once"
 
 
 def test_each_format_marks_the_best_and_rows_of_other_kinds():
@@ -165,3 +165,28 @@ def test_latex_is_read_back_by_its_own_rules(text):
                 characters, rest = characters + rest[0], rest[1:]
     assert characters == text
     assert "--" not in latex(text)
+
+
+LONG = "A sentence of many words, " * 9 + "such as - this 1. one."
+
+
+def test_notes_are_wrapped_to_the_width_and_told_once():
+    some = replace(make_table("t", ("a",), [["1"]]), notes=(LONG, "short"))
+    for write in (to_text, to_markdown):
+        lines = write("title", [some, some], [LONG, "last"], 60).splitlines()
+        assert max(map(len, lines)) <= 60 + 9, "but for what Markdown would take for a list"
+        assert sum(line.lstrip("- ").startswith("A sentence of many") for line in lines) == 1
+        assert sum("short" in line for line in lines) == 1
+        assert not any(line.strip().startswith(("1.", "- this")) for line in lines)
+        assert len(write("title", [some], [], None).splitlines()[-2].lstrip("- ")) == len(LONG)
+
+
+def test_heads_of_wide_tables_are_as_narrow_as_their_columns():
+    table = make_table(
+        "", ("method", "a very long head: skill", "b"), [["mine", "0.1 [0, 1]", "2"]]
+    )
+    lines = to_text("", [table], width=30).splitlines()
+    assert [line.split() for line in lines] == [
+        ["a", "very"], ["long", "head:"], ["method", "skill", "b"], ["mine", "0.1", "[0,", "1]", "2"]
+    ]  # fmt: skip
+    assert len(to_text("", [table], width=60).splitlines()) == 2

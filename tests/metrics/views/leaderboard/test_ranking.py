@@ -12,7 +12,7 @@ from iqtt.floors import Floor
 from metrics.score_file import Skill
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
-from metrics.views.leaderboard.cards import HEAD, read_cards
+from metrics.views.leaderboard.cards import HEAD, read_cards, unmatched
 from metrics.views.leaderboard.floors import FloorError
 from metrics.views.leaderboard.ranking import LeaderboardError, leaderboard, rankings
 from metrics.views.leaderboard.site import lead_of
@@ -55,7 +55,7 @@ def test_ranks_and_best_cells():
     files = [rooms("b", 0.3, 0.01), rooms("a", 0.1, 0.02), rooms("c", 0.3, 0.04)]
     (table,) = leaderboard(files, paper="none")
     assert ranks(table) == [("1", "a"), ("2", "b"), ("2", "c")]
-    assert best(table) == [[True, True, False], [False, True, True], [False, True, False]]
+    assert best(table) == [[True, False, False], [False, False, True], [False, False, False]]
     assert table.head[2] == "Chamfer ↓ (scene unit)"
     assert rests(table)["a"][0] == "[0.1000, 0.1000]"
     assert table.title == "Rooms: 2 scenes in 2 views, rooms.h5"
@@ -78,7 +78,7 @@ def test_what_is_not_comparable_is_never_ranked_nor_best():
         (table,) = leaderboard(files, paper="none")
         assert ranks(table) == [("1", "a"), ("", "part ‡")]
         assert table.rows[1].kind == "incomparable"
-        assert best(table) == [[True] * 3, [False] * 3]
+        assert best(table) == [[False] * 3] * 2, "a method alone is better than none"
         assert any(note.startswith("‡ not comparable") for note in table.notes)
     assert best(leaderboard([part], paper="none")[0]) == [[False] * 3]
 
@@ -123,7 +123,7 @@ def test_scores_that_are_missing_leave_a_hole():
     table = leaderboard([less, a], paper="none")[0]
     assert ranks(table) == [("1", "a"), ("", "b")]
     assert values(table)["b"][0] == "-"
-    assert best(table)[1] == [False, True, True]
+    assert best(table) == [[False] * 3] * 2
     table = leaderboard([less, a], ["mse_depth", "normal_mean_degrees"], paper="none")[0]
     assert values(table)["b"] == ["0.02000", "-"]
     with pytest.raises(UnknownMetricError):
@@ -149,11 +149,28 @@ def test_cards_stand_beside_the_scores(tmp_path):
     ]
     assert [cell.link for cell in table.rows[0].cells[-3:]] == ["", "https://a.b", ""]
     assert values(table)["b"][-6:] == ["-", "-", "the scored one", "-", "-", "-"]
-    for text in ("a: {shoes: 3}", "a: [", "[1]", "a: &x {}\nb: *x", "[" * 5000):
+    twice = ("a: {}\na: {}", "a: {paper: P, paper: Q}")
+    for text in ("a: {shoes: 3}", "a: [", "[1]", "a: &x {}\nb: *x", "[" * 5000, *twice,
+                 "a: {supervised: perhaps}", "? [a]\n: {}"):  # fmt: skip
         path.write_text(text)
         with pytest.raises(SpecError) as refusal:
             read_cards(path)
         assert refusal.value.where.startswith(str(path))
+
+
+def test_names_of_cards_are_taken_as_written_and_the_others_told(tmp_path):
+    names = ["42", "False", "1e3", "007", "2026-01-02", "null", "0x1F", "NO", "~", "1_000", "12:30"]
+    path = tmp_path / "cards.yaml"
+    path.write_text("".join(f"{name}: {{told: 1.0, supervised: yes}}\n" for name in names))
+    cards = read_cards(path)
+    assert list(cards) == names
+    assert {(card.told, card.supervised) for card in cards.values()} == {("1.0", True)}
+    assert unmatched(cards, [rooms(name) for name in names]) == []
+    path.write_text("my-metod: {}\nother: {}\nmine: {}\n")
+    told = unmatched(read_cards(path), [rooms("my-method"), rooms("mine")])
+    assert ["my-metod" in told[0], "my-method?" in told[0], "other" in told[1]] == [True] * 3
+    path.write_text("# none yet\n")
+    assert read_cards(path) == {}
 
 
 def skilled(name, chamfer=0.2, **other):
@@ -299,8 +316,46 @@ def test_scores_by_view_angle_keep_the_order_of_the_ranking():
     _, table = leaderboard(files, paper="none")
     assert table.head[2:] == ("0°", "5°", "35°")
     assert ranks(table) == [("", "a"), ("", "b")]
-    assert best(table) == [[False] * 3, [True] * 3]
+    assert best(table) == [[False] * 3] * 2, "without intervals nothing is told apart"
     assert values(table)["b"][0] == "0"
+
+
+def varied(name, off, seed):
+    """40 scenes of Chamfer distances about 0.2, with noise of their own."""
+    noise = np.random.default_rng(seed).normal(0, 0.02, 40)
+    return rooms_scores(name, {"chamfer": 0.2 + off + noise}, range(40), path=Path(f"{name}.json"))
+
+
+def test_bold_needs_a_difference_that_its_interval_does_not_cross():
+    files = [varied("a", 0.0, 1), varied("b", 0.004, 2), varied("c", 0.08, 3)]
+    (table,) = leaderboard(files, paper="none")
+    assert [row.cells[0].value for row in table.rows] == ["1", "1", "3"]
+    assert best(table) == [[False]] * 3
+    (table,) = leaderboard(files[::2], paper="none")
+    assert best(table) == [[True], [False]]
+
+
+def test_a_set_that_cannot_tell_methods_apart_says_so():
+    nan = float("nan")
+    one = [{"chamfer": [0.1 * k, *[nan] * 3], "hausdorff": [0.1] * 4} for k in (1, 2)]
+    none = [{"chamfer": [0.1 * k] * 4, "object_depth_error": [nan] * 4} for k in (1, 2)]
+    for columns in (one, none):
+        files = [rooms_scores(n, c, range(4)) for n, c in zip("ab", columns, strict=True)]
+        ((ranking,), _) = rankings(files, ["chamfer"], paper="none")
+        assert ranking.mute
+        assert [entry.rank for entry in ranking.entries] == ["", ""]
+        assert best(ranking.tables[0]) == [[False]] * 2
+        assert lead_of(ranking).strong == "No method"
+    assert not rankings([rooms("a"), rooms("b")], paper="none")[0][0].mute
+
+
+def test_a_method_that_is_the_floor_says_so():
+    floor = Skill(0.0, 0.0, 0.0, 0.4, "empty_room_chamfer")
+    files = [skilled("room", 0.4, skills={"chamfer": floor}), skilled("better")]
+    table = leaderboard(files, ["chamfer"], paper="none")[0]
+    ((cell, *_),) = [row.cells[3:] for row in table.rows if row.cells[1].value == "room"]
+    assert (cell.value, cell.rest, cell.best) == ("0", "is the floor", False)
+    assert sum(note.startswith("room: ") for note in table.notes) == 1
 
 
 def shown_figures(tables):
