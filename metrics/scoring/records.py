@@ -177,10 +177,10 @@ class ScoreFile:
         method: its name; any text.
         alignment: what the method says it cannot know; "none" for questions.
         columns: an entry for each of N images or questions: the integers of `ID_COLUMNS`, (N,), of
-            which the first ascend, maybe those of `OPTIONAL_COLUMNS` (-1 where not known; `shape`
-            numbers the shapes of references, by which intervals are clustered), and float64 by name
-            of the metric, (R, N) for R runs, (N,) for scores of OF_TRUTH; NaN where a row has
-            no such score.
+            which the first ascend, maybe those of `OPTIONAL_COLUMNS` (`view_angle_degrees`, float,
+            as `rooms.view_angles` returns it; `shape` numbers the shapes of references, by which
+            intervals are clustered), and float64 by name of the metric, (R, N) for R runs, (N,) for
+            scores of OF_TRUTH; NaN where a row has no such score.
         object_columns: rooms only: an entry for each of L objects that are scored by themselves:
             the integers of `OBJECT_COLUMNS`, (L,) (row of the truth, id in the image, pixels that
             show it), the texts of `SHAPE_COLUMN`, (L,), and float64 by name of the metric, (R, L).
@@ -279,13 +279,17 @@ class ScoreFile:
 
     @cached_property
     def by_view_angle(self) -> Groups:
-        """Scores by whole degrees between a view and its scene's first one, such as "35"."""
+        """Scores by whole degrees between a view and its scene's first one, such as "35".
+
+        Views that are turned by as much to the left and to the right are in one group.
+        """
         angle = self.columns.get("view_angle_degrees")
         if angle is None or len(np.unique(self.columns["view_index"])) < 2:
             return {}
-        here = angle >= 0
+        here = np.isfinite(angle)
+        size = np.abs(angle[here]).astype(np.int64)
         scores = {name: runs[:, here] for name, runs in self._runs_of_scores.items()}
-        return grouped_estimates(scores, angle[here], self.clusters[here], self._bootstrap)
+        return grouped_estimates(scores, size, self.clusters[here], self._bootstrap)
 
     @cached_property
     def by_object_shape(self) -> Groups:
@@ -337,10 +341,11 @@ class ScoreFile:
     @property
     def _runs_of_scores(self) -> dict[str, Array]:
         """The scores of the method, (R, N) each."""
+        others = (*ID_COLUMNS[self.task], *OPTIONAL_COLUMNS[self.task])
         return {
             name: np.atleast_2d(column)
             for name, column in self.columns.items()
-            if column.dtype == np.float64 and not name.startswith(OF_TRUTH)
+            if name not in others and not name.startswith(OF_TRUTH)
         }
 
     def _groups_of_objects(self, labels: Array | None) -> Groups:
