@@ -154,6 +154,50 @@ def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
     return 0 if found.passed else 1
 
 
+@click.command(epilog=f"{EXAMPLE}iqtt floors iqtt-split/iqtt-test.h5 --out floors.json")
+@click.argument("split", type=QUESTIONS)
+@option("--out", type=OutputPath(), default="floors.json", help="File of floors to write.")
+@option(
+    "--questions",
+    type=click.IntRange(200, 1_000_000),
+    default=6_000,
+    help="Questions of each kind to measure on.",
+)
+@options.WORKERS
+@options.DEVICE
+@options.OVERWRITE
+def floors(
+    split: str, out: str, questions: int, workers: int, device: str, overwrite: bool
+) -> None:
+    """Measure what methods without 3D reach on questions with the settings of SPLIT.
+
+    New questions about shapes of the training split are made, which takes minutes, and answered by
+    all probes of `iqtt audit` that see pictures alone. The best is the floor of skill, for `bench
+    score --floors`. The floors of the presets come with the package.
+    """
+    from iqtt.files.reader import open_tables
+    from iqtt.floor_probes import measure_floors
+    from iqtt.floors import to_json
+    from scenegen.common.errors import SpecError
+    from scenegen.files.new_file import check_writable, write_text
+
+    check_writable(Path(out), overwrite)
+    with open_tables(split)[0] as table:
+        spec = table.spec
+    if spec is None:
+        raise SpecError(split, "a released file, without settings", "one that make-split wrote")
+    count = 2 * questions * len(spec.kinds)
+    with progress_bar(count, "question") as bar:
+        measured, probes = measure_floors(
+            spec, questions, workers=workers, device=device, progress=bar.update
+        )
+    write_text(out, to_json([measured]), overwrite)
+    for floor in measured.floors:
+        best = sorted(probes[floor.kind], key=lambda probe: -probe.accuracy)[:3]
+        shown = "; ".join(f"{p.statistic}, {p.rule} {p.accuracy:.3f}" for p in best)
+        print_line(f"{floor.kind}: {floor.accuracy:.3f}, {floor.probe} (best probes: {shown})")
+
+
 @click.command(epilog=f"{EXAMPLE}iqtt verify iqtt-split --items 20")
 @click.argument("folder", type=InputPath(within=(".h5",)))
 @option(
@@ -187,4 +231,4 @@ def verify(
     ctx.exit(print_checks(folder, checks))
 
 
-COMMANDS = (show, info, verify, audit)
+COMMANDS = (show, info, verify, audit, floors)

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, FailFast, Field
 
+from iqtt.floors import Floor
 from metrics.measures.alignment import Alignment
 from metrics.scoring.estimates import (
     ACCURACY,
@@ -142,6 +143,7 @@ class Meta:
             abstentions of all runs.
         noise_floors: by name of the score, what two samples of the true surface score against each
             other at this resolution; none for scores whose floor is 0, and for questions.
+        question_floors: of the kinds of questions, where they are known.
     """
 
     __pydantic_config__ = _STRICT
@@ -157,6 +159,7 @@ class Meta:
     resamples: Whole
     counts: ByKey[Whole]
     noise_floors: ByKey[NotNegative] = field(default_factory=dict)
+    question_floors: TupleOf[Floor] = ()
 
     @property
     def truth_source(self) -> TruthSource:
@@ -273,9 +276,13 @@ class ScoreFile:
         kinds = {
             kind: group.n for kind, group in self.answer_groups.get("by_distractor", {}).items()
         }
-        return {
-            ACCURACY: question_skill(self.metrics[ACCURACY], kinds, self.meta.counts["answers"])
-        }
+        skill = question_skill(self.metrics[ACCURACY], kinds, self.question_floors)
+        return {} if skill is None else {ACCURACY: skill}
+
+    @cached_property
+    def question_floors(self) -> Mapping[str, Floor]:
+        """The floors of the kinds of questions that have one, by kind."""
+        return {floor.kind: floor for floor in self.meta.question_floors}
 
     @cached_property
     def by_view_angle(self) -> Groups:

@@ -28,6 +28,10 @@ from scenegen.common.text_table import by_number, distinct, number, plain, with_
 from scenegen.files.new_file import written_beside
 
 INTERVAL = f"{CONFIDENCE:.0%} interval"
+NO_FLOOR = (
+    "no skill: no floor is known of questions with these settings. `iqtt floors {} --out"
+    " floors.json` measures it, and `bench score --floors floors.json` uses it"
+)
 SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
 FLOORS_OF_ROOMS = {
     EMPTY_ROOM: "empty room",
@@ -194,13 +198,14 @@ def _group_cell(score: Score | None) -> Cell:
 def _kind_cells(scores: ScoreFile, kind: str) -> tuple[Cell, str]:
     """Return the skill in a kind of questions, and its floor."""
     skill = kind_skill(scores, kind)
-    return score_cell(skill), f"{number(skill.floor)}: {skill.floor_name}"
+    floor = "-" if skill is None else f"{number(skill.floor)}: {skill.floor_name}"
+    return score_cell(skill), floor
 
 
-def kind_skill(scores: ScoreFile, kind: str) -> Skill:
-    """Return the skill in a kind of questions over the floor of that kind."""
+def kind_skill(scores: ScoreFile, kind: str) -> Skill | None:
+    """Return the skill in a kind of questions over the floor of that kind, if it is known."""
     accuracy = scores.by_distractor[kind]["iqtt_accuracy"]
-    return question_skill(accuracy, {kind: accuracy.n}, scores.meta.counts["answers"])
+    return question_skill(accuracy, {kind: accuracy.n}, scores.question_floors)
 
 
 def interval_cells(score: Score | Skill) -> tuple[str, str]:
@@ -270,6 +275,8 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
             over = f"the shapes of references, {len(np.unique(scores.items['shape']))} in all"
         yield f"intervals: {how}, over {over}"
         yield "abstentions and ties count as wrong"
+        if not scores.skills:
+            yield NO_FLOOR.format(plain(meta.truth_path))
     yield (
         f"truth: {plain(meta.truth_path)}, digest {meta.truth_digest[:12]}, {source_text(meta)};"
         f" fingerprint {meta.truth_fingerprint[:12]}"
@@ -303,7 +310,10 @@ def what_the_floor_is(scores: ScoreFile) -> str:
             " is the same prediction, held against the relief of another scene. Else it is the"
             " empty room: walls and floor from the true camera, no objects."
         )
-    return "The floor is the best method without 3D, by kind of question: docs/results.md."
+    return (
+        "The floor is the best method without 3D on questions of the same settings, by kind of"
+        " question: docs/results.md."
+    )
 
 
 def source_text(meta: Meta) -> str:

@@ -151,7 +151,7 @@ DAMAGES: list[tuple[str, Edit, str]] = [
     (TRAIN, unlabeled_second_right_answer, "one right answer, ..."),
     (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one right answer, ..."),
     (VAL, distractors_alike, "answers differ, ..."),
-    (VAL, changed("truth/distractor_kind", ALL, other_labels), "labels"),
+    (VAL, changed("truth/distractor_kind", ALL, other_labels), "labels, ..."),
     (VAL, changed("truth/cubes", 3, in_pieces), "shapes, ..."),
     (VAL, changed("truth/shape_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
     (VAL, changed("truth/class_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),

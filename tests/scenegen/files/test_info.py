@@ -50,7 +50,7 @@ def test_facts_and_settings_are_those_of_the_file(file):
         root = dict(raw.attrs)
     releases = [root[f"{name}_version"] for name in ("mitsuba", "drjit", "llvm")]
     for name, expected in {
-        "format": f"{root['format']} 1.0",
+        "format": f"{root['format']} {root['format_version']}",
         "written by": f"{root['writer']}, {root['variant']}",
         "rendered by": "Mitsuba {}, Dr.Jit {}, LLVM {}".format(*releases),
         "command": root.get("creation_command", "-"),
