@@ -7,7 +7,7 @@ Holm's correction included; else it is chance. So the luckiest of many that only
 """
 
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -27,14 +27,14 @@ SEED = int.from_bytes(b"floors")
 
 
 def measure_floors(
-    spec: SplitSpec,
+    specs: Sequence[SplitSpec],
     count: int = QUESTIONS,
     *,
     workers: int = 1,
     device: str = "auto",
     progress: Callable[[int], Any] = lambda done: None,
-) -> tuple[Measured, dict[str, tuple[Probe, ...]]]:
-    """Return the floor of each kind of question that a file with these settings asks.
+) -> list[tuple[Measured, list[tuple[Probe, ...]]]]:
+    """Return the floor of each kind of question that files with these settings ask.
 
     Args:
         count: questions of each kind.
@@ -42,28 +42,36 @@ def measure_floors(
         progress: is called with the number of questions done since the last call; each is made,
             and then read.
 
-    Also returns all probes of each kind. Raises as `make_split`.
+    Also returns, for each floor, all probes. Raises as `make_split`.
     """
-    floors, probes = [], {}
-    for kind, of_kind in specs_of_kinds(spec, count):
+    floors: dict[SplitSpec, list[Floor]] = {}
+    probes: dict[SplitSpec, list[tuple[Probe, ...]]] = {}
+    for (settings, kind), spec in floor_specs(specs, count).items():
         with tempfile.TemporaryDirectory(prefix="iqtt-floors-") as folder:
             try:
-                make_split(folder, of_kind, workers=workers, device=device, progress=progress)
+                make_split(folder, spec, workers=workers, device=device, progress=progress)
             except TooFewShapesError:
-                if len(spec.kinds) > 1:  # a mixed file has no questions of this kind
-                    continue
-                raise
-            probes[kind] = probe_file(Path(folder) / FILES["train"][0], progress)
-        floors.append(floor_of(kind, spec.answers, probes[kind]))
-    return Measured(settings_of(spec), tuple(floors)), probes
+                if any(asked.distractors == kind for asked in specs):
+                    raise
+                continue  # a mixed file then has no questions of this kind
+            found = probe_file(Path(folder) / FILES["train"][0], progress)
+        floors.setdefault(settings, []).append(floor_of(kind, spec.answers, found))
+        probes.setdefault(settings, []).append(found)
+    return [(Measured(s, tuple(floors[s])), probes[s]) for s in floors]
 
 
-def specs_of_kinds(spec: SplitSpec, count: int) -> Iterator[tuple[str, SplitSpec]]:
-    """Yield each kind of question that a spec asks for, and what its floor is measured on."""
-    drawn = replace(settings_of(spec), seed=SEED, train=count, labeled=count, val=0, test=0)
-    for kind in spec.kinds:
-        name = kind if spec.answers == 3 else f"{kind}-{spec.answers}"
-        yield name, replace(drawn, distractors=kind, answers=spec.answers)
+def floor_specs(specs: Iterable[SplitSpec], count: int) -> dict[tuple[SplitSpec, str], SplitSpec]:
+    """Return what each floor is measured on, by `settings_of` and the kind of question."""
+    drawn = {}
+    for spec in specs:
+        settings = settings_of(spec)
+        for kind in spec.kinds:
+            name = kind if spec.answers == 3 else f"{kind}-{spec.answers}"
+            drawn[settings, name] = replace(
+                settings, seed=SEED, train=count, labeled=count, distractors=kind,
+                answers=spec.answers,
+            )  # fmt: skip
+    return drawn
 
 
 def probe_file(path: Path, progress: Callable[[int], Any] = lambda done: None) -> tuple[Probe, ...]:

@@ -155,7 +155,7 @@ def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt floors iqtt-split/iqtt-test.h5 --out floors.json")
-@click.argument("split", type=QUESTIONS)
+@click.argument("splits", nargs=-1, required=True, metavar="SPLIT.h5...", type=QUESTIONS)
 @option("--out", type=OutputPath(), default="floors.json", help="File of floors to write.")
 @option(
     "--questions",
@@ -167,35 +167,37 @@ def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
 @options.DEVICE
 @options.OVERWRITE
 def floors(
-    split: str, out: str, questions: int, workers: int, device: str, overwrite: bool
+    splits: tuple[str, ...], out: str, questions: int, workers: int, device: str, overwrite: bool
 ) -> None:
-    """Measure what methods without 3D reach on questions with the settings of SPLIT.
+    """Measure what methods without 3D reach on questions with the settings of SPLIT.h5.
 
     New questions about shapes of the training split are made, which takes minutes, and answered by
     all probes of `iqtt audit` that see pictures alone. The best is the floor of skill, for `bench
     score --floors`. The floors of the presets come with the package.
     """
     from iqtt.files.reader import open_tables
-    from iqtt.floor_probes import measure_floors
+    from iqtt.floor_probes import floor_specs, measure_floors
     from iqtt.floors import to_json
     from scenegen.common.errors import SpecError
     from scenegen.files.new_file import check_writable, write_text
 
     check_writable(Path(out), overwrite)
-    with open_tables(split)[0] as table:
-        spec = table.spec
-    if spec is None:
-        raise SpecError(split, "a released file, without settings", "one that make-split wrote")
-    count = 2 * questions * len(spec.kinds)
-    with progress_bar(count, "question") as bar:
-        measured, probes = measure_floors(
-            spec, questions, workers=workers, device=device, progress=bar.update
+    specs = []
+    for path in splits:
+        with open_tables(path)[0] as table:
+            if table.spec is None:
+                raise SpecError(path, "a file without settings", "one that iqtt make-split wrote")
+            specs.append(table.spec)
+    with progress_bar(2 * questions * len(floor_specs(specs, questions)), "question") as bar:
+        found = measure_floors(
+            specs, questions, workers=workers, device=device, progress=bar.update
         )
-    write_text(out, to_json([measured]), overwrite)
-    for floor in measured.floors:
-        best = sorted(probes[floor.kind], key=lambda probe: -probe.accuracy)[:3]
-        shown = "; ".join(f"{p.statistic}, {p.rule} {p.accuracy:.3f}" for p in best)
-        print_line(f"{floor.kind}: {floor.accuracy:.3f}, {floor.probe} (best probes: {shown})")
+    write_text(out, to_json([measured for measured, _ in found]), overwrite)
+    for measured, probes in found:
+        for floor, tried in zip(measured.floors, probes, strict=True):
+            best = sorted(tried, key=lambda probe: -probe.accuracy)[:3]
+            shown = "; ".join(f"{p.statistic}, {p.rule} {p.accuracy:.3f}" for p in best)
+            print_line(f"{floor.kind}: {floor.accuracy:.3f}, {floor.probe} (best: {shown})")
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt verify iqtt-split --items 20")

@@ -275,8 +275,10 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
             over = f"the shapes of references, {len(np.unique(scores.items['shape']))} in all"
         yield f"intervals: {how}, over {over}"
         yield "abstentions and ties count as wrong"
-        if not scores.skills:
+        if not scores.skills and scores.by_distractor:
             yield NO_FLOOR.format(plain(meta.truth_path))
+        elif not scores.skills:
+            yield "no skill: the truth does not tell its settings, so no floor is known"
     yield (
         f"truth: {plain(meta.truth_path)}, digest {meta.truth_digest[:12]}, {source_text(meta)};"
         f" fingerprint {meta.truth_fingerprint[:12]}"
