@@ -1,7 +1,7 @@
 """Answers by outlines: the nearest one, without any label, or what trees learn from labels.
 
 Both see the silhouettes of `iqtt.audit.features.outlines` and nothing else, so they know neither
-cubes nor rotations. What they reach on a kind of questions is its floor.
+cubes nor rotations. The audit's probes see the same; `iqtt floors` measures what they reach.
 """
 
 from collections.abc import Callable

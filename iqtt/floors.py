@@ -1,102 +1,137 @@
-"""Floors of questions: how many a method without any idea of 3D answers rightly, by their kind.
+"""Floors of questions: how many a method without any idea of 3D answers rightly.
 
-The methods are probes that look at outlines (`bench baseline outline`, which learns nothing, and
-`bench baseline outline-trees --labels N`), and chance. docs/results.md has the commands that
-measured them. Skill says how much of the way from the floor to perfect a method has gone.
+A floor belongs to the settings of a file of questions and to a kind of question. It is the best of
+the audit's probes that see pictures alone (`floor_probes` measures it). Skill says how much of the
+way from the floor to perfect a method has gone. The package holds the floors of its presets.
 """
 
+import json
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any, Literal
+
+from iqtt.questions.specs import SplitSpec
+from scenegen.common.records import check, from_json
+
+SHIPPED = "floors.json"
+CHANCE = "chance, which no probe beats"
 
 
 @dataclass(frozen=True)
 class Floor:
-    """What one probe reached on one kind of questions.
+    """What the best probe reached on one kind of questions.
 
     Attributes:
-        kind: as `iqtt.questions.specs.question_kind` names it, such as "mirror" or "near-2".
-        probe: name of the baseline.
-        labels: how many labelled questions it learned from; 0 for a probe that does not learn.
+        kind: as `specs.question_kind` names it, such as "mirror" or "near-2".
+        probe: what it looked at and how it chose, or CHANCE.
         accuracy: fraction of right answers.
-        low, high: ends of its 95% interval.
+        questions: how many questions it was measured on.
     """
 
     kind: str
     probe: str
-    labels: int
     accuracy: float
-    low: float
-    high: float
+    questions: int
+
+    def __post_init__(self) -> None:
+        check(0 < self.accuracy < 1, f"accuracy of {self.kind!r}", self.accuracy, "between 0 and 1")
 
     @property
-    def name(self) -> str:
-        """The probe and what it learned from, such as "outline-trees, 1,000 labels"."""
-        return f"{self.probe}, {self.labels:,} labels" if self.labels else self.probe
+    def error(self) -> float:
+        """Standard error of the accuracy."""
+        return math.sqrt(self.accuracy * (1 - self.accuracy) / max(self.questions, 1))
 
 
-# Each measured on 2,000 questions of the preset `suite`, trees trained on others of the kind.
-FLOORS = (
-    Floor("matched", "outline", 0, 0.3240, 0.3038, 0.3448),
-    Floor("matched", "outline-trees", 200, 0.3465, 0.3260, 0.3676),
-    Floor("matched", "outline-trees", 1_000, 0.3515, 0.3309, 0.3727),
-    Floor("matched", "outline-trees", 5_000, 0.3630, 0.3422, 0.3843),
-    Floor("mirror-pair", "outline", 0, 0.3345, 0.3142, 0.3555),
-    Floor("mirror-pair", "outline-trees", 200, 0.3335, 0.3132, 0.3545),
-    Floor("mirror-pair", "outline-trees", 1_000, 0.3225, 0.3024, 0.3433),
-    Floor("mirror-pair", "outline-trees", 5_000, 0.3175, 0.2975, 0.3382),
-    Floor("mirror-pair-2", "outline", 0, 0.4955, 0.4736, 0.5174),
-    Floor("mirror-pair-2", "outline-trees", 200, 0.4930, 0.4711, 0.5149),
-    Floor("mirror-pair-2", "outline-trees", 1_000, 0.4865, 0.4646, 0.5084),
-    Floor("mirror-pair-2", "outline-trees", 5_000, 0.4920, 0.4701, 0.5139),
-    Floor("other", "outline", 0, 0.5565, 0.5346, 0.5781),
-    Floor("other", "outline-trees", 200, 0.5720, 0.5502, 0.5935),
-    Floor("other", "outline-trees", 1_000, 0.5835, 0.5618, 0.6049),
-    Floor("other", "outline-trees", 5_000, 0.5910, 0.5693, 0.6124),
-    Floor("near", "outline", 0, 0.4315, 0.4099, 0.4533),
-    Floor("near", "outline-trees", 200, 0.4135, 0.3921, 0.4352),
-    Floor("near", "outline-trees", 1_000, 0.4290, 0.4075, 0.4508),
-    Floor("near", "outline-trees", 5_000, 0.4525, 0.4308, 0.4744),
-    Floor("mirror", "outline", 0, 0.3610, 0.3402, 0.3823),
-    Floor("mirror", "outline-trees", 200, 0.3410, 0.3205, 0.3621),
-    Floor("mirror", "outline-trees", 1_000, 0.3565, 0.3358, 0.3777),
-    Floor("mirror", "outline-trees", 5_000, 0.3860, 0.3649, 0.4075),
-)
-CHANCE_BEST = "chance, which no probe beats"
-CHANCE_ONLY = "chance, as no probe was measured"
+@dataclass(frozen=True)
+class Measured:
+    """The floors of questions with these settings (`settings_of`), one for each kind."""
+
+    settings: SplitSpec
+    floors: tuple[Floor, ...]
 
 
-def floor_of_kind(kind: str, answers: int) -> tuple[float, str]:
-    """Return the floor of a kind of questions with so many answers, and its name.
+@dataclass(frozen=True)
+class FloorFile:
+    """What a file of floors holds."""
 
-    That is the best of the probes whose interval lies above chance, whatever it learned from; else
-    chance, 1 / answers.
+    format: Literal["pix2shape-bench/floors"]
+    format_version: Literal["1.0"]
+    measured: tuple[Measured, ...]
+
+
+def settings_of(spec: SplitSpec) -> SplitSpec:
+    """Return the settings that floors depend on: the others are the same for all.
+
+    Left out are the seed, the numbers of questions, how pictures are stored, and the kind and the
+    number of answers, which the kind of a floor tells.
     """
-    chance = 1.0 / answers
-    measured = [floor for floor in FLOORS if floor.kind == kind]
-    best = max((f for f in measured if f.low > chance), key=lambda f: f.accuracy, default=None)
-    if best is not None:
-        return best.accuracy, best.name
-    return chance, CHANCE_BEST if measured else CHANCE_ONLY
+    return replace(
+        spec, seed=None, train=1, labeled=0, val=0, test=0, distractors="mixed", answers=3,
+        image_dtype="uint8", with_depth=False,
+    )  # fmt: skip
 
 
-def floor_of_questions(counts: Mapping[str, int], answers: int) -> tuple[float, str]:
+def read_floors(text: str | bytes) -> tuple[Measured, ...]:
+    """Return what a file of floors holds. Raises SpecError where it is none."""
+    return from_json(FloorFile, text, "floors").measured
+
+
+@cache
+def shipped_floors() -> tuple[Measured, ...]:
+    """Return the floors that the package holds."""
+    return read_floors(files("iqtt").joinpath(SHIPPED).read_bytes())
+
+
+def to_json(measured: Sequence[Measured]) -> str:
+    """Return the text of a file of floors: a line for the settings, and one for each floor."""
+    record: dict[str, Any] = {"format": "pix2shape-bench/floors", "format_version": "1.0"}
+    lines = []
+    for group in measured:
+        floors = ",\n".join(f"      {json.dumps(asdict(floor))}" for floor in group.floors)
+        settings = group.settings.to_json()
+        lines.append(f'    {{"settings": {settings},\n     "floors": [\n{floors}]}}')
+    return json.dumps(record)[:-1] + ',\n  "measured": [\n' + ",\n".join(lines) + "]}\n"
+
+
+def floors_of(spec: SplitSpec | None, path: str | Path | None = None) -> dict[str, Floor]:
+    """Return the floors of questions of these settings by kind; none where they are not known.
+
+    Args:
+        spec: None for files that do not tell their settings, as the released ones.
+        path: a file of floors that goes before those of the package.
+
+    Raises OSError, and SpecError where the file is none of floors.
+    """
+    ours = () if path is None else read_floors(Path(path).read_bytes())
+    if spec is None:
+        return {}
+    groups = [group for group in (*shipped_floors(), *ours) if group.settings == settings_of(spec)]
+    return {floor.kind: floor for group in groups for floor in group.floors}
+
+
+def floor_of_questions(
+    counts: Mapping[str, int], floors: Mapping[str, Floor]
+) -> tuple[float, str] | None:
     """Return the floor of a set of questions, and its name: the mean over its questions.
 
     Args:
-        counts: how many questions there are of each kind; empty where the kinds are not known, as
-            in the released files.
-        answers: how many answers each question offers.
+        counts: how many questions there are of each kind; empty where the kinds are not known.
+        floors: as `floors_of` returns them.
+
+    Returns None where the floor of some kind is not known.
     """
-    if not counts:
-        return 1.0 / answers, CHANCE_ONLY
-    floor_of = {kind: floor_of_kind(kind, answers) for kind in sorted(counts)}
+    if not counts or not counts.keys() <= floors.keys():
+        return None
     kinds_of: dict[str, list[str]] = {}
-    for kind, (_, name) in floor_of.items():
-        kinds_of.setdefault(name, []).append(kind)
+    for kind in sorted(counts):
+        kinds_of.setdefault(floors[kind].probe, []).append(kind)
     names = [f"{name} ({', '.join(kinds)})" for name, kinds in kinds_of.items()]
     # Exact where all floors are the same, so that chance has a skill of 0.
-    floors = {floor for floor, _ in floor_of.values()}
-    mean = math.fsum(counts[kind] * floor for kind, (floor, _) in floor_of.items())
-    floor = floors.pop() if len(floors) == 1 else mean / sum(counts.values())
+    values = {floors[kind].accuracy for kind in counts}
+    mean = math.fsum(counts[kind] * floors[kind].accuracy for kind in counts)
+    floor = values.pop() if len(values) == 1 else mean / sum(counts.values())
     return floor, "; ".join(names) if len(names) > 1 else next(iter(kinds_of))

@@ -63,7 +63,7 @@ from scenegen.common.text_table import by_number
 from scenegen.files.new_file import written_beside
 
 FORMAT_NAME = "pix2shape-bench/scores"
-FORMAT_VERSION = "1.0"
+FORMAT_VERSION = "1.1"
 MOST_BYTES = 256 * 2**20  # more images than may be parsed, see `strict_json.MOST_MEMORY`
 MOST_KEYS = 10_000  # of one object
 ROUNDING = 1e-9  # by which an accuracy may lie outside of its interval
@@ -80,7 +80,7 @@ _LABELS = TypeAdapter(Annotated[list[Label], FailFast()])
 _LIMITS = {
     "object": (1, 127),
     "pixels": (LEAST_PIXELS, LARGEST_WHOLE),
-    "view_angle_degrees": (-1, 180),
+    "view_angle_degrees": (-179, 180),
 }
 
 __all__ = [
@@ -104,7 +104,7 @@ class _Stored:
 
     __pydantic_config__ = ConfigDict(extra="forbid")
     format: Literal["pix2shape-bench/scores"]
-    format_version: Literal["1.0"]
+    format_version: Literal["1.0", "1.1"]
     task: Task
     method: Name
     alignment: Alignment
@@ -213,6 +213,8 @@ def _parsed(data: bytes) -> ScoreFile:
         for name, empty in (("objects", {}), ("alignment", "none"), ("shown", "scored_view")):
             if getattr(stored, name) != empty:
                 raise refusal(name, shown(getattr(stored, name)), f"{empty!r} for questions")
+    if stored.format_version == "1.0":
+        _mend_angles(stored.items)
     columns = _item_columns(stored.items, task, runs)
     objects = _object_columns(stored.objects, columns[ID_COLUMNS[task][0]], runs)
     scores = ScoreFile(
@@ -228,6 +230,13 @@ def _parsed(data: bytes) -> ScoreFile:
     _check_meta(scores)
     _check_groups(scores)
     return scores
+
+
+def _mend_angles(items: dict[str, Any]) -> None:
+    """Put null where format 1.0 has -1: an angle that is not known. Its angles have no sign."""
+    angles = items.get("view_angle_degrees")
+    if isinstance(angles, list):
+        items["view_angle_degrees"] = [None if angle == -1 else angle for angle in angles]
 
 
 def _item_columns(stored: Mapping[str, Any], task: str, runs: int) -> dict[str, Array]:
@@ -292,7 +301,8 @@ def _columns(
         where = f"{place}.{name:.60}"
         if name in whole:
             limits = _LIMITS.get(name, (0, LARGEST_WHOLE))
-            columns[name] = _numbers(where, values, *limits, whole=True)
+            # An angle may be unknown, null.
+            columns[name] = _numbers(where, values, *limits, whole=name != "view_angle_degrees")
         elif name == SHAPE_COLUMN and place == "objects":
             with _naming(where):
                 columns[name] = np.array(validated(_LABELS, values), object)

@@ -31,8 +31,8 @@ PROBED = 20_000  # questions that probes look at, by default
 CAST = 48  # questions whose images are ray-cast again
 EXPLAINED = 2_000  # questions whose wrong answers are laid on the reference
 _BY_CUBES = (
-    *("shapes", "one right answer", "answers differ", "mirror images", "matched", "stored ids"),
-    *("splits apart", "splits for ever", "rotations", "angles", "lines of sight"),
+    *("shapes", "one right answer", "answers differ", "labels", "mirror images", "matched"),
+    *("stored ids", "splits apart", "splits for ever", "rotations", "angles", "lines of sight"),
     *("visibility", "cast again", "one explanation"),
 )
 
@@ -187,6 +187,7 @@ def _prove(
         shape_proofs.whole_shapes(with_cubes, shapes),
         shape_proofs.one_right_answer(with_cubes, shapes),
         kinds.answers_differ(with_cubes, shapes),
+        kinds.labels(with_cubes, shapes),
         kinds.mirror_images(with_cubes, shapes),
         kinds.matched(with_cubes, shapes),
         shape_proofs.stored_ids(with_cubes, shapes),

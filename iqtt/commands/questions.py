@@ -154,6 +154,52 @@ def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
     return 0 if found.passed else 1
 
 
+@click.command(epilog=f"{EXAMPLE}iqtt floors iqtt-split/iqtt-test.h5 --out floors.json")
+@click.argument("splits", nargs=-1, required=True, metavar="SPLIT.h5...", type=QUESTIONS)
+@option("--out", type=OutputPath(), default="floors.json", help="File of floors to write.")
+@option(
+    "--questions",
+    type=click.IntRange(200, 1_000_000),
+    default=6_000,
+    help="Questions of each kind to measure on.",
+)
+@options.WORKERS
+@options.DEVICE
+@options.OVERWRITE
+def floors(
+    splits: tuple[str, ...], out: str, questions: int, workers: int, device: str, overwrite: bool
+) -> None:
+    """Measure what methods without 3D reach on questions with the settings of SPLIT.h5.
+
+    New questions about shapes of the training split are made, which takes minutes, and answered by
+    all probes of `iqtt audit` that see pictures alone. The best is the floor of skill, for `bench
+    score --floors`. The floors of the presets come with the package.
+    """
+    from iqtt.files.reader import open_tables
+    from iqtt.floor_probes import floor_specs, measure_floors
+    from iqtt.floors import to_json
+    from scenegen.common.errors import SpecError
+    from scenegen.files.new_file import check_writable, write_text
+
+    check_writable(Path(out), overwrite)
+    specs = []
+    for path in splits:
+        with open_tables(path)[0] as table:
+            if table.spec is None:
+                raise SpecError(path, "a file without settings", "one that iqtt make-split wrote")
+            specs.append(table.spec)
+    with progress_bar(2 * questions * len(floor_specs(specs, questions)), "question") as bar:
+        found = measure_floors(
+            specs, questions, workers=workers, device=device, progress=bar.update
+        )
+    write_text(out, to_json([measured for measured, _ in found]), overwrite)
+    for measured, probes in found:
+        for floor, tried in zip(measured.floors, probes, strict=True):
+            best = sorted(tried, key=lambda probe: -probe.accuracy)[:3]
+            shown = "; ".join(f"{p.statistic}, {p.rule} {p.accuracy:.3f}" for p in best)
+            print_line(f"{floor.kind}: {floor.accuracy:.3f}, {floor.probe} (best: {shown})")
+
+
 @click.command(epilog=f"{EXAMPLE}iqtt verify iqtt-split --items 20")
 @click.argument("folder", type=InputPath(within=(".h5",)))
 @option(
@@ -187,4 +233,4 @@ def verify(
     ctx.exit(print_checks(folder, checks))
 
 
-COMMANDS = (show, info, verify, audit)
+COMMANDS = (show, info, verify, audit, floors)

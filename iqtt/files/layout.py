@@ -21,7 +21,7 @@ from scenegen.rendering.backend import VERSION_ATTRIBUTES
 
 Array = NDArray[Any]
 FORMAT_NAME = "pix2shape-bench/iqtt"
-FORMAT_VERSION = "1.0"
+FORMAT_VERSION = "1.1"
 # The datasets that scores depend on; `truth_digest` is the joint digest of those there.
 SCORED = ("answers", "distractor_kind", "angle_degrees")
 NO_CUBE = -128
@@ -81,12 +81,16 @@ def named(attribute: str, part: str) -> str:
     return f"{attribute}_{part}".rstrip("_")
 
 
-def truth_columns(spec: SplitSpec) -> list[Column]:
-    """Return the columns of `truth`: shapes, views, lights and difficulty of each question."""
+def truth_columns(spec: SplitSpec, version: str = FORMAT_VERSION) -> list[Column]:
+    """Return the columns of `truth`: shapes, views, lights and difficulty of each question.
+
+    `version` is that of the format; 1.0 did not name `near-mirror`, and called it `mirror`.
+    """
+    kinds = DISTRACTOR_KINDS[: 4 if version == "1.0" else None]
     most, lights, images = spec.cubes[1], spec.lights[1], 1 + spec.answers
     coordinates = f"integer coordinates of the cubes of each shape; {NO_CUBE} in unused rows"
     shape_id = "canonical shape under the 24 rotations: its sorted cubes, two bytes each"
-    kind = "of each answer: -1 the right one, else an index into `names`"
+    kind = "of each answer, seen from the reference: -1 the right one, else an index into `names`"
     angle = "difficulty: smallest rotation from the reference's view to the right answer's"
     distance = "from the camera of all images to the world's origin; it lies on +z"
     # fmt: off
@@ -106,7 +110,7 @@ def truth_columns(spec: SplitSpec) -> list[Column]:
         Column("light_color", (images, lights, 3), "float64", "radiance", "RGB",
                "L_j; zero where unused"),
         Column("distractor_kind", (spec.answers,), "int8", "1", "-", kind,
-               within=(-1, len(DISTRACTOR_KINDS) - 1), more={"names": list(DISTRACTOR_KINDS)}),
+               within=(-1, len(kinds) - 1), more={"names": list(kinds)}),
         Column("angle_degrees", (), "float64", "degree", "-", angle, within=(0, 180)),
         Column("visible_pixels", (images, most), "int32", "pixel", "-",
                "pixels that show each cube"),

@@ -192,7 +192,7 @@ class QuestionsFile(RowFile):
         if self.spec is not None:
             home = f"truth/{self.part}".rstrip("/")
             if home in file:
-                self._take(home, truth_columns(self.spec))
+                self._take(home, truth_columns(self.spec, self.attributes["format_version"]))
             mark, digest = (named(name, self.part) for name in ("fingerprint", TRUTH_DIGEST))
             self.fingerprint = read_text(file, mark, self.path, needed=True)
             self.stored_truth_digest = read_digest(file, digest, self.path, self.has_answers)

@@ -296,8 +296,8 @@ def arrange(drawn: Drawn, answer: int, rng: np.random.Generator) -> Shapes:
 
 
 # Which of (shape, its mirror image, near shape) are the right answer and the two distractors, and
-# of what kinds these are. Where the near shape is right, the shape is near to it, and the mirror
-# image counts as `mirror` because it mirrors a shape that is near.
+# of what kinds these are. Where the near shape is right, the shape is near to it, and its mirror
+# image is `near-mirror`.
 _MIRROR_ROLES = np.array(
-    [[[0, 1, 2], [-1, 2, 1]], [[1, 0, 2], [-1, 2, 1]], [[2, 0, 1], [-1, 1, 2]]]
+    [[[0, 1, 2], [-1, 2, 1]], [[1, 0, 2], [-1, 2, 1]], [[2, 0, 1], [-1, 1, 4]]]
 )

@@ -15,8 +15,9 @@ from scenegen.common.records import check, check_range, from_json, normalise, to
 from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 
 SPLITS = ("train", "val", "test")
-DISTRACTOR_KINDS = ("other", "near", "mirror", "matched")  # of wrong answers; append only
-QUESTION_KINDS = (*DISTRACTOR_KINDS, "mirror-pair")
+# Of wrong answers, seen from the reference; append only. "near-mirror" mirrors a "near" answer.
+DISTRACTOR_KINDS = ("other", "near", "mirror", "matched", "near-mirror")
+QUESTION_KINDS = ("other", "near", "mirror", "matched", "mirror-pair")
 LETTERS = "ABC"  # of answers, wherever people look; files count them from 0
 DISTRACTORS = (*QUESTION_KINDS, "mixed")
 SMALLEST_SECRET, LARGEST_SECRET = 16, 1_000_000  # bytes of a file whose content is a seed
@@ -244,7 +245,7 @@ def question_kind(kinds: Sequence[int]) -> str:
     wrong = sorted({DISTRACTOR_KINDS[kind] for kind in kinds if kind >= 0})
     if not wrong:
         raise ValueError("a question has a wrong answer")
-    kind = "mirror" if "mirror" in wrong else wrong[0]
+    kind = "mirror" if {"mirror", "near-mirror"} & set(wrong) else wrong[0]
     if wrong == ["mirror"]:
         kind = "mirror-pair"
     return kind if len(kinds) == 3 else f"{kind}-{len(kinds)}"

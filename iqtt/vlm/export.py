@@ -31,7 +31,7 @@ COLUMNS = {
     "angle": "smallest rotation from the reference's view to the right answer's, degrees",
     "cubes": "number of cubes of each shape",
     "shape": "cluster for intervals: questions about one shape, or its mirror image, share it",
-    "floor": "accuracy that is reached on this kind without any idea of 3D",
+    "floor": "accuracy that is reached on this kind without any idea of 3D; null if not known",
     "canary": "mark of test data; do not train on text or pictures that carry it",
     "digest": "fingerprint of the table of questions; answers are only taken for the same one",
 }

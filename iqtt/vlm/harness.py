@@ -3,6 +3,7 @@
 A row is a dict with `question_index`, `rotation`, `shape`, `floor`, `score` (0 or 1) and `outcome`.
 """
 
+import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -45,8 +46,12 @@ def circular_accuracy(rows: Sequence[Answered]) -> float:
 
 
 def skill(rows: Sequence[Answered]) -> float:
-    """Return how much of the way from the floor to perfect the accuracy has gone."""
-    floor = sum(row["floor"] for row in rows) / len(rows)
+    """Return how much of the way from the floor to perfect the accuracy has gone.
+
+    NaN where the floor of some kind of question is not known.
+    """
+    floors = [math.nan if row["floor"] is None else row["floor"] for row in rows]
+    floor = sum(floors) / len(rows)
     return float((accuracy(rows) - floor) / (1 - floor))
 
 

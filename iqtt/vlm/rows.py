@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from iqtt.files.reader import QuestionsFile, answers_beside
 from iqtt.files.truth import QuestionTruth
-from iqtt.floors import floor_of_kind
-from iqtt.questions.specs import DISTRACTOR_KINDS, question_kind
+from iqtt.floors import floors_of
+from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec, question_kind
 from iqtt.vlm.pictures import composed, draw_pictures, png, stored_question
 from iqtt.vlm.prompt import SIZE, question_text
 from iqtt.vlm.reading import LETTERS
@@ -173,15 +173,16 @@ def _rotations(asked: Asked, questions: QuestionsFile) -> int:
     return asked.rotations
 
 
-def _facts(truth: QuestionTruth, answers: int) -> dict[str, Any]:
+def _facts(truth: QuestionTruth, spec: SplitSpec) -> dict[str, Any]:
     codes = [-1 if k is None else DISTRACTOR_KINDS.index(k) for k in truth.distractor_kind]
     kind = question_kind(codes)
+    floor = floors_of(spec).get(kind)
     return {
         "kind": kind,
         "angle": round(truth.angle_degrees, 3),
         "cubes": int(truth.cubes.shape[1]),
         "shape": hashlib.sha256(truth.class_id[0]).hexdigest()[:16],
-        "floor": floor_of_kind(kind, answers)[0],
+        "floor": None if floor is None else floor.accuracy,
     }
 
 
@@ -195,7 +196,8 @@ def _row(
     answer: int | None,
 ) -> Row:
     count = questions.answers
-    facts = _facts(truth, count)
+    assert questions.spec is not None  # `_opened` refuses released files
+    facts = _facts(truth, questions.spec)
     order = [0, *(1 + (k + rotation) % count for k in range(count))]
     return Row(
         id=f"{index}-{rotation}",

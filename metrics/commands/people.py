@@ -69,6 +69,7 @@ def _serve(
     contact: str, **_: Any,
 ) -> None:
     needs("iqtt quiz", ("itsdangerous", "starlette", "uvicorn"), "quiz")
+    from iqtt.floors import floors_of
     from iqtt.quiz.app import Quiz, make_app
     from iqtt.quiz.commits import Commits
     from iqtt.quiz.schema import open_answers, secret_of
@@ -85,7 +86,8 @@ def _serve(
         connection = open_answers(db, study.settings)
         key = secret_of(connection)
         with Commits(connection) as commits:
-            shown = partial(compare, study.settings.answers)
+            floors = floors_of(study.pool.file.spec)
+            shown = partial(compare, study.settings.answers, floors)
             tell = partial(print_line, err=True)
             made = Quiz(study, commits, key, shown, tell, contact, participants)
             address = address_of(hosts, listening.getsockname()[1])
@@ -145,11 +147,18 @@ def _require_split(stored: Any, file: str) -> int:
 @click.argument("answers", type=InputPath(), metavar="ANSWERS.db")
 @click.option("--model", type=InputPath(), metavar="PREDICTIONS",
               help="A submission of a model to the same split, to be compared with people.")
+@click.option("--questions", type=InputPath(), metavar="SPLIT.h5",
+              help="The questions that were asked: their floors are shown.")
 @click.option("--json", "json_path", type=OutputPath(), help="Write all figures here.")
 @click.option("--html", "html_path", type=OutputPath(), help="Write a page with charts.")
 @OVERWRITE
 def quiz_report(
-    answers: str, model: str | None, json_path: str | None, html_path: str | None, overwrite: bool
+    answers: str,
+    model: str | None,
+    questions: str | None,
+    json_path: str | None,
+    html_path: str | None,
+    overwrite: bool,
 ) -> None:
     """Print what people answered in `iqtt quiz`: accuracy, times, tests as in the paper.
 
@@ -162,7 +171,15 @@ def quiz_report(
 
     for path in filter(None, (json_path, html_path)):
         check_writable(Path(path), overwrite)
-    figures = compute(read_answers(answers), model)
+    stored, floors = read_answers(answers), {}
+    if questions is not None:
+        from iqtt.files.reader import open_tables
+        from iqtt.floors import floors_of
+
+        _require_split(stored, questions)
+        with open_tables(questions)[0] as table:
+            floors = floors_of(table.spec)
+    figures = compute(stored, model, floors)
     if json_path:
         write_text(json_path, to_json(figures), overwrite)
     if html_path:

@@ -54,6 +54,12 @@ TRUTH = click.option(
     help="How many resamples the bootstrap draws.",
 )  # fmt: skip
 @click.option(
+    "--floors",
+    type=InputPath(),
+    metavar="FLOORS.json",
+    help="Floors of questions, from `iqtt floors` [default: those of the package].",
+)
+@click.option(
     "--allow-partial",
     is_flag=True,
     help="Score only the rows that are predicted; the scores are then not comparable.",

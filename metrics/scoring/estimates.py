@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.floors import floor_of_questions
+from iqtt.floors import Floor, floor_of_questions
 from metrics.measures.objects import size_range
 from metrics.measures.skill import skill, skill_intervals
 from metrics.measures.statistics import (
@@ -230,12 +230,18 @@ def accuracy(right: Array, shapes: Array, bootstrap: Bootstrap) -> Score:
     return Score(float(each.mean()), finite(low[0]), finite(high[0]), unit, questions, std)
 
 
-def question_skill(score: Score, counts: Mapping[str, int], answers: int) -> Skill:
+def question_skill(
+    score: Score, counts: Mapping[str, int], floors: Mapping[str, Floor]
+) -> Skill | None:
     """Return (accuracy - floor) / (1 - floor), and its interval by the same line.
 
-    The arguments `counts` and `answers` are those of `floors.floor_of_questions`.
+    The arguments `counts` and `floors` are those of `floors.floor_of_questions`; None where it
+    knows no floor.
     """
-    floor, name = floor_of_questions(counts, answers)
+    found = floor_of_questions(counts, floors)
+    if found is None:
+        return None
+    floor, name = found
     value = skill(score.value, floor, higher_is_better=True)
     assert value is not None, "no floor is perfect"
     low, high = (

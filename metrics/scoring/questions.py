@@ -39,6 +39,7 @@ def score_questions(
     progress: Progress,
 ) -> ScoreFile:
     """Score runs of one method on an open file of answers; raises as `evaluate.score`."""
+    from iqtt.floors import floors_of
     from iqtt.questions.specs import question_kind
 
     names = ("answers", *(LABELS if truth.has_truth else ()))
@@ -62,7 +63,14 @@ def score_questions(
         "answers": truth.answers,
         "abstained": int(np.count_nonzero(answers[:, rows] == ABSTAINED)),
     }
-    meta = meta_of(files, truth, truth_given, fingerprint, digest, settings, counts)
+    kinds: list[str] = []
+    if truth.has_truth:
+        kinds = [question_kind(row) for row in columns["distractor_kind"][rows].tolist()]
+    known = floors_of(truth.spec, settings.floors)
+    floors = [known[kind] for kind in sorted(set(kinds)) if kind in known]
+    meta = meta_of(
+        files, truth, truth_given, fingerprint, digest, settings, counts, question_floors=floors
+    )
     of_reference = _shapes(truth)
     shapes = rows if of_reference is None else of_reference[rows]
 
@@ -72,11 +80,12 @@ def score_questions(
     groups = {"by_position": grouped(true[rows])}
     if len(files) == 1:  # runs may differ in these
         groups |= _groups_of_texts(files[0], answers[0, rows], true, rows, shapes, meta)
-    if len(columns) > 1:
-        kinds, angles = (columns[name][rows] for name in LABELS)
-        bins = np.clip(np.digitize(angles, ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2)
+    if kinds:
+        bins = np.clip(
+            np.digitize(columns["angle_degrees"][rows], ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2
+        )
         spans = np.array([f"{a}-{b}" for a, b in itertools.pairwise(ANGLE_BINS)])
-        groups["by_distractor"] = grouped(np.array([question_kind(row) for row in kinds.tolist()]))
+        groups["by_distractor"] = grouped(np.array(kinds))
         groups["by_rotation_angle"] = grouped(spans[bins])
     items = {"question": rows, ACCURACY: right}
     if of_reference is not None:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, FailFast, Field
 
+from iqtt.floors import Floor
 from metrics.measures.alignment import Alignment
 from metrics.scoring.estimates import (
     ACCURACY,
@@ -143,6 +144,7 @@ class Meta:
             abstentions of all runs.
         noise_floors: by name of the score, what two samples of the true surface score against each
             other at this resolution; none for scores whose floor is 0, and for questions.
+        question_floors: of the kinds of questions, where they are known.
     """
 
     __pydantic_config__ = _STRICT
@@ -158,6 +160,7 @@ class Meta:
     resamples: Whole
     counts: ByKey[Whole]
     noise_floors: ByKey[NotNegative] = field(default_factory=dict)
+    question_floors: TupleOf[Floor] = ()
 
     @property
     def truth_source(self) -> TruthSource:
@@ -178,10 +181,10 @@ class ScoreFile:
         method: its name; any text.
         alignment: what the method says it cannot know; "none" for questions.
         columns: an entry for each of N images or questions: the integers of `ID_COLUMNS`, (N,), of
-            which the first ascend, maybe those of `OPTIONAL_COLUMNS` (-1 where not known; `shape`
-            numbers the shapes of references, by which intervals are clustered), and float64 by name
-            of the metric, (R, N) for R runs, (N,) for scores of OF_TRUTH; NaN where a row has
-            no such score.
+            which the first ascend, maybe those of `OPTIONAL_COLUMNS` (`view_angle_degrees`, float,
+            as `rooms.view_angles` returns it; `shape` numbers the shapes of references, by which
+            intervals are clustered), and float64 by name of the metric, (R, N) for R runs, (N,) for
+            scores of OF_TRUTH; NaN where a row has no such score.
         object_columns: rooms only: an entry for each of L objects that are scored by themselves:
             the integers of `OBJECT_COLUMNS`, (L,) (row of the truth, id in the image, pixels that
             show it), the texts of `SHAPE_COLUMN`, (L,), and float64 by name of the metric, (R, L).
@@ -285,19 +288,27 @@ class ScoreFile:
         kinds = {
             kind: group.n for kind, group in self.answer_groups.get("by_distractor", {}).items()
         }
-        return {
-            ACCURACY: question_skill(self.metrics[ACCURACY], kinds, self.meta.counts["answers"])
-        }
+        skill = question_skill(self.metrics[ACCURACY], kinds, self.question_floors)
+        return {} if skill is None else {ACCURACY: skill}
+
+    @cached_property
+    def question_floors(self) -> Mapping[str, Floor]:
+        """The floors of the kinds of questions that have one, by kind."""
+        return {floor.kind: floor for floor in self.meta.question_floors}
 
     @cached_property
     def by_view_angle(self) -> Groups:
-        """Scores by whole degrees between a view and its scene's first one, such as "35"."""
+        """Scores by whole degrees between a view and its scene's first one, such as "35".
+
+        Views that are turned by as much to the left and to the right are in one group.
+        """
         angle = self.columns.get("view_angle_degrees")
         if angle is None or len(np.unique(self.columns["view_index"])) < 2:
             return {}
-        here = angle >= 0
+        here = np.isfinite(angle)
+        size = np.abs(angle[here]).astype(np.int64)
         scores = {name: runs[:, here] for name, runs in self._runs_of_scores.items()}
-        return grouped_estimates(scores, angle[here], self.clusters[here], self._bootstrap)
+        return grouped_estimates(scores, size, self.clusters[here], self._bootstrap)
 
     @cached_property
     def by_object_shape(self) -> Groups:
@@ -357,10 +368,11 @@ class ScoreFile:
     @property
     def _runs_of_scores(self) -> dict[str, Array]:
         """The scores of the method, (R, N) each."""
+        others = (*ID_COLUMNS[self.task], *OPTIONAL_COLUMNS[self.task])
         return {
             name: np.atleast_2d(column)
             for name, column in self.columns.items()
-            if column.dtype == np.float64 and not name.startswith(OF_TRUTH)
+            if name not in others and not name.startswith(OF_TRUTH)
         }
 
     def _groups_of_objects(self, labels: Array | None) -> Groups:

@@ -85,15 +85,15 @@ def score_rooms(
 def view_angles(scene_index: Array, view_index: Array, world_from_camera: Array) -> Array:
     """Return by how much each view is turned from its scene's first one, (N,) whole degrees.
 
-    About the vertical axis, from 0 to 180; -1 where the scene's first view is not in the file.
-    `scene_index` and `view_index` are (N,), `world_from_camera` is (N, 4, 4).
+    The camera turns about the world's +y, counter-clockwise as seen from above: from -179 to 180.
+    NaN where the scene's first view is not in the file. `scene_index` and `view_index` are (N,),
+    `world_from_camera` is (N, 4, 4).
     """
     back = world_from_camera[:, :3, 2]
     azimuth = np.degrees(np.arctan2(back[:, 0], back[:, 2]))
     first = {int(scene_index[i]): azimuth[i] for i in np.flatnonzero(view_index == 0)}
     from_first = np.array([first.get(int(scene), np.nan) for scene in scene_index])
-    turned = np.abs((azimuth - from_first + 180.0) % 360.0 - 180.0)
-    return np.where(np.isfinite(turned), np.rint(turned), -1).astype(np.int64)
+    return np.asarray(180.0 - (180.0 - np.rint(azimuth - from_first)) % 360.0)
 
 
 def object_shapes(truth: RoomsFile, row: Array, object_id: Array) -> Array:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from iqtt.floors import Floor
 from metrics.measures.statistics import RESAMPLES
 from metrics.scoring.image_scores import NonFinite
 from metrics.scoring.records import Meta, Submission
@@ -44,6 +45,8 @@ class Settings:
             penalised, the result is not comparable.
         processes: how many processes score rooms; None for one a core. Changes no number.
         cluster: whose workers score rooms instead; they must see the files. Changes no number.
+        floors: a file of floors of questions, as `iqtt floors` writes it; None for those of the
+            package.
     """
 
     seed: int = 0
@@ -52,6 +55,7 @@ class Settings:
     non_finite: NonFinite = "error"
     processes: int | None = None
     cluster: Cluster | None = None
+    floors: str | Path | None = None
 
 
 def scorer_versions() -> dict[str, str]:
@@ -106,6 +110,7 @@ def meta_of(
     digest: str,
     settings: Settings,
     counts: Mapping[str, int],
+    question_floors: Sequence[Floor] = (),
 ) -> Meta:
     """Return what a score file records beside its items."""
     resampled = files[0].task == "rooms" or len(files) > 1
@@ -120,4 +125,5 @@ def meta_of(
         seed=settings.seed,
         resamples=settings.resamples if resampled else 0,
         counts=counts,
+        question_floors=tuple(question_floors),
     )

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from metrics.score_file import read_scores
 from metrics.scoring.metric_names import OF_TRUTH, OTHER_SCENE, in_order, metric
+from metrics.scoring.records import ID_COLUMNS, OPTIONAL_COLUMNS
 from metrics.scoring.rows import score_rows
 from metrics.scoring.runs import Progress, ScoringError, Settings, matched_rows
 from metrics.submissions.reader import Predictions, RoomPredictions
@@ -100,7 +101,8 @@ def _stored_scores(path: str | Path, predictions: RoomPredictions, truth: RoomsF
         found = f"scores of {', '.join(run.path for run in scores.meta.submissions)}"
         expected = f"those of {predictions.path} as it is now"
         raise ScoringError(path, found, expected, "score it again, or leave out --scores")
-    columns = {name: column for name, column in scores.items.items() if column.dtype == np.float64}
+    others = (*ID_COLUMNS["rooms"], *OPTIONAL_COLUMNS["rooms"])
+    columns = {name: column for name, column in scores.items.items() if name not in others}
     return RowScores(scores.ids, columns)
 
 

@@ -23,7 +23,7 @@ def angle_floors(file: ScoreFile, name: str) -> dict[str, float]:
         return {}
     floors = {}
     for degrees in file.by_view_angle:
-        chosen = (angles == int(degrees)) & np.isfinite(column)
+        chosen = (np.abs(angles) == int(degrees)) & np.isfinite(column)
         if chosen.any():
             floors[degrees] = float(cluster_means(column[chosen], file.clusters[chosen]).mean())
     return floors

@@ -152,7 +152,8 @@ def entry_name(scores: ScoreFile, entry: int) -> str:
     """Return scene, view and row of an entry, in words."""
     row, scene, view = (int(scores.items[n][entry]) for n in ("row", "scene_index", "view_index"))
     angles = scores.items.get("view_angle_degrees")
-    angle = f" ({int(angles[entry])}°)" if angles is not None and angles[entry] >= 0 else ""
+    known = angles is not None and np.isfinite(angles[entry])
+    angle = f" ({int(angles[entry])}°)" if angles is not None and known else ""
     return f"scene {scene}, view {view}{angle}, row {row}"
 
 

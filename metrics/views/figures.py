@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.floors import floor_of_kind
 from metrics.scoring.geometry import depth_as_scored
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import Score, ScoreFile
@@ -242,7 +241,8 @@ def _floor(file: ScoreFile, name: str) -> float | None:
 
 def _group_floor(file: ScoreFile, by: str, key: str, name: str) -> float | None:
     if file.task == "iqtt":
-        return floor_of_kind(key, file.meta.counts["answers"])[0] if by == "kind" else None
+        floor = file.question_floors.get(key) if by == "kind" else None
+        return None if floor is None else floor.accuracy
     return angle_floors(file, name).get(key) if by == "angle" else None
 
 

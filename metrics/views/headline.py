@@ -171,9 +171,9 @@ def _kinds_table(files: Sequence[ScoreFile], grouping: str) -> Table:
         marks, cells = [("chance", chance)], list[Cell]()
         if by_kind:
             skill = kind_skill(scores, key)
-            marks.append(("floor", skill.floor))
+            marks += [] if skill is None else [("floor", skill.floor)]
             reported = Cell(people.text, f"± {people.spread}") if key == PAPER_KIND else Cell()
-            floor = Cell(number(skill.floor), skill.floor_name)
+            floor = Cell() if skill is None else Cell(number(skill.floor), skill.floor_name)
             cells = [score_cell(skill), floor, reported]
         drawing = _strip_cell(score, others, marks, (0.0, 1.0), ends=(0.0, 1.0))
         beside_it = map(score_cell, others)

@@ -25,6 +25,10 @@ from scenegen.common.text_table import by_number, distinct, number, plain, with_
 from scenegen.files.new_file import written_beside
 
 INTERVAL = f"{CONFIDENCE:.0%} interval"
+NO_FLOOR = (
+    "no skill: no floor is known of questions with these settings. `iqtt floors {} --out"
+    " floors.json` measures it, and `bench score --floors floors.json` uses it"
+)
 SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
 UNREAD = "replies that name no letter; they count as wrong"
 BY_KIND = "by kind of question"
@@ -191,13 +195,14 @@ def _group_cell(score: Score | None) -> Cell:
 def _kind_cells(scores: ScoreFile, kind: str) -> tuple[Cell, str]:
     """Return the skill in a kind of questions, and its floor."""
     skill = kind_skill(scores, kind)
-    return score_cell(skill), f"{number(skill.floor)}: {skill.floor_name}"
+    floor = "-" if skill is None else f"{number(skill.floor)}: {skill.floor_name}"
+    return score_cell(skill), floor
 
 
-def kind_skill(scores: ScoreFile, kind: str) -> Skill:
-    """Return the skill in a kind of questions over the floor of that kind."""
+def kind_skill(scores: ScoreFile, kind: str) -> Skill | None:
+    """Return the skill in a kind of questions over the floor of that kind, if it is known."""
     accuracy = scores.by_distractor[kind]["iqtt_accuracy"]
-    return question_skill(accuracy, {kind: accuracy.n}, scores.meta.counts["answers"])
+    return question_skill(accuracy, {kind: accuracy.n}, scores.question_floors)
 
 
 def interval_cells(score: Score | Skill) -> tuple[str, str]:
@@ -258,6 +263,10 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
             over = f"the shapes of references, {len(np.unique(scores.items['shape']))} in all"
         yield f"intervals: {how}, over {over}"
         yield "abstentions and ties count as wrong"
+        if not scores.skills and scores.by_distractor:
+            yield NO_FLOOR.format(plain(meta.truth_path))
+        elif not scores.skills:
+            yield "no skill: the truth does not tell its settings, so no floor is known"
     yield (
         f"truth: {plain(meta.truth_path)}, digest {meta.truth_digest[:12]}, {source_text(meta)};"
         f" fingerprint {meta.truth_fingerprint[:12]}"
@@ -309,7 +318,10 @@ def what_the_floor_is(scores: ScoreFile) -> str:
             " it is the best guess that was shown as much. Else it is the empty room: walls and"
             " floor from the true camera, no objects."
         )
-    return "The floor is the best method without 3D, by kind of question: docs/results.md."
+    return (
+        "The floor is the best method without 3D on questions of the same settings, by kind of"
+        " question: docs/results.md."
+    )
 
 
 def source_text(meta: Meta) -> str:

@@ -50,6 +50,16 @@ def test_what_is_written_reads_back_to_the_same_bits(runs, tmp_path):
     assert to_json(other) == other.path.read_text()
 
 
+def test_format_1_0_has_angles_without_sign_and_a_number_for_the_unknown(tmp_path):
+    older = copy.deepcopy(ROOMS)
+    older["format_version"] = "1.0"
+    older["items"]["view_angle_degrees"] = [0, 35, -1, 35]
+    (tmp_path / "s.json").write_text(json.dumps(older))
+    angles = read_scores(tmp_path / "s.json").columns["view_angle_degrees"]
+    assert angles[[0, 1, 3]].tolist() == [0, 35, 35]
+    assert np.isnan(angles[2])
+
+
 @given(st.lists(st.floats(0.0, 1e300), min_size=1, max_size=6))
 def test_every_double_survives(values):
     scores = made_scores.rooms_scores("m", {"rmse": [0.5] * len(values)}, range(len(values)))
@@ -227,7 +237,7 @@ GROUP = {"n": 4, "right": [3], "low": None, "high": None}
 WRONG_ROOMS = [
     ("format", GONE, "", "to be there"),
     ("format", "pix2shape-bench/rooms", "", "'pix2shape-bench/scores'"),
-    ("format_version", "3.0", "", "'1.0'"),
+    ("format_version", "3.0", "", "'1.1'"),
     ("task", "room", "", "'rooms' or 'iqtt'"),
     ("method", 3, "", "text"),
     ("method", "m" * 201, "", "at most 200"),
@@ -248,7 +258,7 @@ WRONG_ROOMS = [
     ("items/row", [0, 1, 2, 3.0], "items.row[3]", ""),
     ("items/row", [0, 1, 2, None], "items.row[3]", ""),
     ("items/row", [0, 1, 2, 10**30], "items.row[3]", ""),
-    ("items/view_angle_degrees", [0, 35, -2, -1], "items.view_angle_degrees[2]", "-1 to 180"),
+    ("items/view_angle_degrees", [0, 35, -180, None], "items.view_angle_degrees[2]", "-179 to 180"),
     ("items/chamfer", [0.1, 0.2], "", "4, as in row"),
     ("items/chamfer", [0.1, 0.3, 0.2, "1"], "items.chamfer[3]", "number"),
     ("items/chamfer", [0.1, 0.3, 0.2, True], "items.chamfer[3]", "number"),

@@ -89,7 +89,7 @@ def served(study, path, most=100, public=False, names=()):
     told = []
     hosts = hosts_of(None, public, names)
     with listen(Hosts(), 0) as listening, Commits(db) as commits:
-        shown = partial(compare, study.settings.answers)
+        shown = partial(compare, study.settings.answers, {})
         quiz = Quiz(study, commits, secret_of(db), shown, told.append, "A <b>lab</b>", most)
         server = server_of(make_app(quiz, hosts))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})

@@ -135,10 +135,25 @@ _Guess: TypeAlias = tuple[str, str, str, Array]
 
 def run_probes(evidence: Evidence) -> tuple[Probe, ...]:
     """Run all probes that the evidence allows; none without questions."""
-    guesses = [*_by_rule(evidence), *_by_mirror(evidence), *_learned(evidence)]
-    guesses += _by_place(evidence.places, evidence.answers)
-    chance = 1 / evidence.answers
-    probes = [_probe(*guess, chance) for guess in guesses if len(guess[3])]
+    statistics, right = evidence.statistics, evidence.right
+    guesses = [*_by_picture(statistics, right), *_by_shape(evidence), *_by_mirror(evidence)]
+    if len(right) >= LEAST_QUESTIONS:
+        guesses += [*_learned(evidence), *_learned_outlines(statistics, right)]
+    return _probes(guesses + _by_place(evidence.places, evidence.answers), evidence.answers)
+
+
+def run_floor_probes(statistics: Array, right: Array) -> tuple[Probe, ...]:
+    """Run the probes that may beat chance: they hold pictures of answers against the reference.
+
+    The arguments are those of `Evidence`, of at least LEAST_QUESTIONS questions.
+    """
+    guesses = [guess for guess in _by_picture(statistics, right) if guess[2] == OUTLINE]
+    answers = statistics["area"].shape[1] - 1
+    return _probes([*guesses, *_learned_outlines(statistics, right)], answers)
+
+
+def _probes(guesses: Sequence[_Guess], answers: int) -> tuple[Probe, ...]:
+    probes = [_probe(*guess, 1 / answers) for guess in guesses if len(guess[3])]
     faults = [probe for probe in probes if probe.sees in FAULTS]
     others = [probe for probe in probes if probe.sees not in FAULTS]
     return (*_judged(faults), *_judged(others))
@@ -167,8 +182,7 @@ def _judged(probes: Sequence[Probe]) -> list[Probe]:
     return [replace(p, beats_chance=b) for p, b in zip(probes, beats.tolist(), strict=True)]
 
 
-def _by_rule(evidence: Evidence) -> Iterator[_Guess]:
-    statistics, right = evidence.statistics, evidence.right
+def _by_picture(statistics: Array, right: Array) -> Iterator[_Guess]:
     for name, title in {**_LIGHT, **_OUTLINE}.items():
         values, sees = statistics[name], LIGHT if name in _LIGHT else OUTLINE
         if values.ndim == 2:
@@ -177,6 +191,10 @@ def _by_rule(evidence: Evidence) -> Iterator[_Guess]:
     yield from _by_distance("pixel distance", OUTLINE, statistics["pixel_distance"], right)
     apart = nearest_outline(statistics["outline_distance"])
     yield from _by_distance("whole outline, turned or flipped", OUTLINE, apart, right)
+
+
+def _by_shape(evidence: Evidence) -> Iterator[_Guess]:
+    right = evidence.right
     for title, values in evidence.cubes.items():
         whole = np.isfinite(values).all(axis=1)
         yield from _by_cost(title, WITHOUT, _SIZE, -values[whole], right[whole])
@@ -219,8 +237,6 @@ def _by_mirror(evidence: Evidence) -> Iterator[_Guess]:
 
 def _learned(evidence: Evidence) -> Iterator[_Guess]:
     statistics, right = evidence.statistics, evidence.right
-    if len(right) < LEAST_QUESTIONS:
-        return
     alone = (len(right), evidence.answers, -1)
     outline, apart = statistics["outline"], statistics["outline_distance"]
     features = {
@@ -235,8 +251,6 @@ def _learned(evidence: Evidence) -> Iterator[_Guess]:
     for title, values in features.items():
         yield (title, "learned", WITHOUT, choose(among_others(values), right) == right)
     yield ("small patterns of pixels", "learned", WITHOUT, _by_patterns(statistics, right))
-    columns = next_to_reference(outline, apart[:, 0, 1:])
-    yield ("outlines, by trees", "learned", OUTLINE, choose(columns, right) == right)
     cubes = np.stack(list(evidence.cubes.values()), axis=2)
     for title, values, sees in (
         ("answers' cubes", cubes, WITHOUT),
@@ -246,6 +260,11 @@ def _learned(evidence: Evidence) -> Iterator[_Guess]:
         if np.count_nonzero(whole) >= LEAST_QUESTIONS:
             chosen = choose(among_others(values[whole]), right[whole])
             yield (title, "learned", sees, chosen == right[whole])
+
+
+def _learned_outlines(statistics: Array, right: Array) -> Iterator[_Guess]:
+    columns = next_to_reference(statistics["outline"], statistics["outline_distance"][:, 0, 1:])
+    yield ("outlines, by trees", "learned", OUTLINE, choose(columns, right) == right)
 
 
 def _by_patterns(statistics: Array, right: Array) -> Array:

@@ -18,9 +18,11 @@ from iqtt.audit.table import AuditTable
 from iqtt.questions.specs import DISTRACTOR_KINDS
 
 Array = NDArray[Any]
-# Largest distance of the principal radii of gyration of two answers, cube edges: twice that of two
-# matched shapes, as two answers may both be matched to a third.
-GYRATION = 0.12
+# Largest distance of the moments of two answers, cube edges: twice that of two matched shapes, as
+# two answers may both be matched to a third.
+MOMENTS = 0.1
+_CODE = np.array([1_000_000, 1_000, 1])  # makes one number of a difference of two cubes
+_CHUNK = 4096  # pairs of shapes at a time: bounds the memory
 
 
 def answers_differ(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
@@ -57,32 +59,83 @@ def _is_kind(table: AuditTable, kind: str) -> Array:
     return np.asarray(table.truth["distractor_kind"] == number)
 
 
-def mirror_images(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Prove that an answer told to be a mirror image is one, of an answer and of no turned copy.
+def labels(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
+    """Prove that each wrong answer is to the reference what its label says.
 
-    Where all wrong answers are mirror images, they must be the right one's, and two of
-    them must show it from two sides: rotations that the shape's own symmetry hides do not count.
+    A `mirror` is its mirror image. All others are neither it nor its mirror image: a `near` is it
+    with one cube moved, and a `near-mirror` is the mirror image of an answer labelled `near`.
     """
     wrong = []
     for table, its_shapes in zip(tables, shapes, strict=True):
-        is_mirror = _is_kind(table, "mirror")
         names, classes = its_shapes.shape_name, its_shapes.class_name
-        # (Q, answer, answer): of one class and not congruent.
+        mirror, near, near_mirror = (
+            _is_kind(table, kind) for kind in ("mirror", "near", "near-mirror")
+        )
+        of_reference = classes[:, 1:] == classes[:, :1]
+        bad = mirror & ~(of_reference & (names[:, 1:] != names[:, :1]))
+        known = np.isin(table.truth["distractor_kind"], range(len(DISTRACTOR_KINDS)))
+        bad |= known & ~mirror & of_reference
+        bad |= near & ~_one_cube_moved(table, its_shapes, near)
+        # (Q, answer, answer): a mirror image of a near answer.
         mirrors = classes[:, 1:, None] == classes[:, None, 1:]
-        mirrors &= names[:, 1:, None] != names[:, None, 1:]
-        bad = (is_mirror & ~mirrors.any(axis=2)).any(axis=1)
-        alone = is_mirror.sum(axis=1) == table.images - 2
-        of_right = (classes[:, 1:] == classes[:, :1]) & (names[:, 1:] != names[:, :1])
-        bad |= alone & (is_mirror & ~of_right).any(axis=1)
-        bad |= alone & (_angle_between(table, its_shapes, is_mirror) < _least_angle(table))
-        wrong.append(bad & its_shapes.whole)
+        mirrors &= (names[:, 1:, None] != names[:, None, 1:]) & near[:, None]
+        bad |= near_mirror & ~mirrors.any(axis=2)
+        wrong.append(bad.any(axis=1) & its_shapes.whole)
     return judge(
-        "mirror images",
-        "told mirror images are; where they are the only wrong answers, they are the right one's,"
-        " from sides as far apart as the answers'",
+        "labels",
+        "mirror: the reference's mirror image; near: the reference with one cube moved;"
+        " near-mirror: a near answer's mirror image; none but mirror is the reference's",
         tables,
         wrong,
         lambda t, row: f"kinds {tables[t].truth['distractor_kind'][row].tolist()} are not so",
+    )
+
+
+def _one_cube_moved(table: AuditTable, shapes: Shapes, chosen: Array) -> Array:
+    """Return which of the chosen answers are the reference with one cube moved, (Q, K) bool."""
+    result = np.zeros(chosen.shape, np.bool_)
+    chosen = chosen & shapes.whole[:, None]
+    for n in np.unique(shapes.count[chosen.any(axis=1)]).tolist():
+        rows, answers = np.nonzero(chosen & (shapes.count == n)[:, None])
+        for start in range(0, len(rows), _CHUNK):
+            row, answer = rows[start : start + _CHUNK], answers[start : start + _CHUNK]
+            reference, other = (
+                table.cubes[row, image, :n].astype(np.int64) for image in (0, 1 + answer)
+            )
+            result[row, answer] = _all_but_one_coincide(reference, other)
+    return result
+
+
+def _all_but_one_coincide(first: Array, second: Array) -> Array:
+    """Return whether all cubes but one can be laid on the other shape's, (S, n, 3) to (S,).
+
+    Under each turn, the shift that lays most cubes on others is the most frequent difference.
+    """
+    count, size = first.shape[:2]
+    fits = np.full(count, size == 1)
+    for turn in cube_rotations():
+        shifts = second[:, :, None] - (first @ turn.T)[:, None]
+        codes = np.sort((shifts @ _CODE).reshape(count, -1), axis=1)
+        run = max(size - 1, 1)  # of equal differences
+        fits |= (codes[:, run - 1 :] == codes[:, : codes.shape[1] - run + 1]).any(axis=1)
+    return fits
+
+
+def mirror_images(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
+    """Prove that two mirror images show one shape from two sides.
+
+    Rotations that the shape's own symmetry hides do not count.
+    """
+    wrong = [
+        _angle_between(table, its_shapes, _is_kind(table, "mirror")) < _least_angle(table)
+        for table, its_shapes in zip(tables, shapes, strict=True)
+    ]
+    return judge(
+        "mirror images",
+        "two mirror images of the right one, from sides as far apart as the answers'",
+        tables,
+        wrong,
+        lambda t, row: "they are seen from nearly one side",
     )
 
 
@@ -114,24 +167,24 @@ def _angle_between(table: AuditTable, shapes: Shapes, mirrors: Array) -> Array:
 
 
 def matched(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
-    """Prove that matched shapes are alike: boxes and contacts equal, radii of gyration close."""
+    """Prove that matched shapes are alike: boxes and contacts equal, moments close."""
     gaps = [_gaps(table, its_shapes) for table, its_shapes in zip(tables, shapes, strict=True)]
     return judge(
         "matched",
         "matched wrong answers have the right one's bounding box and number of touching faces, and"
-        f" its principal radii of gyration within {GYRATION:g} cube edges",
+        f" their seven moments are within {MOMENTS:g} cube edges of its",
         tables,
-        [~(gap <= GYRATION + 1e-6) for gap in gaps],
+        [~(gap <= MOMENTS + 1e-5) for gap in gaps],
         lambda t, row: (
             "another box or number of contacts"
             if np.isinf(gaps[t][row])
-            else f"radii that differ by {gaps[t][row]:.3f}"
+            else f"moments that differ by {gaps[t][row]:.3f}"
         ),
     )
 
 
 def _gaps(table: AuditTable, shapes: Shapes) -> Array:
-    """Return how far the radii of a question's matched answers are from the reference's, (Q,).
+    """Return how far the moments of a question's matched answers are from the reference's, (Q,).
 
     It is infinite where box or contacts differ, and 0 for questions without matched answers.
     """
@@ -140,24 +193,35 @@ def _gaps(table: AuditTable, shapes: Shapes) -> Array:
     result = np.zeros(len(table))
     for n in np.unique(shapes.count[rows]).tolist():
         here = rows[shapes.count[rows] == n]
-        cubes = table.cubes[here, :, :n].astype(np.float64)
+        cubes = table.cubes[here, :, :n].astype(np.int64)
         box = np.sort(np.ptp(cubes, axis=2), axis=2)
         apart = np.abs(cubes[:, :, :, None] - cubes[:, :, None]).sum(axis=4)
         touching = np.count_nonzero(apart == 1, axis=(2, 3))
         alike = (box == box[:, :1]).all(axis=2) & (touching == touching[:, :1])
-        radii = gyration_radii(cubes)
-        far = np.linalg.norm(radii - radii[:, :1], axis=2)
+        lengths = moment_lengths(cubes)
+        far = np.linalg.norm(lengths - lengths[:, :1], axis=2)
         far = np.where(alike, far, np.inf)[:, 1:]
         result[here] = np.where(is_matched[here], far, 0).max(axis=1)
     return result
 
 
-def gyration_radii(cubes: Array) -> Array:
-    """Return the principal radii of gyration of solid shapes, (..., n, 3) to (..., 3), rising.
+def moment_lengths(cubes: Array) -> Array:
+    """Return seven lengths of shapes, by docs/iqtt.md#moments: integers (..., n, 3) to (..., 7).
 
-    The singular values of the centred cubes give those of their middles; the inertia of a cube
-    about its own middle adds 1/12 to each square.
+    The squared norm of a tensor of moments is the mean, over all pairs of cubes, of a power of
+    their dot product. Sums are of n times the coordinates, in integers, so that a symmetric shape
+    gets 0 and not the sixth root of a rounding error.
     """
-    centred = cubes - cubes.mean(axis=-2, keepdims=True)
-    singular = np.linalg.svd(centred, compute_uv=False)[..., ::-1]
-    return np.asarray(np.sqrt(singular**2 / cubes.shape[-2] + 1 / 12))
+    size = cubes.shape[-2]
+    x = size * cubes.astype(np.int64) - cubes.sum(axis=-2, keepdims=True, dtype=np.int64)
+    dots = x @ np.swapaxes(x, -1, -2)
+    square = np.diagonal(dots, axis1=-2, axis2=-1)
+    # The inertia of a cube about its own middle adds 1/12 to each square.
+    singular = np.linalg.svd(x / size, compute_uv=False)[..., ::-1]
+    radii = np.sqrt(singular**2 / size + 1 / 12)
+    third = (dots**3).mean(axis=(-2, -1)) ** (1 / 6)
+    trace = np.cbrt(np.linalg.norm((square[..., None] * x).mean(axis=-2), axis=-1))
+    fourth = (dots.astype(np.float64) ** 4).mean(axis=(-2, -1)) ** (1 / 8)
+    distance = (square.astype(np.float64) ** 2).mean(axis=-1) ** (1 / 4)
+    lengths = np.stack([third / 2, trace / 2, distance, fourth], axis=-1) / size
+    return np.concatenate([radii, lengths], axis=-1)

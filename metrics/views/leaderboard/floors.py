@@ -2,18 +2,17 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
-from iqtt import floors
-from iqtt.floors import floor_of_kind
 from metrics.score_file import SCORE_AGAIN
 from metrics.scoring.metric_names import EMPTY_ROOM, RELIEF, WHOSE
 from metrics.scoring.records import ScoreFile
 from metrics.views.by_angle import angle_floors
-from metrics.views.leaderboard.rows import Cells, unranked_rows
+from metrics.views.leaderboard.rows import Cells
 from metrics.views.score_tables import floor_text
-from metrics.views.table import Cell, Table
+from metrics.views.table import Cell, Table, make_table
 from scenegen.common.errors import SceneGenError
-from scenegen.common.text_table import number, with_interval
+from scenegen.common.text_table import number
 
 SKILL_OF = "skill of "  # begins the keys of columns of skills
 FLOOR, CHANCE = "floor: ", "floor: chance"
@@ -47,10 +46,11 @@ def floor_cells_of_groups(file: ScoreFile, name: str, keys: Sequence[str]) -> Ce
     if file.task == "rooms":
         values = angle_floors(file, name) if is_shared(name) else {}
         return _shown({FLOOR + WHOSE[str(file.floor_of(name))]: values} if values else {})
-    answers = file.meta.counts["answers"]
-    best = {kind: floor_of_kind(kind, answers)[0] for kind in keys}
-    chance = dict.fromkeys(keys, 1.0 / answers)
-    return _shown({CHANCE: chance} if best == chance else {f"{FLOOR}best": best, CHANCE: chance})
+    floors = file.question_floors
+    best = {kind: floors[kind].accuracy for kind in keys if kind in floors}
+    chance = dict.fromkeys(keys, 1.0 / file.meta.counts["answers"])
+    same = all(best[kind] == chance[kind] for kind in best)
+    return _shown({CHANCE: chance} if same else {f"{FLOOR}best": best, CHANCE: chance})
 
 
 def _shown(rows: Mapping[str, Mapping[str, float]]) -> Cells:
@@ -93,21 +93,17 @@ def _stated(file: ScoreFile) -> dict[str, float]:
 
 
 def floors_table(files: Sequence[ScoreFile]) -> Table | None:
-    """Return what each probe reached on the kinds of question in these files; None if unknown."""
-    shown = {kind for file in files for kind in file.by_distractor}
-    measured = [floor for floor in floors.FLOORS if floor.kind in shown]
-    kinds = tuple(dict.fromkeys(floor.kind for floor in measured))
-    if not kinds:
+    """Return the best probe on each kind of question in these files; None if none is known."""
+    floors = {kind: floor for file in files for kind, floor in file.question_floors.items()}
+    if not floors:
         return None
-    cells: dict[str, dict[str, Cell]] = {}
-    for floor in measured:
-        cell = Cell(*with_interval(floor.accuracy, floor.low, floor.high))
-        cells.setdefault(floor.name, {})[floor.kind] = cell
-    rows = unranked_rows("floor", cells, kinds)
+    rows = [
+        (kind, Cell(number(f.accuracy), f"± {f.error:.3f}"), f.probe, f"{f.questions:,}")
+        for kind, f in floors.items()
+    ]
     note = (
-        "Fraction of right answers of methods that know nothing of 3D, with 95% intervals, by kind"
-        " of question and number of labelled questions; measured once, as docs/results.md says. The"
-        " best that lies above chance is the floor of skill."
+        "Fraction of right answers of the best probe without 3D, with its standard error, on"
+        " questions of the same settings about training shapes: docs/results.md."
     )
-    head = ("#", "method", *kinds)
-    return Table("3D-IQTT: floors by kind of question", head, tuple(rows), (note,), named_by=1)
+    head = ("kind", "floor", "probe", "questions")
+    return replace(make_table("3D-IQTT: floors by kind of question", head, rows), notes=(note,))

@@ -438,8 +438,9 @@ def _title(file: ScoreFile) -> str:
         file.shown_of_several or "", "Rooms"
     )
     scenes, views = (len(np.unique(c)) for c in (file.clusters, file.columns["view_index"]))
-    angles = file.columns.get("view_angle_degrees", np.array([-1]))
-    span = f" from 0° to {angles.max()}°" if angles.max() > 0 else ""
+    angles = file.columns.get("view_angle_degrees", np.zeros(0))
+    widest = np.abs(angles[np.isfinite(angles)]).max(initial=0)
+    span = f" from 0° to {widest:g}°" if widest > 0 else ""
     each = f" in {views} views{span}" if views > 1 else ""
     return f"{task}: {scenes:,} scenes{each}, {name}"
 

@@ -6,16 +6,17 @@ the reference and of the right answer.
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from iqtt.floors import floor_of_kind
+from iqtt.floors import Floor
 from iqtt.quiz.answers import Answer, Answers
 from metrics.scoring.questions import ANGLE_BINS
 from metrics.submissions.reader import QuestionPredictions, open_predictions
@@ -41,7 +42,7 @@ class Group:
 
     Attributes:
         accuracy: mean of participants' accuracies.
-        floor: of outlines, where it is known.
+        floor: of methods without 3D, where it is known.
         seconds: mean of participants' mean response times of right answers; None without times.
         line: of these times over the angle.
     """
@@ -124,8 +125,16 @@ def counted(answers_file: Answers) -> list[Answer]:
     return answers
 
 
-def compute(answers_file: Answers, model: str | Path | None = None) -> Figures:
-    """Return all figures; `model` is a submission for the same split.
+def compute(
+    answers_file: Answers,
+    model: str | Path | None = None,
+    floors: Mapping[str, Floor] = MappingProxyType({}),
+) -> Figures:
+    """Return all figures.
+
+    Args:
+        model: a submission for the same split.
+        floors: of the kinds of questions, as `iqtt.floors.floors_of` returns them.
 
     Raises FileFormatError where nobody finished, and as `open_predictions`; SpecError where the
     submission is for another split or lacks a question.
@@ -150,7 +159,7 @@ def compute(answers_file: Answers, model: str | Path | None = None) -> Figures:
             name=name,
             answers=int(chosen.sum()),
             accuracy=within(mean_of_people(right[chosen], people[chosen])),
-            floor=floor_of_kind(name, settings.answers)[0] if is_kind else None,
+            floor=floors[name].accuracy if is_kind and name in floors else None,
             seconds=mean_of_people(seconds[timed], people[timed]) if timed.any() else None,
             line=line(chosen) if is_kind else None,
         )
@@ -180,7 +189,7 @@ def compute(answers_file: Answers, model: str | Path | None = None) -> Figures:
         by_angle=[group(spans[i], span == i, False) for i in np.unique(span[span >= 0])],
         line=line(np.ones(len(answers), bool)),
         timed=int(np.isfinite(seconds).sum()),
-        references=references(kinds.tolist(), settings.answers),
+        references=references(kinds.tolist(), settings.answers, floors),
     )
 
 

@@ -1,10 +1,10 @@
 """What stands beside people's scores: chance, the floor of outlines, and the paper's figures."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from iqtt.floors import floor_of_questions
+from iqtt.floors import Floor, floor_of_questions
 from iqtt.quiz.pages import Bar
 from iqtt.quiz.study import UNTOLD, Question
 from metrics.measures.statistics import wilson_interval
@@ -29,19 +29,19 @@ class Reference:
     note: str
 
 
-def references(kinds: Sequence[str], answers: int) -> list[Reference]:
-    """Return chance, the floor of these kinds of questions, and the figures of the paper.
+def references(kinds: Sequence[str], answers: int, floors: Mapping[str, Floor]) -> list[Reference]:
+    """Return chance, the floor of these kinds of questions if known, and figures of the paper.
 
     Args:
         kinds: of each question that counts.
         answers: how many answers a question offers.
+        floors: as `floors.floors_of` returns them.
     """
     counts = {} if UNTOLD in kinds else dict(Counter(kinds))
-    floor, probe = floor_of_questions(counts, answers)
-    beside = [
-        Reference("Chance", 1 / answers, "guessing"),
-        Reference("Outlines alone", floor, f"without any idea of 3D: {probe}"),
-    ]
+    found = floor_of_questions(counts, floors)
+    beside = [Reference("Chance", 1 / answers, "guessing")]
+    if found is not None:
+        beside.append(Reference("Without 3D", found[0], f"the best of many tricks: {found[1]}"))
     figures = [f for f in TABLES[2].figures if f.method in (PEOPLE, PAPER)]
     for figure in figures if answers == THREE else ():
         spread = f" ± {figure.spread}" if figure.spread else ""
@@ -52,16 +52,18 @@ def references(kinds: Sequence[str], answers: int) -> list[Reference]:
     return beside
 
 
-def compare(answers: int, results: Sequence[tuple[Question, bool]]) -> list[Bar]:
+def compare(
+    answers: int, floors: Mapping[str, Floor], results: Sequence[tuple[Question, bool]]
+) -> list[Bar]:
     """Return a participant's score with Wilson's interval, and the references below it.
 
     Args:
-        answers: how many answers a question offers.
+        answers, floors: as in `references`.
         results: each question that counts, and whether it was answered rightly.
     """
     right, count = sum(good for _, good in results), len(results)
     score = Bar(
         "You", right / count, *wilson_interval(right, count), f"{right} of {count}", own=True
     )
-    others = references([question.kind for question, _ in results], answers)
+    others = references([question.kind for question, _ in results], answers, floors)
     return [score, *(Bar(other.name, other.value, None, None, other.note) for other in others)]

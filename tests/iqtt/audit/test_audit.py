@@ -28,8 +28,8 @@ from scenegen.common.errors import FileFormatError, SpecError
 
 OF_IMAGES = ("answer places", "pixel values", "framing", "distinct images", "distinct questions")
 BY_CUBES = {
-    *("shapes", "one right answer", "answers differ", "mirror images", "matched", "stored ids"),
-    *("splits apart", "splits for ever", "rotations", "angles", "lines of sight"),
+    *("shapes", "one right answer", "answers differ", "labels", "mirror images", "matched"),
+    *("stored ids", "splits apart", "splits for ever", "rotations", "angles", "lines of sight"),
     *("visibility", "cast again", "one explanation"),
 }
 PROOFS = {"content", *OF_IMAGES, *BY_CUBES}
@@ -77,6 +77,11 @@ def unlabeled_second_right_answer(file: h5py.File) -> None:
 def distractors_alike(file: h5py.File) -> None:
     first, second = wrong(file, 2, 1), wrong(file, 2, 2)
     set_shape(file["truth"], 2, second, shape(file["truth"], 2, first) @ ROTATIONS[7].T)
+
+
+def other_labels(kinds: Any) -> Any:
+    """Call each mirror image of the reference a near shape."""
+    return np.where(kinds == 2, 1, kinds)
 
 
 def in_pieces(cubes: Any) -> Any:
@@ -146,6 +151,7 @@ DAMAGES: list[tuple[str, Edit, str]] = [
     (TRAIN, unlabeled_second_right_answer, "one right answer, ..."),
     (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one right answer, ..."),
     (VAL, distractors_alike, "answers differ, ..."),
+    (VAL, changed("truth/distractor_kind", ALL, other_labels), "labels, ..."),
     (VAL, changed("truth/cubes", 3, in_pieces), "shapes, ..."),
     (VAL, changed("truth/shape_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
     (VAL, changed("truth/class_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),

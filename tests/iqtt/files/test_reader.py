@@ -13,6 +13,7 @@ from iqtt.files.reader import (
     open_questions,
     parts,
 )
+from iqtt.questions.specs import DISTRACTOR_KINDS
 from iqtt.shapes.polycube import canonical, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
 
@@ -64,7 +65,7 @@ def test_truth_has_no_padding_and_agrees_with_the_images(split_folder):
         assert list(truth.shape_id) == ids
         same = [k for k in range(3) if truth.shape_id[k + 1] == truth.shape_id[0]]
         assert same == [record.answer] == [k for k, v in enumerate(truth.distractor_kind) if not v]
-        assert set(truth.distractor_kind) <= {None, "other", "near", "mirror", "matched"}
+        assert set(truth.distractor_kind) <= {None, *DISTRACTOR_KINDS}
         for k, kind in enumerate(truth.distractor_kind):
             assert (kind == "mirror") <= (truth.class_id.count(truth.class_id[k + 1]) > 1)
         assert truth.camera == questions.spec.camera(truth.camera.position[2])

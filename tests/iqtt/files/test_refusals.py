@@ -106,14 +106,31 @@ def test_what_is_no_question_file_is_refused_by_all(damaged, kind, check_refusal
         assert line.count(str(path)) == 1
 
 
+def test_files_of_format_1_0_are_read(damaged):
+    """They did not name `near-mirror`."""
+
+    def older(file):
+        file.attrs["format_version"] = "1.0"
+        named(["other", "near", "mirror", "matched"])(file)
+        kinds = file["truth/distractor_kind"][:]
+        file["truth/distractor_kind"][:] = np.where(kinds == 4, 2, kinds)
+
+    with open_questions(damaged(older)) as questions:
+        assert "near-mirror" not in {
+            k for i in range(6) for k in questions[i].truth.distractor_kind
+        }
+    newer = damaged(lambda file: (older(file), file.attrs.update(format_version="1.1")))
+    refused(newer, NAMES)
+
+
 # A value of row 4, and the range that the error names.
 OUT_OF_RANGE = [
     ("cube_count", 8, "1 to 7"),
     ("cube_count", 0, "1 to 7"),
     ("light_count", 3, "0 to 2"),
     ("light_count", -1, "0 to 2"),
-    ("distractor_kind", 4, "-1 to 3"),
-    ("distractor_kind", -2, "-1 to 3"),
+    ("distractor_kind", 5, "-1 to 4"),
+    ("distractor_kind", -2, "-1 to 4"),
     ("angle_degrees", np.nan, "0 to 180"),
     ("angle_degrees", 181, "0 to 180"),
     *(("camera_distance", x, "0.001 to 1000000000.0") for x in (0, -1, np.nan, np.inf, 1e300)),

@@ -129,13 +129,13 @@ def test_the_seed_moves_intervals_only(folder):
 
 
 def test_views_are_averaged_within_scenes_and_told_by_angle(folder, tmp_path):
-    """Rows 0 to 3 become one scene seen from 0, 35, 35 and 80 degrees; the others stay."""
+    """Rows 0 to 3 become one scene seen from 0, 35, -35 and 80 degrees; the others stay."""
     truth = tmp_path / "rooms.h5"
     shutil.copy(folder / "rooms.h5", truth)
     with h5py.File(truth, "r+") as file:
         file["scene_index"][:4] = 0
         file["view_index"][:4] = np.arange(4)
-        for row, degrees in enumerate((10, 45, 45, 90)):
+        for row, degrees in enumerate((10, 45, -25, 90)):
             azimuth = np.radians(degrees)
             position = 3 * np.array([np.sin(azimuth), 0.5, np.cos(azimuth)])
             camera = Camera(tuple(position.tolist()), (0.0, 0.0, 0.0), 20.0)
@@ -143,7 +143,7 @@ def test_views_are_averaged_within_scenes_and_told_by_angle(folder, tmp_path):
         told_again(file)
     found = score([folder / "noisy-0.h5"], truth)
     items = np.asarray(found.items["mse_depth"])
-    assert np.asarray(found.items["view_angle_degrees"])[:4].tolist() == [0, 35, 35, 80]
+    assert np.asarray(found.items["view_angle_degrees"])[:4].tolist() == [0, 35, -35, 80]
     value = np.mean([items[:4].mean(), *items[4:]])
     assert found.metrics["mse_depth"].value == pytest.approx(value)
     assert found.metrics["mse_depth"].n == 5
@@ -152,15 +152,18 @@ def test_views_are_averaged_within_scenes_and_told_by_angle(folder, tmp_path):
     assert found.by_view_angle["35"]["mse_depth"].low is None
 
 
-def test_view_angles_go_the_short_way_round():
+def test_view_angles_go_the_short_way_round_and_tell_which():
+    """From +z towards +x is counter-clockwise, as seen from above."""
+
     def matrix(degrees):
         turned = np.eye(4)
         turned[:3, 2] = [np.sin(np.radians(degrees)), 0, np.cos(np.radians(degrees))]
         return turned
 
-    cameras = np.stack([matrix(d) for d in (170, -170, 80, 5)])
-    found = view_angles(np.array([0, 0, 0, 7]), np.array([0, 1, 2, 1]), cameras)
-    assert found.tolist() == [0, 20, 90, -1]
+    cameras = np.stack([matrix(d) for d in (170, -170, 80, -10, -9.6, 5)])
+    found = view_angles(np.array([0] * 5 + [7]), np.array([0, 1, 2, 3, 4, 1]), cameras)
+    assert found[:5].tolist() == [0, 20, -90, 180, 180]
+    assert np.isnan(found[5])
 
 
 def test_missing_rows_are_refused_or_stamped(folder, tmp_path):

@@ -11,14 +11,24 @@ import pytest
 from refusals import refused
 
 from baselines.trivial import write_chance
-from iqtt import floors
 from iqtt.files.make import make_split
-from iqtt.floors import Floor, floor_of_questions
-from iqtt.questions.specs import QUESTION_KINDS, SplitSpec, question_kind
+from iqtt.files.reader import open_questions
+from iqtt.floors import (
+    CHANCE,
+    Floor,
+    Measured,
+    floor_of_questions,
+    floors_of,
+    settings_of,
+    to_json,
+)
+from iqtt.questions.specs import PRESETS, SUITE, SplitSpec, preset_spec, question_kind
 from metrics.measures.statistics import design_effect, wilson_interval
 from metrics.prediction_writer import PredictionError, write_answers
+from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
-from metrics.scoring.runs import ScoringError
+from metrics.scoring.runs import ScoringError, Settings
+from scenegen.common.errors import SpecError
 
 
 def test_answers_are_scored_by_kind_angle_and_place(questions):
@@ -111,7 +121,7 @@ def test_intervals_take_shapes_as_independent(questions, tmp_path):
     assert (other.low, other.high) == pytest.approx(wilson_interval(15, 30))
     assert "shape" not in plain.items
     assert "shape" not in plain.items
-    assert (plain.by_distractor, plain.skills["iqtt_accuracy"].floor) == ({}, 1 / 3)
+    assert (plain.by_distractor, plain.skills) == ({}, {})
     given[0] = -1
     (tmp_path / "b.json").write_text(json.dumps({"answers": given.tolist(), "method": "m"}))
     paths = [tmp_path / f"{name}.json" for name in "ab"]
@@ -132,7 +142,6 @@ def test_two_answers_are_scored_against_a_half(tmp_path):
     assert set(found.by_distractor) == {"mirror-pair-2"}
     assert set(found.by_position) <= {"0", "1"}
     assert found.meta.counts["answers"] == 2
-    assert found.skills["iqtt_accuracy"].floor == 0.5
     (tmp_path / "a.json").write_text(str([0, 1, 2, 0, 1, -1, 0, 1]))
     with refused(ScoringError, "a.json: answer", found="such as 2", expected="an answer"):
         score([tmp_path / "a.json"], test)
@@ -140,48 +149,70 @@ def test_two_answers_are_scored_against_a_half(tmp_path):
         write_answers(tmp_path / "b.h5", test, method="m", scores=np.zeros((8, 3)))
 
 
-MEASURED = (
-    Floor("near", "outline", 0, 0.5, 0.45, 0.55),
-    Floor("near", "outline-trees", 1000, 0.6, 0.55, 0.65),
-    Floor("mirror", "outline-trees", 1000, 0.36, 0.31, 0.41),
-    Floor("near-2", "outline", 0, 0.55, 0.49, 0.61),
-)
+NEAR = Floor("near", "outlines, by trees", 0.6, 6000)
+MIRROR = Floor("mirror", CHANCE, 1 / 3, 6000)
 
 
 @pytest.mark.parametrize(
-    ("counts", "answers", "floor", "name"),
+    ("counts", "floor", "name"),
     [
-        ({"near": 7}, 3, 0.6, "outline-trees, 1,000 labels"),
-        ({"mirror": 7}, 3, 1 / 3, floors.CHANCE_BEST),
-        ({"near-2": 7}, 2, 0.5, floors.CHANCE_BEST),
-        ({"unheard": 7}, 3, 1 / 3, floors.CHANCE_ONLY),
-        ({}, 3, 1 / 3, floors.CHANCE_ONLY),
-        ({"near": 3, "mirror": 1}, 3, (3 * 0.6 + 1 / 3) / 4, "1,000 labels (near)"),
+        ({"near": 7}, 0.6, NEAR.probe),
+        ({"mirror": 7}, 1 / 3, CHANCE),
+        ({"near": 3, "mirror": 1}, (3 * 0.6 + 1 / 3) / 4, f"{NEAR.probe} (near)"),
     ],
 )
-def test_the_floor_is_the_best_probe_that_beats_chance(monkeypatch, counts, answers, floor, name):
-    monkeypatch.setattr(floors, "FLOORS", MEASURED)
-    found = floor_of_questions(counts, answers)
+def test_the_floor_of_questions_is_the_mean_of_those_of_their_kinds(counts, floor, name):
+    found = floor_of_questions(counts, {"near": NEAR, "mirror": MIRROR})
+    assert found is not None
     assert found[0] == pytest.approx(floor)
     assert name in found[1]
 
 
-def test_skill_is_the_share_of_the_way_from_the_floor_to_all_right(questions, monkeypatch):
-    kinds = score([questions / "chance-0.h5"]).by_distractor
-    table = tuple(replace(MEASURED[1], kind=kind) for kind in kinds)
-    monkeypatch.setattr(floors, "FLOORS", table)
+def test_no_floor_where_one_kind_has_none():
+    for counts in ({}, {"near": 3, "other": 1}):
+        assert floor_of_questions(counts, {"near": NEAR}) is None
+
+
+def floors_file(path, spec, kinds):
+    floors = tuple(replace(NEAR, kind=kind) for kind in kinds)
+    path.write_text(to_json([Measured(settings_of(spec), floors)]))
+    return path
+
+
+def test_skill_is_the_share_of_the_way_from_the_floor_to_all_right(questions, tmp_path):
+    with open_questions(questions / "split/iqtt-val.h5") as file:
+        spec = file.spec
+    found = score([questions / "chance-0.h5"])
+    assert found.skills == {}
+    kinds = found.by_distractor
+    path = floors_file(tmp_path / "floors.json", replace(spec, test=3, seed=1), kinds)
     for paths in ([0], [0, 1]):
-        found = score([questions / f"chance-{i}.h5" for i in paths])
+        runs = [questions / f"chance-{i}.h5" for i in paths]
+        found = score(runs, settings=Settings(floors=path))
         told, accuracy = found.skills["iqtt_accuracy"], found.metrics["iqtt_accuracy"]
-        assert (told.floor, told.floor_name) == (pytest.approx(0.6), "outline-trees, 1,000 labels")
+        assert (told.floor, told.floor_name) == (pytest.approx(0.6), NEAR.probe)
         for end in ("value", "low", "high"):
             assert getattr(told, end) == pytest.approx((getattr(accuracy, end) - 0.6) / 0.4)
+        write_scores(found, tmp_path / "s.json", overwrite=True)
+        assert read_scores(tmp_path / "s.json").skills == found.skills
+    for other in (replace(spec, min_angle_degrees=1), replace(spec, background=(0, 0, 0))):
+        floors_file(path, other, kinds)
+        assert score([questions / "chance-0.h5"], settings=Settings(floors=path)).skills == {}
 
 
-def test_the_table_of_floors_is_sound():
-    """Known kinds, each probe once for a number of labels, accuracies within their intervals."""
-    kinds = {f"{kind}{end}" for kind in QUESTION_KINDS for end in ("", "-2")}
-    assert {floor.kind for floor in floors.FLOORS} <= kinds
-    keys = [(floor.kind, floor.probe, floor.labels) for floor in floors.FLOORS]
-    assert len(set(keys)) == len(keys)
-    assert all(0 < floor.low < floor.accuracy < floor.high < 1 for floor in floors.FLOORS)
+def test_what_is_no_file_of_floors_is_refused(tmp_path, questions):
+    path = floors_file(tmp_path / "floors.json", SplitSpec(), ["near"])
+    good = path.read_text()
+    for old, new in (("0.6", "1.0"), ("floors", "scores"), ("near", 'near", 1, '), ("{", "[")):
+        path.write_text(good.replace(old, new, 1))
+        with pytest.raises(SpecError):
+            score([questions / "chance-0.h5"], settings=Settings(floors=path))
+
+
+def test_the_package_has_the_floors_of_every_preset():
+    for preset in PRESETS:
+        spec = preset_spec(preset)
+        assert floors_of(spec).keys() >= {*spec.kinds}
+        assert all(floor.questions >= 5000 for floor in floors_of(spec).values())
+    assert floors_of(preset_spec("suite")).keys() >= SUITE.keys()
+    assert floors_of(preset_spec("small", min_angle_degrees=0.0)) == {}

@@ -48,13 +48,12 @@ def test_every_score_stands_beside_its_reference():
     assert head["chamfer"][-1] == "0.1600: empty room; noise floor 0.01230"
 
 
-def test_questions_have_the_floor_of_their_kind(monkeypatch):
-    floors = (Floor("mirror", "outline", 0, 0.5, 0.4, 0.6),)
-    monkeypatch.setattr("iqtt.floors.FLOORS", floors)
+def test_questions_have_the_floor_of_their_kind():
+    floors = (Floor("mirror", "outline", 0.5, 2500),)
     accuracy = {"iqtt_accuracy": Skill(0.0, None, None, 0.5, "outline")}
     group = {"mirror": {"iqtt_accuracy": make_score("iqtt_accuracy", 1 / 3)}}
     by_kind, by_answer = {"skills": accuracy, "by_distractor": group}, {"2": group["mirror"]}
-    scores = iqtt_scores("a", [1, 0], **by_kind, by_position=by_answer)
+    scores = iqtt_scores("a", [1, 0], **by_kind, by_position=by_answer, question_floors=floors)
     head = cells_of(headline_rows(scores))
     assert head["skill of iqtt_accuracy"][-1] == "0: outline"
     assert head["iqtt_accuracy"][-1] == "0.5: outline; chance 0.3"
@@ -144,12 +143,11 @@ def test_the_headline_stands_beside_floor_paper_and_other_methods(tmp_path):
 def test_questions_stand_by_kind_beside_chance_floor_and_people():
     group = {"iqtt_accuracy": make_score("iqtt_accuracy", 1 / 3)}
     kinds = {"other": group, "near-2": group, "<b>": group}
-    section, *_ = kinds_sections([iqtt_scores("mine", [1, 0, 1], by_distractor=kinds)])
+    told = {"by_distractor": kinds, "question_floors": (Floor("other", "trees", 0.591, 2500),)}
+    section, *_ = kinds_sections([iqtt_scores("mine", [1, 0, 1], **told)])
     cells = cells_of(section.tables[0])
-    assert cells["other"][3:] == ["0.3333", "-0.6300", "0.5910 outline-trees, 5,000 labels",
-                                  "0.7329 ± 0.148"]  # fmt: skip
-    assert cells["near-2"][5] == "0.3333 chance, as no probe was measured"
-    assert cells["near-2"][6] == cells["<b>"][6] == "-"
+    assert cells["other"][3:] == ["0.3333", "-0.6300", "0.5910 trees", "0.7329 ± 0.148"]
+    assert cells["near-2"][4:] == cells["<b>"][4:] == ["-", "-", "-"]
 
 
 def test_examples_of_questions_say_what_is_right(truths, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from made_scores import DIGEST, iqtt_scores, make_score, rooms_scores, stated
 from refusals import refused
 
-from iqtt.floors import Floor
+from iqtt.floors import CHANCE, Floor
 from metrics.score_file import Skill
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
@@ -18,13 +18,6 @@ from metrics.views.leaderboard.ranking import LeaderboardError, leaderboard, ran
 from metrics.views.leaderboard.site import lead_of
 from metrics.views.paper import TABLES
 from scenegen.common.errors import SpecError
-
-
-@pytest.fixture(autouse=True)
-def _no_floors(monkeypatch):
-    """Kinds of questions are taken as not measured, except where a test says otherwise."""
-    monkeypatch.setattr("iqtt.floors.FLOORS", ())
-
 
 SCENES = [0, 0, 1, 1]
 PAPER = ("task", "all", "none")
@@ -63,10 +56,12 @@ def test_ranks_and_best_cells():
 
 
 def test_higher_is_better_where_it_is():
-    files = [iqtt_scores("low", [1, 0, 0] * 5), iqtt_scores("high", [1, 1, 1] * 5)]
-    (table,) = leaderboard(files, paper="none")
+    floors = (Floor("mirror", CHANCE, 1 / 3, 2500),)
+    rights = {"low": [1, 0, 0] * 5, "high": [1, 1, 1] * 5}
+    files = [iqtt_scores(name, right, question_floors=floors) for name, right in rights.items()]
+    table, _ = leaderboard(files, paper="none")
     assert best(table) == [[True, True], [False, False], [False, False]]
-    floor = "floor: chance, as no probe was measured"
+    floor = f"floor: {CHANCE}"
     assert ranks(table) == [("1", "high"), ("", floor), ("", "low")]
     assert table.head[2:] == ("IQTT accuracy: skill ↑", "IQTT accuracy ↑ (fraction)")
     assert table.title == "Mental rotation: 15 questions of the kind mirror, rooms.h5"
@@ -289,11 +284,10 @@ def by_kind(*rights):
     }
 
 
-def test_questions_by_kind_with_the_floors_of_each_kind(monkeypatch):
-    table = (Floor("near", "outline-trees", 1000, 0.6, 0.5, 0.7),)
-    table += (Floor("matched", "outline-trees", 1000, 0.35, 0.3, 0.4),)
-    monkeypatch.setattr("iqtt.floors.FLOORS", (*table, replace(table[0], kind="other")))
-    file = iqtt_scores("a", [1, 0, 1, 0], by_distractor=by_kind(0.3, 0.7))
+def test_questions_by_kind_with_the_floors_of_each_kind():
+    table = (Floor("near", "trees", 0.6, 2500), Floor("matched", CHANCE, 1 / 3, 2500))
+    told = {"by_distractor": by_kind(0.3, 0.7), "question_floors": table}
+    file = iqtt_scores("a", [1, 0, 1, 0], **told)
     _, kinds, floors = leaderboard([file], paper="none")
     assert kinds.head[2:] == ("matched", "near")
     assert values(kinds) == {
@@ -301,10 +295,10 @@ def test_questions_by_kind_with_the_floors_of_each_kind(monkeypatch):
         "floor: best": ["0.3333", "0.6000"],
         "floor: chance": ["0.3333", "0.3333"],
     }
-    assert floors.head[2:] == ("near", "matched")
-    assert values(floors) == {"outline-trees, 1,000 labels": ["0.60", "0.35"]}
-    (ends,) = rests(floors).values()
-    assert ends == ["[0.50, 0.70]", "[0.30, 0.40]"]
+    assert [[cell.value for cell in row.cells] for row in floors.rows] == [
+        ["near", "0.6000", "trees", "2,500"],
+        ["matched", "0.3333", CHANCE, "2,500"],
+    ]
 
 
 def angles(shift):

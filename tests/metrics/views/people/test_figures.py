@@ -12,17 +12,19 @@ from quizzes import MADE, made_answers
 from refusals import refused
 from scipy import stats
 
-from iqtt.floors import floor_of_kind
+from iqtt.floors import Floor
 from iqtt.quiz.answers import read_answers, to_csv
 from metrics.prediction_writer import write_answers
 from metrics.views.people.figures import compute
 from metrics.views.people.references import compare, references
 from scenegen.common.errors import FileFormatError, SpecError
 
+FLOORS = {"mirror": Floor("mirror", "trees", 0.4, 100), "near": Floor("near", "trees", 0.6, 100)}
+
 
 @pytest.fixture(scope="module")
 def figures(answers_db):
-    return compute(read_answers(answers_db))
+    return compute(read_answers(answers_db), floors=FLOORS)
 
 
 @pytest.fixture(scope="module")
@@ -83,7 +85,7 @@ def test_groups(figures, lines):
             continue
         assert group.seconds.value == pytest.approx(statistics.mean(seconds))
         assert (group.seconds.low, group.seconds.high) == pytest.approx(student(seconds))
-    assert figures.by_kind[0].floor == floor_of_kind("mirror", 3)[0]
+    assert figures.by_kind[0].floor == 0.4
     assert sum(group.answers for group in figures.by_angle) == len(lines)
 
 
@@ -156,20 +158,15 @@ def test_nobody_finished(tmp_path):
 
 
 def test_references():
-    values = {
-        other.name: other.value for other in references(["mirror", "near", "near", "near"], 3)
-    }
-    floors = [floor_of_kind(kind, 3)[0] for kind in ("mirror", "near")]
-    assert values["Outlines alone"] == pytest.approx(0.25 * floors[0] + 0.75 * floors[1])
+    kinds = ["mirror", "near", "near", "near"]
+    values = {other.name: other.value for other in references(kinds, 3, FLOORS)}
+    assert values["Without 3D"] == pytest.approx(0.25 * 0.4 + 0.75 * 0.6)
     assert values["People in the paper"] == 0.7329
     assert (values["Pix2Shape, no labels"], values["Pix2Shape, 1,000 labels"]) == (0.5519, 0.7012)
-    assert [other.name for other in references(["mirror-pair-2"], 2)] == [
-        "Chance",
-        "Outlines alone",
-    ]
+    assert [other.name for other in references(["mirror-pair-2"], 2, FLOORS)] == ["Chance"]
     from iqtt.quiz.study import Question
 
     asked = Question(False, 0, "near", 50.0, 0, "")
-    own, *_ = compare(3, [(asked, True)] * 14 + [(asked, False)] * 6)
+    own, *_ = compare(3, FLOORS, [(asked, True)] * 14 + [(asked, False)] * 6)
     expected = stats.binomtest(14, 20).proportion_ci(method="wilson")
     assert (own.value, own.low, own.high) == pytest.approx((0.7, expected.low, expected.high))
