@@ -13,7 +13,7 @@ import mitsuba as mi
 import numpy as np
 
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.tables import gather_row, upload_table
+from scenegen.rendering.tables import gather_row, unit, upload_table
 
 SMALLEST = 1e-20  # least component of a direction, to avoid a division by zero
 
@@ -80,6 +80,6 @@ def closest_cube(cubes: Cubes, item: Any, o: Any, d: Any) -> Any:
     on_x = (at.x >= at.y) & (at.x >= at.z)
     on_y = ~on_x & (at.y >= at.z)
     face = dr.select(on_x, rows[0], dr.select(on_y, rows[1], rows[2]))
-    n = dr.normalize(face)
+    n = unit(face)
     n = dr.select(dr.dot(n, d) > 0, -n, n)
     return t, object_id, dr.select(object_id >= 0, n, mi.Vector3f(0))

@@ -96,7 +96,7 @@ def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tu
         tree, offset = None, np.zeros((max(1, len(models)), 3))
         if spec.shadows:
             tree, offset = model_scene(variant, batch.shape_of, batch.names, models)
-        unit = UnitScene(tree, offset, np.zeros(len(offset), np.uint32), GRID, None)
+        unit = UnitScene(tree, offset, np.zeros(len(offset), np.uint32), GRID, None, None)
     mi.set_variant(variant)
     exact = upload_surfaces(surfaces)
     shape = np.maximum(batch.shape, 0)
@@ -125,7 +125,8 @@ def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tu
         slots=spec.object_slots,
         light_slots=spec.light_slots,
         surfaces=exact,
-        triangles=unit.normals,
+        normals=unit.normals,
+        corners=unit.corners,
         objects=upload_table(objects),
         scenes=upload_table(about),
         materials=upload_table(np.concatenate(materials, axis=-1)),

@@ -148,7 +148,7 @@ def _cover(triangles: Triangles, keys: Any, thread: Any, start: Any, x: Any, y: 
     a, b, c, size = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
     left, top, columns, rows = _rectangle(triangles, a, b, c, size, x, y)
     area = mi.UInt32(columns * rows)
-    planes = [_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b)]
+    planes = [edge_plane(b, c), edge_plane(c, a), edge_plane(a, b)]
     normal = dr.cross(b - a, c - a)
     above = dr.dot(a, normal)
     nearest = -dr.maximum(a.z, dr.maximum(b.z, c.z))
@@ -226,7 +226,7 @@ def _barycentrics(triangles: Triangles, key: Any, dx: Any, dy: Any) -> tuple[Any
     draw = dr.gather(mi.UInt32, triangles.draw, thread, hit)
     a, b, c, _ = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
     sides = [
-        dx * n.x + dy * n.y - n.z for n in (_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b))
+        dx * n.x + dy * n.y - n.z for n in (edge_plane(b, c), edge_plane(c, a), edge_plane(a, b))
     ]
     total = sides[0] + sides[1] + sides[2]
     inverse = dr.select(total == 0, 0, 1 / total)
@@ -301,7 +301,7 @@ def _rectangle(
     return left, top, columns, rows
 
 
-def _edge_plane(a: Any, b: Any) -> Any:
+def edge_plane(a: Any, b: Any) -> Any:
     """Return a x b, computed from the ends in an order of their own: exactly -(b x a)."""
     less = (a.x < b.x) | ((a.x == b.x) & ((a.y < b.y) | ((a.y == b.y) & (a.z < b.z))))
     p, q = dr.select(less, a, b), dr.select(less, b, a)

@@ -24,6 +24,7 @@ from scenegen.rendering.ground_truth import encode_image
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.path_tracing.phong_material import phong_bsdf
 from scenegen.rendering.pixel_samples import sample_positions
+from scenegen.rendering.tables import unit
 from scenegen.rendering.unit_scene import triangle_mesh
 
 Array = NDArray[Any]
@@ -65,7 +66,7 @@ def _trace_one(batch: SceneBatch, b: int, integrator: Any) -> Array:
         x = mi.Float(pixel % spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 0]), sample)
         y = mi.Float(pixel // spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 1]), sample)
         d = right * ((x - spec.width / 2) * size) + up * ((spec.height / 2 - y) * size) - back
-        ray = mi.RayDifferential3f(mi.Point3f(origin), dr.normalize(d))
+        ray = mi.RayDifferential3f(mi.Point3f(origin), unit(d))
         radiance, valid, _ = integrator.sample(scene, sampler, ray)
         radiance = dr.select(valid, radiance, mi.Color3f(*batch.background[b].tolist()))
         values = np.asarray(dr.ravel(radiance), np.float64)
