@@ -12,6 +12,7 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from scenegen.common.rotations import product
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.tables import gather_row, unit, upload_table
 
@@ -42,7 +43,7 @@ def upload_cubes(batch: SceneBatch) -> Cubes:
     first = np.where(batch.object_count > 0, batch.object_scale[:, 0], 1.0)
     scale = np.sqrt(3) / first[:, None, None] ** 2
     frame = np.swapaxes(batch.world_from_object[:, 0, :3, :3], 1, 2) * scale
-    center = batch.world_from_object[..., :3, 3] @ np.swapaxes(frame, 1, 2)
+    center = product(batch.world_from_object[..., :3, 3], np.swapaxes(frame, 1, 2))
     return Cubes(
         slots=batch.spec.object_slots,
         count=mi.UInt32(batch.object_count),

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
+from scenegen.common.rotations import product
 from scenegen.objects.solids import Mesh
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.tables import gather_packet, gather_row, upload_rows, upload_table
@@ -81,11 +82,11 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
     model = batch.shape[image, slot]
     threads = sizes[model]
     first_thread = np.cumsum(threads) - threads
-    camera_from_world = np.linalg.inv(batch.world_from_camera)[:, :3]
+    turn = np.swapaxes(batch.world_from_camera[:, :3, :3], 1, 2)
+    camera_from_world = np.concatenate([turn, -product(turn, batch.world_from_camera[:, :3, 3:])], 2)
     placed = np.zeros((max(1, len(model)), 13))
-    placed[: len(model), :12] = np.einsum(
-        "dij,djk->dik", camera_from_world[image], batch.world_from_object[image, slot]
-    ).reshape(-1, 12)
+    moved = product(camera_from_world[image], batch.world_from_object[image, slot])
+    placed[: len(model), :12] = moved.reshape(-1, 12)
     pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
     placed[: len(model), 12] = pixel[image]
 
