@@ -10,6 +10,7 @@ parameter of a hit IS its depth.
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check
-from scenegen.common.rotations import cross
+from scenegen.common.rotations import cos_sin, cross
 
 Vector3 = tuple[float, float, float]
 Array = NDArray[Any]
@@ -47,7 +48,7 @@ class Camera:
         """Return the vertical field of view of an image with the diagonal of a square one."""
         diagonal = math.tan(math.radians(fov_degrees) / 2) * math.sqrt(2)
         half = diagonal * height / math.hypot(height, width)
-        return fov_degrees if height == width else math.degrees(2 * math.atan(half))
+        return fov_degrees if height == width else round(math.degrees(2 * math.atan(half)), 9)
 
     @property
     def world_from_camera(self) -> NDArray[np.float64]:
@@ -82,9 +83,17 @@ def look_at(position: Array, target: Array) -> NDArray[np.float64]:
     return matrix
 
 
+@lru_cache(maxsize=1024)
+def half_angle(fov_degrees: float) -> tuple[float, float]:
+    """Return cosine and sine of half an angle, with the same bits on every machine."""
+    cosine, sine = cos_sin(fov_degrees / 720)
+    return float(cosine), float(sine)
+
+
 def pixel_size(height: int, fov_y_degrees: float) -> float:
     """Return the side of a pixel on the plane at depth 1, in scene units."""
-    return 2 * math.tan(math.radians(fov_y_degrees) / 2) / height
+    cosine, sine = half_angle(fov_y_degrees)
+    return 2 * (sine / cosine) / height
 
 
 def pixel_directions(height: int, width: int, fov_y_degrees: float) -> NDArray[np.float64]:
@@ -113,12 +122,13 @@ def back_project(depth: Array, fov_y_degrees: float) -> NDArray[np.float64]:
 
 def transform_points(matrix: Array, points: Array) -> NDArray[np.float64]:
     """Apply a (4, 4) `to_from` transform to points (..., 3)."""
-    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
+    return transform_vectors(matrix, points) + matrix[:3, 3]
 
 
 def transform_vectors(matrix: Array, vectors: Array) -> NDArray[np.float64]:
     """Apply the rotation of a rigid (4, 4) `to_from` transform to vectors (..., 3)."""
-    return np.asarray(vectors @ matrix[:3, :3].T)
+    x, y, z = (vectors[..., i, None] * matrix[:3, i] for i in range(3))
+    return np.asarray(x + y + z)  # not `@`, whose bits depend on the processor
 
 
 def intrinsics(

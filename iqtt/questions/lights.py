@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from iqtt.questions.packing import cube_centres
 from iqtt.questions.specs import SplitSpec
+from scenegen.common.rotations import cos_sin
 
 Array = NDArray[Any]
 Lights = tuple[Array, Array, Array]  # positions and colours, (I, L, 3) each, and numbers, (I,)
@@ -66,7 +67,8 @@ def propose_lights(
     around = rng.uniform(0.0, 2 * math.pi, (images, most))
     around[:, 1:] = around[:, :1] + math.pi / 2 + around[:, 1:] / 2
     r = np.sqrt(1 - z * z)
-    direction = np.stack([r * np.cos(around), r * np.sin(around), z], axis=2)
+    cosine, sine = cos_sin(around / (2 * math.pi))
+    direction = np.stack([r * cosine, r * sine, z], axis=2)
     color = rng.uniform(0.3, 1.0, (images, most, 3))
     level = spec.light_level * distance**2 / count
     color *= level[:, None, None] / color.max(axis=2, keepdims=True)

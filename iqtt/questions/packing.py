@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from iqtt.questions.distractors import Shapes
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.polycube import box_centre
+from scenegen.common.rotations import product
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.rendering.packing import SceneBatch
 
@@ -75,7 +76,7 @@ def pack_questions(spec: SplitSpec, questions: Sequence[Question]) -> SceneBatch
     used = np.arange(slots) < counts[:, None]
     world_from_object = np.zeros((batch, slots, 4, 4))
     world_from_object[..., :3, :3] = CUBE_SCALE * world_from_shape[:, None]
-    world_from_object[..., :3, 3] = centres @ np.swapaxes(world_from_shape, 1, 2)
+    world_from_object[..., :3, 3] = product(centres, np.swapaxes(world_from_shape, 1, 2))
     world_from_object[..., 3, 3] = 1.0
     world_from_object[~used] = 0.0
     reflectance = np.zeros((batch, 1 + slots, 3))

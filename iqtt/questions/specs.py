@@ -9,7 +9,7 @@ from typing import Any, get_args
 
 from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import MAX_CUBES
-from scenegen.camera import Camera, Vector3
+from scenegen.camera import Camera, Vector3, half_angle
 from scenegen.common.names import check_choice
 from scenegen.common.records import check, check_range, from_json, normalise, to_json
 from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
@@ -153,12 +153,13 @@ class SplitSpec:
         """
         side = min(self.height, self.width)
         spare = max(1.02, side / (side - 2))
-        return spare * radius / math.sin(math.radians(self.fov_degrees) / 2)
+        return spare * radius / half_angle(self.fov_degrees)[1]
 
     @property
     def pixels_per_edge(self) -> float:
         """Least length in pixels of a cube edge at the origin that is parallel to the image."""
-        half = math.tan(math.radians(self.fov_degrees) / 2) * self.camera_distance
+        cosine, sine = half_angle(self.fov_degrees)
+        half = sine / cosine * self.camera_distance
         return min(self.height, self.width) / 2 / half
 
     @property
@@ -166,8 +167,8 @@ class SplitSpec:
         """Field of view across the image's height, degrees."""
         if self.height <= self.width:
             return self.fov_degrees
-        half = math.tan(math.radians(self.fov_degrees) / 2) * self.height / self.width
-        return math.degrees(2 * math.atan(half))
+        cosine, sine = half_angle(self.fov_degrees)
+        return round(math.degrees(2 * math.atan(sine / cosine * self.height / self.width)), 9)
 
     def camera(self, distance: float) -> Camera:
         """Return the camera of a question's images; it lies on +z and looks at the origin."""

@@ -16,7 +16,7 @@ from iqtt.questions.visibility import cube_pixels
 from iqtt.shapes.polycube import MAX_CUBES, ROTATIONS, bounding_radius, mirror, symmetries
 from scenegen.common.errors import PlacementError
 from scenegen.common.random.seeding import Purpose
-from scenegen.common.rotations import rotation_matrix
+from scenegen.common.rotations import product, rotation_matrix
 
 Array = NDArray[Any]
 SHRINK = 2  # how many times smaller than images the grids are on which visibility is judged
@@ -334,11 +334,13 @@ def rotation_angle_degrees(a: Array, b: Array, symmetric: Array) -> float:
             cannot be seen, so they do not count.
     """
     # These are the traces of b g^T a^T, for all symmetries g of the shape.
-    traces = ROTATIONS[symmetric].reshape(-1, 9) @ (a.T @ b).ravel()
-    return math.degrees(math.acos(min(1.0, max(-1.0, (float(traces.max()) - 1) / 2))))
+    traces = (ROTATIONS[symmetric] * product(a.T, b)).sum(axis=(1, 2))
+    degrees = math.degrees(math.acos(min(1.0, max(-1.0, (float(traces.max()) - 1) / 2))))
+    return round(degrees, 9)  # the last bits of an arc cosine depend on the machine
 
 
 def draw_rotations(rng: np.random.Generator, shape: tuple[int, ...]) -> Array:
     """Draw rotations that are uniform on SO(3), (*shape, 3, 3)."""
-    quaternion = rng.standard_normal((4, *shape))
+    # Rounded, as a few normal numbers come from the logarithm, which differs in its last bits.
+    quaternion = np.rint(rng.standard_normal((4, *shape)) * 2.0**40)
     return rotation_matrix(quaternion / np.sqrt((quaternion * quaternion).sum(axis=0)))

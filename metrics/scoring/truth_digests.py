@@ -69,3 +69,19 @@ def _checked(
         f"{expected!s:.12}, with which the file was written",
         f"what was changed since: {', '.join(changed)}" if changed else "",
     )
+
+
+def file_digest(path: Path, task: str) -> tuple[str, int]:
+    """Return the digest of a file's truth, computed from all its values, and its number of rows.
+
+    Raises FileFormatError for a file that is none, and ScoringError as `rooms_digest`.
+    """
+    if task == "rooms":
+        with RoomsFile(path) as rooms:
+            return rooms_digest(rooms, {}), len(rooms)
+    from iqtt.files.layout import SCORED as OF_ANSWERS
+    from iqtt.files.reader import AnswersFile
+
+    with AnswersFile(path) as answers:
+        columns = {name: answers.read(name, slice(None)) for name in OF_ANSWERS}
+        return answers_digest(answers, columns), len(answers)

@@ -37,9 +37,15 @@ def cross(a: Any, b: Any) -> tuple[Any, Any, Any]:
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-def cos_sin(turns: NDArray[Any]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def product(a: Any, b: Any) -> NDArray[np.float64]:
+    """Return the product of small matrices, (..., n, k) and (..., k, m), alike on every machine."""
+    terms = (a[..., i, None] * b[..., None, i, :] for i in range(a.shape[-1]))
+    return np.asarray(sum(terms, np.float64(0.0)))
+
+
+def cos_sin(turns: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return cosine and sine of angles in full turns, within 2**-52, alike on every machine."""
-    quarters = 4.0 * turns
+    quarters = 4.0 * np.asarray(turns)
     nearest = np.rint(quarters)
     x = (quarters - nearest) * (math.pi / 2)
     square = x * x

@@ -15,6 +15,7 @@ import numpy as np
 from scenegen.common.names import check_choice
 from scenegen.objects import teapot
 from scenegen.objects.basic_hulls import kept
+from scenegen.objects.coarse_hulls import POINT_STEP, rounded
 from scenegen.objects.exact_surfaces import FAR, Capsule, Torus, Turned, cone_of
 from scenegen.objects.solids import (
     Array,
@@ -128,7 +129,8 @@ def _teapot() -> UnitShape:
     discs = np.concatenate([discs, np.zeros(len(others))]) * scale
     resting = kept("teapot-resting", lambda: resting_directions(points[on_hull]))
 
-    corners = (corners - center) * scale
+    # Rounded, as the last bits of these sums depend on the processor.
+    corners, normals = rounded((corners - center) * scale, POINT_STEP), rounded(normals, POINT_STEP)
     triangles = np.concatenate([corners[:, [0, 1, 2]], corners[:, [0, 2, 3]]])
     corner_normals = np.concatenate([normals[:, [0, 1, 2]], normals[:, [0, 2, 3]]])
     mesh = unshared(*face_outwards(triangles, corner_normals))

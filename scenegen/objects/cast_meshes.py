@@ -32,6 +32,23 @@ def normal_table(shape: UnitShape) -> Array:
     return table
 
 
+def corner_table(shape: UnitShape) -> Array:
+    """Return three corners of each triangle, and the number of the triangle beyond the side that is
+    opposite to each of them, (F, 12) float32. A side at a border has its own triangle beyond it.
+    """
+    corners = shape.triangles.astype(np.float32)
+    count = len(corners)
+    vertex = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)[1].reshape(count, 3)
+    sides = np.sort(np.stack([np.roll(vertex, -k, axis=1)[:, 1:] for k in range(3)]), axis=2)
+    key = (sides[..., 0] * (3 * count) + sides[..., 1]).ravel()
+    order = np.argsort(key, kind="stable")
+    first = np.flatnonzero(key[order[1:]] == key[order[:-1]])
+    beyond = np.tile(np.arange(count), 3)
+    one, other = order[first], order[first + 1]
+    beyond[one], beyond[other] = other % count, one % count
+    return np.concatenate([corners.reshape(-1, 9), beyond.reshape(3, -1).T], axis=1)
+
+
 def overlapping(triangles: Array) -> Array:
     """Move the edges of triangles, (F, 3, 3), outwards by OVERLAP, within their planes.
 

@@ -23,7 +23,8 @@ def coarse_hull(corners: Array) -> tuple[Array, float]:
     height = 1 - (2 * np.arange(_TRIED) + 1) / _TRIED
     cosine, sine = cos_sin(np.arange(_TRIED) * ((5**0.5 - 1) / 2))
     radius = np.sqrt(1 - height * height)
-    directions = np.stack([radius * cosine, height, radius * sine])
+    # Rounded as in `sampling.bodies`, so that the sums of products are exact.
+    directions = rounded(np.stack([radius * cosine, height, radius * sine]), POINT_STEP)
     reach = corners[:, :3] @ directions + corners[:, 3:] * radius
     farthest, best, chosen = reach.max(axis=0), np.full(_TRIED, -1.0), []
     for _ in range(COARSE_CORNERS):
@@ -35,5 +36,5 @@ def coarse_hull(corners: Array) -> tuple[Array, float]:
 
 
 def rounded(values: Array, step: float) -> Array:
-    """Return the nearest multiples of a power of two."""
-    return np.asarray(np.rint(values * (1 / step)) * step)
+    """Return the nearest multiples of a power of two; no zero is negative."""
+    return np.asarray(np.rint(values * (1 / step)) * step + 0.0)

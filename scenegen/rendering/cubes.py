@@ -12,8 +12,9 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
+from scenegen.common.rotations import product
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.tables import gather_row, upload_table
+from scenegen.rendering.tables import gather_row, unit, upload_table
 
 SMALLEST = 1e-20  # least component of a direction, to avoid a division by zero
 
@@ -42,7 +43,7 @@ def upload_cubes(batch: SceneBatch) -> Cubes:
     first = np.where(batch.object_count > 0, batch.object_scale[:, 0], 1.0)
     scale = np.sqrt(3) / first[:, None, None] ** 2
     frame = np.swapaxes(batch.world_from_object[:, 0, :3, :3], 1, 2) * scale
-    center = batch.world_from_object[..., :3, 3] @ np.swapaxes(frame, 1, 2)
+    center = product(batch.world_from_object[..., :3, 3], np.swapaxes(frame, 1, 2))
     return Cubes(
         slots=batch.spec.object_slots,
         count=mi.UInt32(batch.object_count),
@@ -80,6 +81,6 @@ def closest_cube(cubes: Cubes, item: Any, o: Any, d: Any) -> Any:
     on_x = (at.x >= at.y) & (at.x >= at.z)
     on_y = ~on_x & (at.y >= at.z)
     face = dr.select(on_x, rows[0], dr.select(on_y, rows[1], rows[2]))
-    n = dr.normalize(face)
+    n = unit(face)
     n = dr.select(dr.dot(n, d) > 0, -n, n)
     return t, object_id, dr.select(object_id >= 0, n, mi.Vector3f(0))

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
+from scenegen.common.rotations import product
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.exact_surfaces import Surface
@@ -96,7 +97,7 @@ def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tu
         tree, offset = None, np.zeros((max(1, len(models)), 3))
         if spec.shadows:
             tree, offset = model_scene(variant, batch.shape_of, batch.names, models)
-        unit = UnitScene(tree, offset, np.zeros(len(offset), np.uint32), GRID, None)
+        unit = UnitScene(tree, offset, np.zeros(len(offset), np.uint32), GRID, None, None)
     mi.set_variant(variant)
     exact = upload_surfaces(surfaces)
     shape = np.maximum(batch.shape, 0)
@@ -107,7 +108,7 @@ def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tu
     objects = np.zeros((count, spec.object_slots, 4 * OBJECT))
     objects[..., :3], objects[..., 3] = center, batch.object_scale
     into = objects[..., 4:16].reshape(count, -1, 3, 4)  # a view
-    into[..., :3], into[..., 3] = linear, -np.einsum("bkij,bkj->bki", linear, center)
+    into[..., :3], into[..., 3] = linear, -product(linear, center[..., None])[..., 0]
     objects[..., 16:19] = exact.record[shape % len(exact.record)]
     objects[..., 20:23], objects[..., 23] = unit.offset[shape], unit.first_triangle[shape]
     about = np.zeros((count, BEFORE_LIGHTS + 6 * spec.light_slots))
@@ -125,7 +126,8 @@ def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tu
         slots=spec.object_slots,
         light_slots=spec.light_slots,
         surfaces=exact,
-        triangles=unit.normals,
+        normals=unit.normals,
+        corners=unit.corners,
         objects=upload_table(objects),
         scenes=upload_table(about),
         materials=upload_table(np.concatenate(materials, axis=-1)),

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
+from scenegen.common.rotations import product
 from scenegen.objects.solids import Mesh
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.tables import gather_packet, gather_row, upload_rows, upload_table
@@ -81,11 +82,11 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
     model = batch.shape[image, slot]
     threads = sizes[model]
     first_thread = np.cumsum(threads) - threads
-    camera_from_world = np.linalg.inv(batch.world_from_camera)[:, :3]
+    turn = np.swapaxes(batch.world_from_camera[:, :3, :3], 1, 2)
+    camera_from_world = np.concatenate([turn, -product(turn, batch.world_from_camera[:, :3, 3:])], 2)
     placed = np.zeros((max(1, len(model)), 13))
-    placed[: len(model), :12] = np.einsum(
-        "dij,djk->dik", camera_from_world[image], batch.world_from_object[image, slot]
-    ).reshape(-1, 12)
+    moved = product(camera_from_world[image], batch.world_from_object[image, slot])
+    placed[: len(model), :12] = moved.reshape(-1, 12)
     pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
     placed[: len(model), 12] = pixel[image]
 
@@ -148,7 +149,7 @@ def _cover(triangles: Triangles, keys: Any, thread: Any, start: Any, x: Any, y: 
     a, b, c, size = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
     left, top, columns, rows = _rectangle(triangles, a, b, c, size, x, y)
     area = mi.UInt32(columns * rows)
-    planes = [_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b)]
+    planes = [edge_plane(b, c), edge_plane(c, a), edge_plane(a, b)]
     normal = dr.cross(b - a, c - a)
     above = dr.dot(a, normal)
     nearest = -dr.maximum(a.z, dr.maximum(b.z, c.z))
@@ -226,7 +227,7 @@ def _barycentrics(triangles: Triangles, key: Any, dx: Any, dy: Any) -> tuple[Any
     draw = dr.gather(mi.UInt32, triangles.draw, thread, hit)
     a, b, c, _ = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
     sides = [
-        dx * n.x + dy * n.y - n.z for n in (_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b))
+        dx * n.x + dy * n.y - n.z for n in (edge_plane(b, c), edge_plane(c, a), edge_plane(a, b))
     ]
     total = sides[0] + sides[1] + sides[2]
     inverse = dr.select(total == 0, 0, 1 / total)
@@ -301,7 +302,7 @@ def _rectangle(
     return left, top, columns, rows
 
 
-def _edge_plane(a: Any, b: Any) -> Any:
+def edge_plane(a: Any, b: Any) -> Any:
     """Return a x b, computed from the ends in an order of their own: exactly -(b x a)."""
     less = (a.x < b.x) | ((a.x == b.x) & ((a.y < b.y) | ((a.y == b.y) & (a.z < b.z))))
     p, q = dr.select(less, a, b), dr.select(less, b, a)

@@ -14,6 +14,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+from scenegen.rendering.rasteriser import edge_plane
 from scenegen.rendering.shading import SHADOW_OFFSET
 from scenegen.rendering.surfaces.in_kernel import (
     MESH,
@@ -21,8 +22,9 @@ from scenegen.rendering.surfaces.in_kernel import (
     first_on_surface,
     normal_on_surface,
 )
-from scenegen.rendering.tables import PACKET, gather_packet, gather_row
+from scenegen.rendering.tables import PACKET, gather_packet, gather_row, unit
 
+MOST_NEIGHBOURS = 4  # triangles that are looked at for one hit
 OBJECT = 6  # packets of an object's row
 BEFORE_LIGHTS = 11  # floats of a scene's row
 
@@ -36,11 +38,12 @@ class Scenes:
         grid: as in `UnitScene`.
         slots, light_slots: K and L, the most objects and lights a scene can have.
         surfaces: the exact surfaces of the other shapes.
-        triangles: face normal and three corner normals of each triangle, (F, 12).
+        normals, corners: of the triangles of those meshes, as in `UnitScene`; None where they only
+            cast shadows.
         objects: of each slot, (B K, 24): bounding sphere (centre, radius, which is 0 if the slot is
             unused); three rows of the affine map into the unit shape's frame (linear, offset);
             `Surfaces.record` and an unused float; position in the unit scene and first row in
-            `triangles`.
+            `normals` and `corners`.
         scenes: of each scene, (B, 11 + 6 L): ambient, k_l, k_q, whether it has a room, number of
             objects, an unused float, radiance of rays that hit nothing; then position and colour
             of each light.
@@ -53,7 +56,8 @@ class Scenes:
     slots: int
     light_slots: int
     surfaces: Surfaces
-    triangles: Any
+    normals: Any
+    corners: Any
     objects: Any
     scenes: Any
     materials: Any
@@ -145,6 +149,42 @@ def _first_hit(scenes: Scenes, row: Any, start: Any, u: Any, reach: Any) -> tupl
             distance = dr.select(hit.is_valid(), hit.t, dr.inf)
             face = hit.prim_index
             uv = hit.prim_uv
+            if dr.hint(scenes.corners is not None, mode="scalar"):  # noqa: SIM102
+                if dr.hint(hit.is_valid(), exclude=[scenes]):
+                    distance, face, uv = _exact_hit(scenes, mi.UInt32(place[3]), face, start, u)
+    return distance, face, uv
+
+
+@dr.syntax
+def _exact_hit(scenes: Scenes, first: Any, face: Any, o: Any, u: Any) -> Any:
+    """Return distance (inf for none), triangle and barycentrics of a hit that Embree found.
+
+    Embree chooses its instructions by processor, and they round differently. So it only says near
+    which triangle the ray passes. Where it passes outside, within the overlap of neighbours, the
+    hit is on the neighbour.
+    """
+    distance = mi.Float(dr.inf)
+    uv = mi.Point2f(0)
+    tries = mi.UInt32(MOST_NEIGHBOURS)
+    while dr.hint(tries > 0, exclude=[scenes]):
+        row = gather_row(scenes.corners, first + face, 12)
+        a, b, c = (mi.Vector3f(*row[i : i + 3]) - mi.Vector3f(*o) for i in (0, 3, 6))
+        planes = [edge_plane(b, c), edge_plane(c, a), edge_plane(a, b)]
+        sides = mi.Vector3f(*(dr.dot(plane, u) for plane in planes))
+        total = sides.x + sides.y + sides.z
+        sides = sides * dr.sign(total)
+        least = dr.min(sides)
+        inside = (least >= 0) & (total != 0)
+        normal = dr.cross(b - a, c - a)
+        x = dr.dot(a, normal) / dr.dot(u, normal)
+        from_a = x * mi.Vector3f(*u) - a
+        v = dr.dot(dr.cross(from_a, c - a), normal) / dr.dot(normal, normal)
+        w = dr.dot(dr.cross(b - a, from_a), normal) / dr.dot(normal, normal)
+        distance = dr.select(inside, x, dr.inf)
+        uv = dr.select(inside, mi.Point2f(v, w), 0)
+        beyond = dr.select(sides.x == least, row[9], dr.select(sides.y == least, row[10], row[11]))
+        face = dr.select(inside, face, mi.UInt32(beyond))
+        tries = dr.select(inside, 0, tries - 1)
     return distance, face, uv
 
 
@@ -162,7 +202,7 @@ def normal_at(scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, face: A
         if dr.hint(MESH in scenes.surfaces.kinds, mode="scalar"):  # noqa: SIM102
             if dr.hint(record[0] == MESH, exclude=[scenes]):
                 first = mi.UInt32(gather_packet(scenes.objects, row * OBJECT + 5)[3])
-                table = gather_row(scenes.triangles, first + face, 12)
+                table = gather_row(scenes.normals, first + face, 12)
                 flat = mi.Vector3f(*table[:3])
                 smooth = (
                     (1 - uv.x - uv.y) * mi.Vector3f(*table[3:6])
@@ -187,11 +227,11 @@ def visible_normal(
     n = mi.Vector3f(mi.Float(on_x), mi.Float(on_y), mi.Float(~on_x & ~on_y))
     if dr.hint(object_id > 0, exclude=[scenes]):
         row = item * scenes.slots + mi.UInt32(object_id - 1)
-        n = dr.normalize(_to_world(scenes, row, smooth))
+        n = unit(_to_world(scenes, row, smooth))
         n = dr.select(dr.dot(_to_world(scenes, row, flat), d) > 0, -n, n)
         # A smooth normal may lean away just inside a silhouette: make it perpendicular to the ray.
         away = dr.dot(n, d)
-        n = dr.select(away > 0, dr.normalize(n - away / dr.dot(d, d) * d), n)
+        n = dr.select(away > 0, unit(n - away / dr.dot(d, d) * d), n)
     return dr.select(object_id >= 0, n, mi.Vector3f(0))
 
 
@@ -221,7 +261,7 @@ def radiance_at(
     material = gather_row(scenes.materials, row, 5 if scenes.glossy else 3)
     if scenes.glossy:
         specular, shininess = material[3:]
-        mirrored = dr.normalize(d - 2 * dr.dot(d, n) * n)  # the viewing ray, mirrored
+        mirrored = unit(d - 2 * dr.dot(d, n) * n)  # the viewing ray, mirrored
     for j in range(scenes.light_slots):
         light = record[BEFORE_LIGHTS + 6 * j :][:6]
         to_light = mi.Vector3f(*light[:3]) - p

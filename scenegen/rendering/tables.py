@@ -54,3 +54,11 @@ def gather_row(table: Any, row: Any, width: int) -> list[Any]:
     count = -(-width // PACKET)
     packets = [gather_packet(table, row * count + i) for i in range(count)]
     return [packet[i] for packet in packets for i in range(PACKET)][:width]
+
+
+def unit(vector: Any) -> Any:
+    """Return vectors divided by their lengths, with the same bits on every processor.
+
+    `dr.normalize` multiplies by the processor's own approximation of 1 / sqrt(x).
+    """
+    return vector / dr.sqrt(dr.dot(vector, vector))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.records import check
-from scenegen.objects.cast_meshes import normal_table, overlapping
+from scenegen.objects.cast_meshes import corner_table, normal_table, overlapping
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering.tables import upload_table
 
@@ -33,8 +33,8 @@ class UnitScene:
         first_triangle: each shape's first row in `normals`, or NO_TRIANGLE, (S,)
             uint32.
         grid: spacing of the grid from whose points rays start; 0 if they may start anywhere.
-        normals: face normal and three corner normals of each triangle, (1 + F, 12) as a table of
-            `tables.upload_table`; row 0 belongs to no triangle.
+        normals, corners: of each triangle, as from `cast_meshes.normal_table` and `corner_table`,
+            (1 + F, 12) as tables of `tables.upload_table`; row 0 belongs to no triangle.
     """
 
     scene: Any
@@ -42,6 +42,7 @@ class UnitScene:
     first_triangle: Array
     grid: float
     normals: Any
+    corners: Any
 
 
 @lru_cache(maxsize=4)
@@ -52,15 +53,16 @@ def unit_scene(variant: str, shapes: tuple[UnitShape, ...]) -> UnitScene:
     cell = np.stack(np.unravel_index(np.arange(len(shapes)), (side, side, side)), axis=1)
     offset = (cell - (side - 1) / 2) * LATTICE
     contents: dict[str, Any] = {"type": "scene"}
-    tables = []
+    normals, corners = [], []
     for shape, place in zip(shapes, offset, strict=True):
-        if shape.surface is None:
+        meshed = shape.surface is None
+        if meshed:
             contents[shape.name] = mitsuba_shape(shape, place)
-            tables.append(normal_table(shape))
-        else:
-            tables.append(np.empty((0, 12), np.float32))
-    first_triangle, normals = stacked(tables)
-    return UnitScene(mi.load_dict(contents), offset, first_triangle, 0.0, normals)
+        normals.append(normal_table(shape) if meshed else np.empty((0, 12), np.float32))
+        corners.append(corner_table(shape) if meshed else np.empty((0, 12), np.float32))
+    first_triangle, table = stacked(normals)
+    scene = mi.load_dict(contents)
+    return UnitScene(scene, offset, first_triangle, 0.0, table, stacked(corners)[1])
 
 
 def stacked(tables: Sequence[Array]) -> tuple[Array, Any]:

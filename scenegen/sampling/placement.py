@@ -9,14 +9,13 @@ passes between any two objects of a scene. Supports move with their bodies, so t
 orientation are computed once for all places tried.
 """
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import look_at
+from scenegen.camera import half_angle, look_at
 from scenegen.common.rotations import cos_sin
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
@@ -106,7 +105,8 @@ def border_normals(fov_y_degrees: float, height: int, width: int) -> Array:
 
     They are unit vectors within DIRECTION_STEP, of which they are multiples.
     """
-    half_y = math.tan(math.radians(fov_y_degrees) / 2)
+    cosine, sine = half_angle(fov_y_degrees)
+    half_y = sine / cosine
     half_x = half_y * width / height
     normals = np.array([[1, 0, half_x], [-1, 0, half_x], [0, 1, half_y], [0, -1, half_y]])
     length = np.sqrt(1 + np.array([half_x, half_x, half_y, half_y]) ** 2)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import PlacementError
 from scenegen.common.random.seeding import Purpose, item_numbers
-from scenegen.common.rotations import rotation_matrix
+from scenegen.common.rotations import product, rotation_matrix
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
@@ -176,6 +176,6 @@ def _place_objects(
             who, best, looking = looking[done], best[done], looking[~done]
             position[who, slot], rotation[who, slot] = place[best], turn[best]
             scale[who, slot] = size[best]
-            placed[who, slot] = place[best] @ SEPARATORS.T + reach[best]
+            placed[who, slot] = product(place[best], SEPARATORS.T) + reach[best]
         going[looking] = False
     return going, position, rotation, scale

@@ -10,6 +10,7 @@ import scenegen
 from scenegen.common.recent import Recent
 from scenegen.objects.cache import DiskCache
 from scenegen.objects.cast_meshes import cast_mesh
+from scenegen.objects.coarse_hulls import POINT_STEP, rounded
 from scenegen.objects.families.members import check_member, make_member
 from scenegen.objects.families.parts.assembly import UPRIGHT
 from scenegen.objects.solids import Array, Mesh, UnitShape, no_mesh
@@ -56,7 +57,10 @@ class MemberStore:
 
     def _made(self, family: str, number: int, key: str) -> dict[str, Array]:
         shape = make_member(family, number)
-        mesh = cast_mesh(shape.mesh)
+        mesh = shape.mesh
+        # Cosines and sums differ in their last bits between processors, and what is 0 may be 1e-17.
+        placed = None if mesh.normals is None else rounded(mesh.normals, POINT_STEP)
+        mesh = cast_mesh(Mesh(rounded(mesh.vertices, POINT_STEP), mesh.faces, placed))
         outline = {name: getattr(shape, name) for name in _OUTLINE}
         arrays = {**outline, **{name: getattr(mesh, name) for name in _MESH}}
         self._disk.write(key, arrays)

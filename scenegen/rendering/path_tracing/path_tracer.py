@@ -24,6 +24,7 @@ from scenegen.rendering.ground_truth import encode_image
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.path_tracing.phong_material import phong_bsdf
 from scenegen.rendering.pixel_samples import sample_positions
+from scenegen.rendering.tables import unit
 from scenegen.rendering.unit_scene import triangle_mesh
 
 Array = NDArray[Any]
@@ -48,24 +49,27 @@ def _trace_one(batch: SceneBatch, b: int, integrator: Any) -> Array:
     pixels = spec.height * spec.width
     right, up, back, origin = (mi.Vector3f(*v) for v in batch.world_from_camera[b, :3].T.tolist())
     size = pixel_size(spec.height, float(batch.fov_y_degrees[b]))
-    seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, int(batch.view[b]))
     places = sample_positions(spec.spp)
     total = np.zeros((pixels, 3))
     at_once = max(1, RAYS_AT_ONCE // pixels)
-    for start in range(0, spec.spp, at_once):
+    for number, start in enumerate(range(0, spec.spp, at_once)):
         positions = places[start : start + at_once]
         count = len(positions)
         # Multi-jittered samples are less noisy, but need a count that fills a rectangle.
         kind = "independent" if count % math.isqrt(count) else "multijitter"
         sampler = mi.load_dict({"type": kind, "sample_count": count})
         sampler.set_samples_per_wavefront(count)
-        sampler.seed((seed + start) % 2**32, pixels * count)
+        # Mitsuba keys the numbers of pixel p by count * p + seed: with neighbouring seeds, one pass
+        # would repeat those of another for a pixel nearby.
+        stream = number * len(spec.views) + int(batch.view[b])
+        seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, stream)
+        sampler.seed(seed, pixels * count)
         index = dr.arange(mi.UInt32, pixels * count)
         pixel, sample = index // count, index % count
         x = mi.Float(pixel % spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 0]), sample)
         y = mi.Float(pixel // spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 1]), sample)
         d = right * ((x - spec.width / 2) * size) + up * ((spec.height / 2 - y) * size) - back
-        ray = mi.RayDifferential3f(mi.Point3f(origin), dr.normalize(d))
+        ray = mi.RayDifferential3f(mi.Point3f(origin), unit(d))
         radiance, valid, _ = integrator.sample(scene, sampler, ray)
         radiance = dr.select(valid, radiance, mi.Color3f(*batch.background[b].tolist()))
         values = np.asarray(dr.ravel(radiance), np.float64)

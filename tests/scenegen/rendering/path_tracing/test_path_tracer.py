@@ -210,7 +210,8 @@ def test_samples_in_several_goes_make_the_same_picture(spp, monkeypatch, variant
     best = render(pack(replace(PATH, spp=512), [scene])).image  # in one go: shares no noise
     once, two = render(batch).image, render(pack(replace(PATH, spp=2), [scene])).image
     path_tracer = importlib.import_module("scenegen.rendering.path_tracing.path_tracer")
-    monkeypatch.setattr(path_tracer, "RAYS_AT_ONCE", 2 * 24 * 32)
+    tracer = "scenegen.rendering.path_tracing.path_tracer"
+    monkeypatch.setattr(importlib.import_module(tracer), "RAYS_AT_ONCE", 2 * 24 * 32)
     parts = render(batch).image
     assert parts.tobytes() != once.tobytes()
     error_once, error_parts, error_two = (
@@ -218,3 +219,27 @@ def test_samples_in_several_goes_make_the_same_picture(spp, monkeypatch, variant
     )
     assert error_parts < 1.2 * error_two * (2 / spp) ** 0.5, "no noise is drawn twice"
     assert error_parts < 1.8 * error_once, "but 16 at once are spread more evenly"
+
+
+@pytest.mark.parametrize("passes", [1, 2, 8])
+def test_noise_of_neighbours_is_independent_and_falls_with_the_samples(
+    passes, variant, monkeypatch
+):
+    """However many passes an image takes."""
+    side, spp = 192, 16
+    tracer = "scenegen.rendering.path_tracing.path_tracer"
+    monkeypatch.setattr(importlib.import_module(tracer), "RAYS_AT_ONCE", side * side * spp // passes)
+    room = replace(OPEN, objects=(), room_reflectance=(0.7,) * 3, ambient=(0.3,) * 3)
+    spec = replace(PATH, height=side, width=side, objects=(0, 0), lights=(1, 1), spp=spp)
+
+    def noise(**settings):
+        a, b = (render(pack(replace(spec, seed=s, **settings), [room])).image[0] for s in (1, 2))
+        return (a - b).mean(axis=-1) / np.maximum(a + b, 1e-3).mean(axis=-1)
+
+    found = noise()
+    assert found.std() > 1e-3
+    for lag in (1, 2, 3, 4):
+        for ahead, behind in ((found[:, lag:], found[:, :-lag]), (found[lag:], found[:-lag])):
+            assert abs(np.corrcoef(ahead.ravel(), behind.ravel())[0, 1]) < 0.02
+    few = noise(spp=spp // passes) if passes > 1 else found
+    assert few.var() / found.var() == pytest.approx(passes, rel=0.15)

@@ -1,0 +1,95 @@
+"""`bench sets`: the named test sets, and making them."""
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+import click
+
+from scenegen.command_line.groups import EXAMPLE
+from scenegen.command_line.options import WORKERS
+from scenegen.command_line.output import print_line
+from scenegen.command_line.paths import OutputFolder
+
+
+@click.group("sets", invoke_without_command=True, epilog=EXAMPLE + "bench sets make rooms-1")
+@click.pass_context
+def sets_command(context: click.Context) -> None:
+    """List the named test sets, or make one."""
+    if context.invoked_subcommand is None:
+        _list()
+
+
+def _list() -> None:
+    from metrics.scoring import known_tests
+
+    for name, files in known_tests.sets().items():
+        print_line(f"{name}: {files[0].purpose}")
+        print_line(f"  {files[0].command}")
+        for test in files:
+            print_line(f"  {test.digest}  {test.rows:,} {_rows(test.task)}, {test.file}")
+    print_line("made by older versions, whose bits were others:")
+    for test in known_tests.KNOWN_TESTS:
+        if test.superseded:
+            print_line(f"  {test.digest}  {test.rows:,} {_rows(test.task)}, {test.name}")
+
+
+def _rows(task: str) -> str:
+    return "images" if task == "rooms" else "questions"
+
+
+@sets_command.command("make", epilog=EXAMPLE + "bench sets make rooms-1 --out sets")
+@click.argument("name")
+@click.option("--out", type=OutputFolder(), default="sets", show_default=True, help="Folder.")
+@WORKERS
+def make(name: str, out: str, workers: int) -> None:
+    """Make a test set, and check that its truth is the published one.
+
+    Files that are there already are kept and checked. Where a run was ended, the same command goes
+    on.
+    """
+    from metrics.scoring import known_tests
+    from scenegen.common.names import check_choice
+
+    sets = known_tests.sets()
+    check_choice("set", name, sets)
+    folder, files = Path(out), sets[name]
+    if not all((folder / test.file).exists() for test in files):
+        folder.mkdir(parents=True, exist_ok=True)
+        whole = folder / files[0].file if len(files) == 1 else folder
+        words = [*shlex.split(files[0].command), "--out", str(whole), "--workers", str(workers)]
+        _run(words)
+    wrong = [test.file for test in files if not _is_published(folder, test)]
+    if wrong:
+        print_line(f"{name}: not the published set: {', '.join(wrong)}")
+        sys.exit(1)
+    print_line(f"{name}: the published set")
+
+
+def _run(words: list[str]) -> Any:
+    """Run a command of another group, in this process."""
+    from iqtt.commands.making import make_split
+    from scenegen.commands.making import render
+
+    typed, sys.argv = sys.argv, words  # files record the command that made them
+    try:
+        return {"render": render, "make-split": make_split}[words[1]].main(
+            words[2:], prog_name=" ".join(words[:2]), standalone_mode=False
+        )
+    finally:
+        sys.argv = typed
+
+
+def _is_published(folder: Path, test: Any) -> bool:
+    """Print how a file compares with the published one; return whether they are equal."""
+    from metrics.scoring.truth_digests import file_digest
+
+    found, rows = file_digest(folder / test.file, test.task)
+    same = found == test.digest
+    what = "as published" if same else f"published: {test.rows:,} rows, {test.digest}"
+    print_line(f"{folder / test.file}: {rows:,} rows, {found}, {what}")
+    return same
+
+
+COMMANDS = (sets_command,)
