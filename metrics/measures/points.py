@@ -47,6 +47,22 @@ def departures(points: Array, true_depth: Array, rays: Array, on_rays: bool) -> 
     return np.concatenate([(depth - true_depth)[:, None], aside], axis=1)
 
 
+def pixels_off_rays(points: Array, rays: Array, pitch: float) -> Array:
+    """Return how far from its pixel's centre the camera sees each point, (N,), in pixels.
+
+    Infinite for points that are not in front of the camera.
+
+    Args:
+        points: camera frame, (N, 3).
+        rays: those of their pixels, (N, 3), with z = -1.
+        pitch: the pixel size on the plane at depth 1.
+    """
+    ahead = points[:, 2] < 0.0
+    depth = np.where(ahead, -points[:, 2], 1.0)[:, None]
+    off = np.linalg.norm(points[:, :2] / depth - rays[:, :2], axis=-1) / pitch
+    return np.asarray(np.where(ahead, off, np.inf))
+
+
 def local_point_scores(points: Array, true_points: Array, object_id: Array) -> dict[str, float]:
     """Return `local_points_rel` and `local_points_delta_1`: means over objects, each fitted alone.
 

@@ -69,9 +69,7 @@ KNOWN_TESTS = (
         f"{_RENDER} --size 64 --shadows",
         "rooms-1 where objects cast shadows",
     ),
-    KnownTest(
-        "rooms-128-1", "rooms", "", 1500, _RENDER, "rooms-1 at 128 pixels"
-    ),
+    KnownTest("rooms-128-1", "rooms", "", 1500, _RENDER, "rooms-1 at 128 pixels"),
     KnownTest(
         "objects-1",
         "rooms",
@@ -81,9 +79,7 @@ KNOWN_TESTS = (
         "rooms of built-in objects that no training set shows",
     ),
     *(
-        KnownTest(
-            f"rotation-1/{kind}", "iqtt", digest, 500, _QUESTIONS, "mental rotation, by kind"
-        )
+        KnownTest(f"rotation-1/{kind}", "iqtt", digest, 500, _QUESTIONS, "mental rotation, by kind")
         for kind, digest in _ROTATION_1.items()
     ),
     KnownTest(

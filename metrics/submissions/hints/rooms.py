@@ -3,6 +3,7 @@
 from metrics.submissions.hints.depth import depth_hints, disparity_hints
 from metrics.submissions.hints.normals import normal_hints
 from metrics.submissions.hints.order import order_hints
+from metrics.submissions.hints.points import point_hints
 from metrics.submissions.hints.samples import sample_rooms
 from metrics.submissions.problems import Problem
 from metrics.submissions.reader import RoomPredictions
@@ -21,6 +22,8 @@ def room_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]:
         hints = disparity_hints(samples)
     else:
         hints = depth_hints(samples, predictions.alignment, predictions.kind)
+    if predictions.kind == "points":
+        hints += point_hints(samples, predictions.alignment)
     if predictions.has_normals:
         hints += normal_hints(samples)
     return hints + order_hints(predictions, truth)

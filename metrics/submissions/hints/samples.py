@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from metrics.submissions.reader import RoomPredictions
 from metrics.submissions.rules import LARGEST
-from scenegen.camera import pixel_directions
+from scenegen.camera import pixel_directions, pixel_size
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
@@ -25,19 +25,37 @@ class Sample:
         depth: predicted planar depth, (h, w), or disparity.
         true_depth: scene units, (h, w).
         mask: where both are finite, (h, w).
-        stretch: length of the ray at depth 1: distance along the ray is depth times this, (h, w).
+        rays: directions of the pixels, (h, w, 3), with z = -1.
+        pitch: the pixel size of the whole image on the plane at depth 1.
+        points: predicted, camera frame, (h, w, 3); None where depth is predicted.
         normal: predicted, (h, w, 3); None where there are none.
         true_normal: camera frame, (h, w, 3).
         camera_from_world: rotation, (3, 3).
+        position: of the camera, world, (3,).
+        fov_y_degrees: vertical field of view.
     """
 
     depth: Array
     true_depth: Array
     mask: Array
-    stretch: Array
+    rays: Array
+    pitch: float
+    points: Array | None
     normal: Array | None
     true_normal: Array
     camera_from_world: Array
+    position: Array
+    fov_y_degrees: float
+
+    @property
+    def stretch(self) -> Array:
+        """Length of the ray at depth 1: distance along the ray is depth times this, (h, w)."""
+        return np.asarray(np.linalg.norm(self.rays, axis=-1))
+
+    @property
+    def true_points(self) -> Array:
+        """Camera frame, scene units, (N, 3), of the mask."""
+        return np.asarray((self.rays * self.true_depth[..., None])[self.mask])
 
 
 def sample_rooms(predictions: RoomPredictions, truth: RoomsFile) -> list[Sample]:
@@ -70,15 +88,23 @@ def _sample(predictions: RoomPredictions, i: int, truth: RoomsFile) -> Sample | 
     grid = np.ix_(mirrored_grid(height, SIDE), mirrored_grid(width, SIDE))
     fov = float(truth.read("camera/fov_y_degrees", row))
     true_depth = truth.read("depth", row)[grid].astype(np.float64)
+    pose = truth.read("camera/world_from_camera", row)
     usable = np.isfinite(true_depth) & (np.abs(depth[grid]) <= LARGEST)
+    points = predictions.geometry(i)[grid] if predictions.kind == "points" else None
+    if points is not None:
+        usable &= (np.abs(points) <= LARGEST).all(axis=-1)
     if 2 * np.count_nonzero(usable) < usable.size:
         return None
     return Sample(
         depth[grid],
         true_depth,
         usable,
-        np.linalg.norm(pixel_directions(height, width, fov)[grid], axis=-1),
+        pixel_directions(height, width, fov)[grid],
+        pixel_size(height, fov),
+        points,
         None if normal is None else normal[grid],
         truth.read("normal", row)[grid].astype(np.float64),
-        truth.read("camera/world_from_camera", row)[:3, :3].T,
+        pose[:3, :3].T,
+        pose[:3, 3],
+        fov,
     )

@@ -187,6 +187,7 @@ def test_heads_of_wide_tables_are_as_narrow_as_their_columns():
     )
     lines = to_text("", [table], width=30).splitlines()
     assert [line.split() for line in lines] == [
-        ["a", "very"], ["long", "head:"], ["method", "skill", "b"], ["mine", "0.1", "[0,", "1]", "2"]
+        ["a", "very"], ["long", "head:"], ["method", "skill", "b"],
+        ["mine", "0.1", "[0,", "1]", "2"],
     ]  # fmt: skip
     assert len(to_text("", [table], width=60).splitlines()) == 2
