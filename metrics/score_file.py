@@ -63,7 +63,7 @@ from scenegen.common.text_table import by_number
 from scenegen.files.new_file import written_beside
 
 FORMAT_NAME = "pix2shape-bench/scores"
-FORMAT_VERSION = "1.1"
+FORMAT_VERSION = "2.0"
 MOST_BYTES = 256 * 2**20  # more images than may be parsed, see `strict_json.MOST_MEMORY`
 MOST_KEYS = 10_000  # of one object
 ROUNDING = 1e-9  # by which an accuracy may lie outside of its interval
@@ -104,7 +104,7 @@ class _Stored:
 
     __pydantic_config__ = ConfigDict(extra="forbid")
     format: Literal["pix2shape-bench/scores"]
-    format_version: Literal["1.0", "1.1"]
+    format_version: Literal["1.0", "2.0"]
     task: Task
     method: Name
     alignment: Alignment
@@ -204,7 +204,7 @@ def _naming(path: str | Path) -> Iterator[None]:
 def _parsed(data: bytes) -> ScoreFile:
     """Return the scores in the bytes of a file. Raises JsonError at the first wrong thing."""
     try:
-        stored = validated(_Stored, parse_json(data, MOST_KEYS))
+        stored = validated(_Stored, _without_noise(parse_json(data, MOST_KEYS)))
     except JsonError as error:
         hint = SCORE_AGAIN if error.where == "format_version" else ""
         raise JsonError(error.where, error.found, error.expected, hint) from error
@@ -226,10 +226,19 @@ def _parsed(data: bytes) -> ScoreFile:
         objects,
         stored.answer_groups,
         shown=stored.shown,
+        older=stored.format_version != FORMAT_VERSION,
     )
     _check_meta(scores)
     _check_groups(scores)
     return scores
+
+
+def _without_noise(document: Any) -> Any:
+    """Leave out the noise floors of format 1.0, which were no floor of anything."""
+    meta = document.get("meta") if isinstance(document, dict) else None
+    if isinstance(meta, dict) and document.get("format_version") == "1.0":
+        meta.pop("noise_floors", None)
+    return document
 
 
 def _mend_angles(items: dict[str, Any]) -> None:
@@ -391,8 +400,6 @@ def _check_meta(scores: ScoreFile) -> None:
         raise refusal("meta.resamples", shown(meta.resamples), expected)
     if len({submission.sha256 for submission in meta.submissions}) < scores.runs:
         raise refusal("meta.submissions", "the same sha256 twice", "each submission once")
-    for name in meta.noise_floors:
-        _known_metric(f"meta.noise_floors.{name:.60}", name, "rooms" if task == "rooms" else "-")
 
 
 def _check_groups(scores: ScoreFile) -> None:

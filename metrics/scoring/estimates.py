@@ -15,6 +15,7 @@ from metrics.measures.statistics import (
     cluster_means,
     clustered_wilson_interval,
     linearised_means,
+    wilson_interval,
 )
 from metrics.scoring.metric_names import (
     BEHIND,
@@ -123,8 +124,10 @@ def estimates(scores: Mapping[str, Array], scene: Array, bootstrap: Bootstrap) -
     for names, there in by_presence(scores):
         runs = np.stack([scores[name][:, there] for name in names], axis=-1)  # (R, M, K)
         means = cluster_means(runs.mean(axis=0), scene[there])
-        low, high = bootstrap_interval(means, *bootstrap)
         value = means.mean(axis=0)
+        low, high = bootstrap_interval(means, *bootstrap)
+        for k, name in enumerate(names):
+            low[k], high[k] = with_width(means[:, k], low[k], high[k], metric(name).unit)
         each = np.stack([cluster_means(run, scene[there]).mean(axis=0) for run in runs])
         for k, name in enumerate(names):
             means_of[name] = Score(
@@ -136,6 +139,17 @@ def estimates(scores: Mapping[str, Array], scene: Array, bootstrap: Bootstrap) -
                 float(each[:, k].std(ddof=1)) if len(each) > 1 else None,
             )
     return {name: means_of[name] for name in scores if name in means_of}
+
+
+def with_width(means: Array, low: float, high: float, unit: str) -> tuple[float, float]:
+    """Return an interval of fractions, means (S,) of scenes; Wilson's where all are 0, or all 1.
+
+    No resample differs from the others then, but S scenes do not show that the next is the same.
+    """
+    same = unit == "fraction" and len(means) > 1 and means[0] in (0.0, 1.0)
+    if not same or (means != means[0]).any():
+        return low, high
+    return wilson_interval(float(means.sum()), len(means), CONFIDENCE)
 
 
 def grouped_estimates(
@@ -199,10 +213,13 @@ def skills(
         if not kept:
             continue
         ends = skill_intervals(errors[:, kept], floors[:, kept], *bootstrap)
-        for k, low, high in zip(kept, *ends, strict=True):
-            name, value = group[k], values[k]
+        for k, *interval in zip(kept, *ends, strict=True):
+            (low, high), name, value = interval, group[k], values[k]
             assert value is not None
             # The ends belong to the value but for rounding; min and max keep what is not a number.
+            if value == 1.0 and higher[k]:
+                low, high = with_width(1.0 - errors[:, k], low, high, metric(name).unit)
+                low = (low - float(floor[k])) / (1.0 - float(floor[k]))
             span = finite(min(low, value)), finite(max(high, value))
             if all(abs(end) <= ROUNDING for end in (value, *span) if end is not None):
                 value = 0.0
@@ -226,6 +243,8 @@ def accuracy(right: Array, shapes: Array, bootstrap: Bootstrap) -> Score:
         return Score(count / questions, *ends, unit, questions, None)
     each = right.mean(axis=0)
     low, high = bootstrap_interval(linearised_means(each, shapes), *bootstrap)
+    if each.min() == each.max() and each[0] in (0.0, 1.0):
+        low, high = np.array([clustered_wilson_interval(each, shapes)]).T
     std = float(right.mean(axis=1).std(ddof=1))
     return Score(float(each.mean()), finite(low[0]), finite(high[0]), unit, questions, std)
 

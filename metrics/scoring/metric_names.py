@@ -61,6 +61,11 @@ SHOWN_AS_MUCH = {
     "first_view": (EMPTY_ROOM, BALLS, BLOCKS),
     "no_view": (EMPTY_ROOM,),
 }
+# Scores that have another definition in score files of format 1.0.
+_SURFACES = (
+    "chamfer", "accuracy_distance", "completeness_distance", "hausdorff", "f_score_",
+    "object_completeness", "object_recall_", "behind_recall_", "boundary_", "derived_",
+)  # fmt: skip
 WHOSE = {
     EMPTY_ROOM: "empty room",
     CUT_OUT: "flat cut-out",
@@ -438,6 +443,11 @@ def metric(name: str) -> Metric:
         hint = did_you_mean(name, ALL)
         raise UnknownMetricError("score", f"{name!r:.60}", "a name listed in docs/scores.md", hint)
     return ALL[name]
+
+
+def changed(name: str) -> bool:
+    """Return whether a score has another definition in score files of format 1.0."""
+    return name.startswith(_SURFACES)
 
 
 def in_order(names: Iterable[str]) -> list[str]:

@@ -142,8 +142,6 @@ class Meta:
         counts: how many there are of each of `COUNTS`: rows or questions of the truth, rows with
             values that had to be penalised, pixels of an image, answers to each question, and
             abstentions of all runs.
-        noise_floors: by name of the score, what two samples of the true surface score against each
-            other at this resolution; none for scores whose floor is 0, and for questions.
         question_floors: of the kinds of questions, where they are known.
     """
 
@@ -159,7 +157,6 @@ class Meta:
     seed: Whole
     resamples: Whole
     counts: ByKey[Whole]
-    noise_floors: ByKey[NotNegative] = field(default_factory=dict)
     question_floors: TupleOf[Floor] = ()
 
     @property
@@ -191,6 +188,8 @@ class ScoreFile:
         answer_groups: questions only: by grouping, then by group.
         path: where it was read from; no part of the content.
         shown: rooms: which image of a scene the method was shown.
+        older: whether it was read from a file of an older format, in which scores of CHANGED have
+            other definitions.
     """
 
     task: Task
@@ -202,6 +201,7 @@ class ScoreFile:
     answer_groups: AnswerGroups = field(default_factory=dict)
     path: Path | None = None
     shown: Shown = "scored_view"
+    older: bool = False
 
     @property
     def runs(self) -> int:
@@ -217,6 +217,11 @@ class ScoreFile:
     def clusters(self) -> Array:
         """The scene of each image, whose errors are correlated; each question by itself, (N,)."""
         return self.columns["scene_index" if self.task == "rooms" else "question"]
+
+    @property
+    def truth(self) -> tuple[Task, str]:
+        """The test set: scores are of the same one where these are equal, and only there."""
+        return self.task, self.meta.truth_digest
 
     @property
     def shown_of_several(self) -> Shown | None:

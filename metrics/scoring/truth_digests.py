@@ -27,6 +27,14 @@ def view_digests(view: TrueView) -> RowDigests:
     return tuple(row_digest(getattr(view, name)) for name in PER_PIXEL)
 
 
+def stored_digest(truth: "RoomsFile | AnswersFile") -> str | None:
+    """Return the digest that an open truth states of itself; None where it states none."""
+    if isinstance(truth, RoomsFile):
+        digest = truth.attributes.get("truth_digest")
+        return digest if isinstance(digest, str) else None
+    return truth.stored_truth_digest
+
+
 def rooms_digest(truth: RoomsFile, scored: Mapping[int, RowDigests]) -> str:
     """Return the digest of a truth of which some rows were scored; the others are read here.
 

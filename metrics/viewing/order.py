@@ -13,6 +13,7 @@ from metrics.scoring.metric_names import OF_TRUTH, OTHER_SCENE, in_order, metric
 from metrics.scoring.records import ID_COLUMNS, OPTIONAL_COLUMNS
 from metrics.scoring.rows import score_rows
 from metrics.scoring.runs import Progress, ScoringError, Settings, matched_rows
+from metrics.scoring.truth_digests import stored_digest
 from metrics.submissions.reader import Predictions, RoomPredictions
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
@@ -93,9 +94,10 @@ def _chosen(items: Sequence[int] | None, there: Array, path: str | Path) -> Arra
 def _stored_scores(path: str | Path, predictions: RoomPredictions, truth: RoomsFile) -> RowScores:
     """Read the scores of a submission from a score file."""
     scores = read_scores(path)
-    if scores.task != "rooms" or scores.meta.truth_fingerprint != truth.fingerprint:
-        expected = f"those of {truth.path}, fingerprint {truth.fingerprint:.12}"
-        found = f"scores of {scores.task} with fingerprint {scores.meta.truth_fingerprint:.12}"
+    digest = stored_digest(truth)
+    if scores.truth != ("rooms", digest):
+        expected = f"those of {truth.path}, truth of digest {digest or 'none':.12}"
+        found = f"scores of {scores.task}, truth of digest {scores.meta.truth_digest:.12}"
         raise ScoringError(path, found, expected)
     if predictions.sha256 not in {run.sha256 for run in scores.meta.submissions}:
         found = f"scores of {', '.join(run.path for run in scores.meta.submissions)}"

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from metrics.scoring.records import ScoreFile
+from metrics.scoring.truth_digests import stored_digest
 from scenegen.common.errors import SceneGenError
 from scenegen.files import trial
 
@@ -57,12 +58,11 @@ def _truth_digest(file: ScoreFile, path: Path) -> str | None:
             from scenegen.rooms.reader import RoomsFile
 
             with RoomsFile(path) as rooms:
-                digest = rooms.attributes.get("truth_digest")
-                return digest if isinstance(digest, str) else None
+                return stored_digest(rooms)
         from iqtt.files.reader import AnswersFile
 
         with AnswersFile(path) as answers:
-            return answers.stored_truth_digest
+            return stored_digest(answers)
     except (OSError, SceneGenError):
         return None
 

@@ -112,7 +112,7 @@ def _require_same_truth(scores: ScoreFile, beside: Sequence[ScoreFile]) -> None:
     expected = scores.task, scores.meta.truth_digest[:12]
     for file in beside:
         found = file.task, file.meta.truth_digest[:12]
-        if found != expected:
+        if file.truth != scores.truth:
             raise BesideError(
                 file.place,
                 "scores of {}, truth of digest {}".format(*found),

@@ -97,7 +97,7 @@ def headline_rows(scores: ScoreFile) -> Table:
 def floor_text(scores: ScoreFile, name: str) -> str:
     """Return the name of the floor of a score that has a skill."""
     if scores.task == "rooms":
-        return WHOSE[str(scores.floor_of(name))]
+        return WHOSE[scores.skills[name].floor_name[: -len(name)]]
     return scores.skills[name].floor_name
 
 

@@ -21,7 +21,7 @@ from metrics.scoring.known_tests import KNOWN_TESTS
 from metrics.scoring.records import GROUPINGS
 from metrics.submissions.strict_json import LONGEST_SHOWN, refusal
 
-ROOMS = json.loads(to_json(made_scores.simple_rooms(noise_floors={"chamfer": 0.01})))
+ROOMS = json.loads(to_json(made_scores.simple_rooms()))
 RUNS = json.loads(to_json(made_scores.simple_rooms(runs=2)))
 OBJECTS = json.loads(to_json(made_scores.rooms_with_objects()))
 IQTT = json.loads(to_json(made_scores.iqtt_scores("m", [1, 0, 1, 1])))
@@ -35,7 +35,7 @@ def read_again(scores, folder):
 
 @pytest.mark.parametrize("runs", [1, 3])
 def test_what_is_written_reads_back_to_the_same_bits(runs, tmp_path):
-    scores = made_scores.rooms_with_objects(runs=runs, noise_floors={"chamfer": 0.1 + 0.2})
+    scores = made_scores.rooms_with_objects(runs=runs)
     other = read_again(scores, tmp_path)
     assert other.path == tmp_path / "s.json"
     for name in ("task", "method", "alignment", "shown", "meta"):
@@ -237,7 +237,7 @@ GROUP = {"n": 4, "right": [3], "low": None, "high": None}
 WRONG_ROOMS = [
     ("format", GONE, "", "to be there"),
     ("format", "pix2shape-bench/rooms", "", "'pix2shape-bench/scores'"),
-    ("format_version", "3.0", "", "'1.1'"),
+    ("format_version", "3.0", "", "'2.0'"),
     ("task", "room", "", "'rooms' or 'iqtt'"),
     ("method", 3, "", "text"),
     ("method", "m" * 201, "", "at most 200"),
@@ -288,7 +288,6 @@ WRONG_ROOMS = [
     ("meta/counts/rows_in_truth", 3, "", "more than 3"),
     ("meta/counts/rows_penalised", 5, "", "at most 4"),
     ("meta/truth_digest", KNOWN_TESTS[0].digest, "meta.counts.rows_in_truth", "8, as"),
-    ("meta/noise_floors", {"mine": 1}, "meta.noise_floors.mine", "docs"),
 ]
 WRONG_RUNS = [
     ("meta/submissions/1", RUNS["meta"]["submissions"][0], "meta.submissions", "once"),
@@ -319,7 +318,6 @@ WRONG_QUESTIONS = [
     ("meta/counts/answers", 0, "", "2 or 3"),
     ("meta/counts/answers", GONE, "meta.counts", "answers"),
     ("meta/truth_digest", KNOWN_TESTS[0].digest, "", "a truth of task 'iqtt'"),
-    ("meta/noise_floors", {"chamfer": 1}, "meta.noise_floors.chamfer", "docs"),
     ("items/iqtt_accuracy", GONE, "", "to be there"),
     ("items/iqtt_accuracy", [1, 0, 1, 0.5], "", "0 or 1"),
     ("items/iqtt_accuracy", [1, 0, 1, 0], "answer_groups.by_distractor", "as in items"),

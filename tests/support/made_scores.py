@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from metrics.score_file import Meta, Score, ScoreFile, Submission
-from metrics.scoring.metric_names import EMPTY_ROOM, metric
+from metrics.scoring.metric_names import OF_TRUTH, metric
 from metrics.scoring.records import GROUPINGS, AnswerGroup
 
 TRUTH = "0123456789abcdef" * 4
@@ -50,7 +50,7 @@ def rooms_scores(method, columns, scenes, runs=1, rows=None, **other):
     items = {"row": rows, "scene_index": np.asarray(scenes), "view_index": np.array(views)}
     for name, column in columns.items():
         values = np.asarray(column, np.float64)
-        shape = values.shape if name.startswith(EMPTY_ROOM) else (runs, count)
+        shape = values.shape if name.startswith(OF_TRUTH) else (runs, count)
         items[name] = np.broadcast_to(values, shape)
     numbers = {name: other.pop(name) for name in FOLLOWING & other.keys()}
     own = {name: other.pop(name) for name in {"object_columns", "path"} & other.keys()}

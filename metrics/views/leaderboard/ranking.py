@@ -12,9 +12,10 @@ from typing import Literal
 
 import numpy as np
 
+from metrics.score_file import SCORE_AGAIN
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import HEADLINE, OBJECT_SCORES, metric
-from metrics.scoring.records import ID_COLUMNS, Score, ScoreFile, Skill
+from metrics.scoring.records import ID_COLUMNS, Score, ScoreFile, Skill, Task
 from metrics.submissions.layout import Shown
 from metrics.views.by_angle import angle_floors
 from metrics.views.compare.compare import Comparison, compare
@@ -146,14 +147,15 @@ def rankings(
     """
     _require_once(files)
     tasks = {name: metric(name).task for name in metrics or ()}
-    groups: dict[tuple[str, str, Shown | None], list[ScoreFile]] = {}
+    groups: dict[tuple[tuple[Task, str], Shown | None, bool], list[ScoreFile]] = {}
     for file in files:
-        key = (file.task, file.meta.truth_digest, file.shown_of_several)
+        key = (file.truth, file.shown_of_several, file.older)
         groups.setdefault(key, []).append(file)
     ranked: list[Ranking] = []
     placed: set[Figure] = set()
-    for (task, digest, seen), members in groups.items():
-        together = [file for file in files if (file.task, file.meta.truth_digest) == (task, digest)]
+    for (truth, seen, older), members in groups.items():
+        task = truth[0]
+        together = [file for file in files if (file.truth, file.older) == (truth, older)]
         _require_same_rows(together)
         require_same_floors(together)
         names = [name for name in tasks if tasks[name] == task]
@@ -179,7 +181,7 @@ def _require_once(files: Sequence[ScoreFile]) -> None:
     """Raise LeaderboardError where two files hold scores of the same submissions."""
     for first, second in itertools.combinations(files, 2):
         runs, others = ({run.sha256 for run in file.meta.submissions} for file in (first, second))
-        if runs == others and first.meta.truth_digest == second.meta.truth_digest:
+        if runs == others and first.truth == second.truth:
             found = f"scores of the same submissions as {first.place}"
             raise LeaderboardError(second.place, found, "each submission once")
 
@@ -462,6 +464,11 @@ def _notes(files: Sequence[ScoreFile], key: str) -> Iterator[str]:
     truth = f", truth {first.meta.truth_digest[:12]}"
     if first.task == "rooms":
         yield f"{len(first.ids):,} images of {len(np.unique(first.clusters)):,} scenes{truth}."
+        if first.older:
+            yield (
+                "These are files of format 1.0, in which Chamfer, Hausdorff and others are defined"
+                f" otherwise: {SCORE_AGAIN}."
+            )
         if first.shown_of_several is not None:
             yield (
                 f"These methods were shown {VIEWS_SEEN[first.shown]}; others have their own list."

@@ -36,7 +36,7 @@ SKILLS = {"chamfer": Skill(-0.25, -0.5, -0.1, 0.16, "empty_room_chamfer")}
 
 
 def test_every_score_stands_beside_its_reference():
-    scores = simple_rooms(noise_floors={"chamfer": 0.0123}, skills=SKILLS)
+    scores = simple_rooms(skills=SKILLS)
     table = all_scores(scores)
     cells = cells_of(table)
     for name, value in scores.metrics.items():

@@ -34,7 +34,7 @@ def without(file, rows, comparable=False):
 
 A, B = rooms("a"), rooms("b")
 FEWER = without(B, [1, 4], comparable=True)  # whole, by its own account
-OTHER_TRUTH, OTHER_ROWS = rooms("b", truth="f" * 64), with_items(B, row=A.ids + 100)
+OTHER_ROWS = with_items(B, row=A.ids + 100)
 OTHER_BITS = rooms("b", digest="f" * 64)
 OTHER_SCENES = with_items(B, scene_index=[0, 0, 1, 2, 2, 2])
 WITHOUT_ITEMS = replace(B, columns={k: v for k, v in B.columns.items() if k != "chamfer"})
@@ -48,7 +48,6 @@ UNUSABLE = "2 of 6 rows without a usable number: 1, 3"
     [
         ([], "comparison", "0 score file", "two or more"),
         ([A], "comparison", "1 score file", "two or more"),
-        ([A, OTHER_TRUTH], "b.json", "scores of truth ffffffffffff", "0123456789ab as in a.json"),
         (
             [A, OTHER_BITS],
             "b.json",
@@ -67,6 +66,15 @@ UNUSABLE = "2 of 6 rows without a usable number: 1, 3"
 def test_files_that_do_not_belong_together(files, where, found, expected, allowed):
     with refused(ComparisonError, where, found, expected):
         compare(files, ["chamfer"], allow_incomparable=allowed)
+
+
+def test_scores_of_an_older_format_compare_where_their_definition_is_the_same():
+    older = replace(with_items(B, mse_depth=np.ones((1, 6))), older=True)
+    newer = with_items(A, mse_depth=np.zeros((1, 6)))
+    with refused(ComparisonError, "b.json", "chamfer", hint="score"):
+        compare([newer, older], ["mse_depth", "chamfer"])
+    assert compare([newer, older], ["mse_depth"])
+    assert compare([replace(A, older=True), older], ["chamfer"])
 
 
 def test_files_that_are_not_comparable_need_leave():

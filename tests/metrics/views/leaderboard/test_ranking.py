@@ -140,10 +140,10 @@ def test_cards_stand_beside_the_scores(tmp_path):
     table = leaderboard([rooms("a"), rooms("b")], paper="none", cards=cards)[0]
     assert table.head[-6:] == HEAD
     assert values(table)["a (supervised)"][-6:] == [
-        *("-", "-", "the scored one", "P", "https://a.b", "2026-01-02")
+        *("-", "-", "the scored view", "P", "https://a.b", "2026-01-02")
     ]
     assert [cell.link for cell in table.rows[0].cells[-3:]] == ["", "https://a.b", ""]
-    assert values(table)["b"][-6:] == ["-", "-", "the scored one", "-", "-", "-"]
+    assert values(table)["b"][-6:] == ["-", "-", "the scored view", "-", "-", "-"]
     twice = ("a: {}\na: {}", "a: {paper: P, paper: Q}")
     for text in ("a: {shoes: 3}", "a: [", "[1]", "a: &x {}\nb: *x", "[" * 5000, *twice,
                  "a: {supervised: perhaps}", "? [a]\n: {}"):  # fmt: skip
@@ -169,10 +169,10 @@ def test_names_of_cards_are_taken_as_written_and_the_others_told(tmp_path):
 
 
 def skilled(name, chamfer=0.2, **other):
-    """Rooms with a skill over a floor of 0.4, and a noise floor."""
+    """Rooms with a skill over a floor of 0.4."""
     columns = {"hausdorff": [0.3] * 4, "chamfer": [chamfer] * 4}
     skills = {"chamfer": Skill(1 - chamfer / 0.4, -0.5, 0.9, 0.4, "empty_room_chamfer")}
-    told = {"skills": skills, "noise_floors": {"chamfer": 0.0123}, "path": Path(f"{name}.json")}
+    told = {"skills": skills, "path": Path(f"{name}.json")}
     return rooms_scores(name, columns, SCENES, **{**told, **other})
 
 
@@ -262,8 +262,6 @@ def test_a_test_set_has_one_floor():
     skill = Skill(0.9, 0.8, 1.0, 2.0, "empty_room_chamfer")
     with refused(FloorError, "b.json: skills.chamfer.floor", "2.0", "0.4, as in a.json"):
         leaderboard([skilled("a"), skilled("b", skills={"chamfer": skill})])
-    with refused(FloorError, "b.json: meta.noise_floors.chamfer", "0.1"):
-        leaderboard([skilled("a"), skilled("b", noise_floors={"chamfer": 0.1})])
     part = skilled("b", skills={"chamfer": skill}, comparable=False)
     assert leaderboard([part, skilled("a")])[0].rows[2].cells[-1].value != "2.000"
 
