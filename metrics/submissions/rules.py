@@ -129,7 +129,9 @@ RULES = (
     ),
     Rule(
         ("rotated",), "range", "numbers of answers from 0, -1 or -2", "that are no answers",
-        lambda answers, against: (_no_answer(answers, against) & (answers != NOT_ASKED)).any(axis=1),
+        lambda answers, against: (
+            _no_answer(answers, against) & (answers != NOT_ASKED)
+        ).any(axis=1),
     ),
     Rule(
         ("rotated",), "agreement", "`answer`, in the first column", "that begin with another one",
