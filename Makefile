@@ -19,7 +19,7 @@ command -v chromium > /dev/null || echo "No Chromium: tests of pages are skipped
 $(PIP) --no-compile -e '.[$(1)]'; status=$$?; wait; exit $$status
 endef
 
-.PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results fuzz torture vlmevalkit dist clean
+.PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results fuzz torture harnesses dist clean
 
 demo: $(VENV)/.runtime
 	mkdir -p demo
@@ -87,16 +87,13 @@ docs: $(VENV)/.docs
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -q -n $(WORKERS) -m "not slow"
 
-# VLMEvalKit pins other versions, so it has an environment of its own, of 7 GB. `make test-all` runs
-# it where `make vlmevalkit` has made that, or where VLMEVALKIT_PYTHON names another one.
-VLMEVALKIT = .venv-vlmevalkit
-ifneq ($(wildcard $(VLMEVALKIT)/bin/python),)
-export VLMEVALKIT_PYTHON ?= $(CURDIR)/$(VLMEVALKIT)/bin/python
-endif
-
-vlmevalkit:
-	$(PYTHON) -m venv $(VLMEVALKIT)
-	$(VLMEVALKIT)/bin/python -m pip install -q --disable-pip-version-check ms-vlmeval==0.0.20
+# VLMEvalKit and lmms-eval want other versions, so each has an environment of its own, of 7 GB.
+# `make test-all` runs them where these are.
+harnesses:
+	$(PYTHON) -m venv .venv-vlmeval
+	.venv-vlmeval/bin/python -m pip install -q --disable-pip-version-check ms-vlmeval==0.0.20
+	$(PYTHON) -m venv .venv-lmms_eval
+	.venv-lmms_eval/bin/python -m pip install -q --disable-pip-version-check lmms-eval==0.7.3 'filelock<4'
 
 test-all: $(VENV)/.dev check
 	$(BIN)/python -m pytest -q -n $(WORKERS)

@@ -342,7 +342,7 @@ def _message(value: Any) -> dict[str, Any]:
     choice = value["choices"][0]
     message, ending = choice["message"], str(choice.get("finish_reason") or "").lower()
     if choice.get("error") or ending in ("error", "abort"):
-        raise AskError("", f"a reply that failed: {choice.get('error') or ending!s:.200}")
+        raise AskError("", f"a reply that failed: {(choice.get('error') or ending)!a:.200}")
     if not (message.keys() & {"content", "refusal"} or ending):
         raise LookupError("content")
     parts, usage = list(_parts(message.get("content"))), value.get("usage")

@@ -90,20 +90,22 @@ _PLACE = (
 _YES = any_of("yes|yep|correct|no|nope|wrong|match|same|mirror(?:ed)?|different")
 # What makes plain sentences of a text: patterns with their replacements, in this order.
 _PLAIN: list[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]] = [
-    (re.compile(r"<([A-J])>(?!.*</\1>)", re.DOTALL), r"(\1)"),
+    (re.compile(r"<([A-J])>(?!.*</\1>)", re.DOTALL), r"(\1)"),  # "<B>", and no "<B>bold</B>"
     (re.compile(r"<[^<>\n]{1,60}>"), " "),  # tags
     (re.compile(r"[\\\t](?:text(?:bf|rm|it)?|math(?:bf|rm|sf)|bf|rm|mbox)\s*\{([^{}]*)\}"), r"\1"),
-    (re.compile(r"\\n(?![a-z])"), "\n"),
+    (re.compile(r"\\n(?![a-z])"), "\n"),  # an escaped end of a line
     (re.compile(r"(?<=[A-Za-z])_(?=[A-J]\b)|\[[xX]\](?=\s*\W?[A-J]\b)"), " "),
+    # Marks of Markdown and LaTeX, and white space at the starts of lines.
     (re.compile(r"```\w*|[*_`$~#]|\\[()\[\]]|^[^\S\n]*(?:>[^\S\n]*)+|^[^\S\n]+", re.MULTILINE), ""),
+    # Scripts without spaces get some around letters, so that these stand by themselves.
     (re.compile(rf"(?<={CJK})(?=[A-Za-z(\"\[])|(?<=[A-Za-z)\"\]])(?={CJK})"), " "),
     (compiled(r"\b(fig|pic|opt|ans|img)\.(?=\s*\W?[A-Ja-j]\b)"), r"\1"),
     (re.compile(r"^\s*(?:[-•·–—+]+\s*|\(?\d+[.)]\s+)(?=\S)", re.MULTILINE), ""),  # of lists
     (re.compile(rf"(?i:{_PLACE})(?={L})"), ""),
     *((re.compile(small, re.IGNORECASE | re.MULTILINE), _with_capital) for small in _SMALL),
-    (re.compile(rf"\b([A-J])\?\s*(?=(?i:{_YES}))"), r"\1: "),
+    (re.compile(rf"\b([A-J])\?\s*(?=(?i:{_YES}))"), r"\1: "),  # "A? No."
     (compiled(any_of("(?:anything|everything|everyone|all|any) but")), "except"),
-    (re.compile(r":\s*\n\s*"), ": "),
+    (re.compile(r":\s*\n\s*"), ": "),  # "Answer:", and the letter in the next line
     (re.compile(r"^(\W{0,2}[A-J]\W?)[.)]+[ \t]+(?=\S)", re.MULTILINE), r"\1: "),  # "B. It has"
     (compiled(any_of("if (?:i (?:had|have|must)(?: to)?|forced to) (?:guess|choose)")), "probably"),
     (compiled(any_of(r"on (?:second thoughts?|(?:\w+ )?(?:reflection|inspection))")), "actually"),

@@ -132,7 +132,7 @@ def ask(
     print_line(f"{log}: {unread_note(unread, sums.rows)}")
     if sums.cut_off:
         spent = f", {sums.only_thoughts} of them in thoughts" if sums.only_thoughts else ""
-        advice = "give more, and a new --log"
+        advice = "use a larger --max-tokens, with a new --log"
         print_line(
             f"{log}: {sums.cut_off} of {sums.rows} replies were cut off at --max-tokens"
             f" {server.max_tokens}{spent}; {advice}"

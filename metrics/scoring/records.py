@@ -350,7 +350,7 @@ class ScoreFile:
 
     @cached_property
     def by_outcome(self) -> Groups:
-        """Scores by what became of a model's text: answered, unparsed, refused or cut off."""
+        """Scores by what became of a model's text: see `OUTCOMES` of `submissions.rules`."""
         return self._groups_of_answers("by_outcome")
 
     @cached_property

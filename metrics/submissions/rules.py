@@ -90,6 +90,12 @@ def _no_answer(answers: Array, against: Against) -> Mask:
     return np.asarray((answers < ABSTAINED) | (answers >= against.answers))
 
 
+def _no_rotated(answers: Array, against: Against) -> Mask:
+    wrong = _no_answer(answers, against)
+    wrong[:, 1:] &= answers[:, 1:] != NOT_ASKED  # the first is `answer`
+    return np.asarray(wrong.any(axis=1))
+
+
 def _other_than_scores(answers: Array, against: Against) -> Mask:
     if against.of_scores is None:
         return np.zeros(len(answers), bool)
@@ -129,9 +135,7 @@ RULES = (
     ),
     Rule(
         ("rotated",), "range", "numbers of answers from 0, -1 or -2", "that are no answers",
-        lambda answers, against: (
-            _no_answer(answers, against) & (answers != NOT_ASKED)
-        ).any(axis=1),
+        _no_rotated,
     ),
     Rule(
         ("rotated",), "agreement", "`answer`, in the first column", "that begin with another one",

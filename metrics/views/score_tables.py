@@ -90,7 +90,7 @@ def headline_rows(scores: ScoreFile) -> Table:
         text = f"{floor.value}: {floor.rest}" if floor.rest else floor.value
         rows.append((name, *interval_cells(scores.metrics[name]), text))
     if scores.unread is not None:
-        rows.append(("unread replies", number(scores.unread), "-", UNREAD))
+        rows.append(("unread replies", f"{scores.unread:.0%}", "-", UNREAD))
     return make_table("", ("headline", "value", INTERVAL, "floor"), rows)
 
 
@@ -276,7 +276,7 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
 
 
 def unread_notes(files: Sequence[ScoreFile]) -> list[str]:
-    """Return the share of unread replies of each method that was asked in words."""
+    """Return in words the share of unread replies of each method whose replies were read."""
     return [
         f"{label}: {file.unread:.0%} unread {UNREAD}"
         for file, label in zip(files, labels_of(files), strict=True)

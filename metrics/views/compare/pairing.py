@@ -50,6 +50,7 @@ def require_same_test(
             raise ComparisonError(
                 file.place, f"scores that are {why}", hint="or say --allow-incomparable"
             )
+
     def shown() -> list[str]:  # a test set of single views, say, has nothing behind
         return [n for n in HEADLINE[first.task] if any(n in file.headline for file in files)]
 

@@ -177,7 +177,7 @@ def test_what_cannot_be_viewed(truths, folder, check_refusal):
         check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
 
-def test_score_gives_the_hints_of_validate_and_never_a_floor_of_zero(truths, folder):
+def test_score_gives_the_hints_of_validate(truths, folder):
     from metrics.prediction_writer import RoomPredictionWriter
     from scenegen import open_rooms
 
@@ -192,7 +192,3 @@ def test_score_gives_the_hints_of_validate_and_never_a_floor_of_zero(truths, fol
     assert scored.exit_code == 0
     (hint,) = [line for line in told.splitlines() if line.startswith("hint")]
     assert hint.removeprefix("hint").strip() in scored.stderr
-    rows = [line.split() for line in scored.stdout.splitlines() if "noise floor" in line]
-    floors = [row[row.index("floor") + 1] for row in rows if row[:2] == ["noise", "floor"]]
-    assert floors
-    assert all(float(floor) > 0 for floor in floors if floor != "-" and floor[0].isdigit())

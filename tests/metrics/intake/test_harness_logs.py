@@ -144,6 +144,31 @@ def inspect_log(path: Path, rows: list[Row], split: Path) -> Path:
 
 
 @pytest.mark.slow
+def test_lmms_eval_runs_the_task_and_its_samples_come_back(
+    split: Path, rows: list[Row], tmp_path: Path
+) -> None:
+    python = python_with("lmms_eval")
+    export_for_models(Asked(split / "iqtt-val.h5", rotations=3, size=64), tmp_path / "in")
+    done = subprocess.run(
+        [python, "-m", "lmms_eval", "--model", "dummy", "--model_args", "response=B",
+         "--include_path", "in", "--tasks", "iqtt", "--log_samples", "--output_path", "out"],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+        env=os.environ | {"HF_HUB_OFFLINE": "1", "HF_HOME": str(tmp_path / "hf"),
+                          "PYTHONPATH": str(Path(__file__).parents[3])},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-3000:]
+    (log,) = tmp_path.glob("out/**/*_samples_iqtt.jsonl")
+    (results,) = tmp_path.glob("out/**/*_results.json")
+    told = json.loads(results.read_text())["results"]["iqtt"]
+    assert told["accuracy,none"] == pytest.approx(np.mean([row.answer == "B" for row in rows]))
+    write_returned(tmp_path / "p.h5", split / "iqtt-val.h5", read_returned(log), method="m")
+    scores = score([tmp_path / "p.h5"], split / "iqtt-val.h5")
+    right = np.mean([row.answer == "B" for row in rows if row.rotation == 0])
+    assert scores.metrics["iqtt_accuracy"].value == right
+    assert scores.unread == 0.0
+
+
+@pytest.mark.slow
 def test_samples_that_failed_in_inspect_are_no_answers(
     split: Path, rows: list[Row], tmp_path: Path
 ) -> None:
@@ -193,12 +218,19 @@ for name in ("iqtt-val", "iqtt-val_circular"):
 """
 
 
+def python_with(package: str) -> str:
+    """Return the Python of the environment that has a harness, which `make harnesses` makes."""
+    own = Path(__file__).parents[3] / f".venv-{package}" / "bin" / "python"
+    python = str(own) if own.exists() else os.environ.get("HARNESS_PYTHON", sys.executable)
+    probe = f"import importlib.util, sys; sys.exit(importlib.util.find_spec({package!r}) is None)"
+    if subprocess.run([python, "-c", probe], check=False).returncode:
+        pytest.skip(f"{package} is not installed; `make harnesses` does that")
+    return python
+
+
 def vlmevalkit_log(path: Path, rows: list[Row], split: Path) -> Path:
     """Run VLMEvalKit with a model that is told what to say; return its sheet of all rows."""
-    python = os.environ.get("VLMEVALKIT_PYTHON", sys.executable)
-    probe = "import importlib.util, sys; sys.exit(importlib.util.find_spec('vlmeval') is None)"
-    if subprocess.run([python, "-c", probe], check=False).returncode:
-        pytest.skip("VLMEvalKit is not installed; see CONTRIBUTING.md")
+    python = python_with("vlmeval")
     export_for_models(Asked(split / "iqtt-val.h5", rotations=3, size=64), path / "in")
     first = [text_for(row) for row in rows if row.rotation == 0]
     texts = json.dumps([*first, *map(text_for, rows)])

@@ -105,7 +105,7 @@ def test_problems_of_answers_at_once(truths, tmp_path):
 def test_what_is_told_of_asked_models_is_checked(truths, tmp_path):
     def spoil(file):
         count = len(file["question"])
-        file["outcome"] = np.full(count, 3)
+        file["outcome"] = np.full(count, 4)
         file["rotated"] = np.repeat((file["answer"][()] + 1)[:, None] % 3, 3, axis=1)
 
     problems = validate(edited(spoil, good_answers)(tmp_path, truths.iqtt))
