@@ -15,6 +15,7 @@ from typing import Any
 import click
 
 from baselines.pix2shape.commands import (
+    ALLOW_TEST_SET,
     SUBMISSION,
     WEIGHTS_PATH,
     Setting,
@@ -108,6 +109,7 @@ def _listed(baselines: Mapping[str, str]) -> str:
 @click.option(
     "--train-features", type=InputPath(), help="The same for the labelled questions of --train."
 )
+@ALLOW_TEST_SET
 @SUBMISSION
 @click.option(
     "--seed",
@@ -133,9 +135,14 @@ def baseline(
     out: str,
     seed: int,
     weights: str | None,
+    allow_test_set: bool,
     overwrite: bool,
 ) -> None:
     """Write the submission of a baseline for rooms or questions."""
+    from baselines.training.test_sets import refuse_test_set
+
+    if train is not None:
+        refuse_test_set(train, allow_test_set)
     _check_task(name, data)
     _check_options(name, weights, train, labels, features)
     if train_features is not None and name != "features":
@@ -252,6 +259,7 @@ def _answer_by_outline(
     help="Change another setting of the baseline, such as depth=50; docs/baselines.md lists them.",
 )
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
+@ALLOW_TEST_SET
 def train_baseline(
     name: str,
     data: str,
@@ -261,6 +269,7 @@ def train_baseline(
     iterations: int | None,
     settings: tuple[tuple[str, Any], ...],
     resume: bool,
+    allow_test_set: bool,
 ) -> None:
     """Train a baseline; weights and checkpoint are written to a folder."""
     options = {"labels": labels, "seed": seed, "iterations": iterations}
@@ -269,8 +278,10 @@ def train_baseline(
         message = "--resume goes on with the run's own --labels, --seed, --iterations and --set"
         raise click.UsageError(f"{message}; leave them out")
     module = _module(name)
+    from baselines.training.test_sets import refuse_test_set
     from scenegen.common.records import check, from_json
 
+    refuse_test_set(data, allow_test_set)
     parameters = inspect.signature(module.train).parameters.values()
     arguments = {p.name for p in parameters if p.kind is p.KEYWORD_ONLY} - {"resume", "progress"}
     names = {field.name for field in fields(module.Settings)}

@@ -76,7 +76,13 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
     return chosen
 
 
+ALLOW_TEST_SET = click.option(
+    "--allow-test-set", is_flag=True, help="Learn from a named test set, or from its scenes."
+)
+
+
 @click.command(epilog=f"{EXAMPLE}pix2shape train --data rooms.h5 --out run")
+@ALLOW_TEST_SET
 @click.option(
     "--data", type=InputPath(), required=True, help="Rooms, or iqtt-train.h5, to train on."
 )
@@ -146,6 +152,7 @@ def train(
     devices: int | None,
     nodes: int | None,
     precision: str | None,
+    allow_test_set: bool,
 ) -> None:
     """Train the model on rooms or questions; weights and checkpoint are written to a folder.
 
@@ -155,7 +162,9 @@ def train(
     from baselines.pix2shape.network.config import model_config
     from baselines.pix2shape.training.run import train_run
     from baselines.training import launch
+    from baselines.training.test_sets import refuse_test_set
 
+    refuse_test_set(data, allow_test_set)
     chosen = named_once(settings, **({} if seed is None else {"seed": seed}))
     if resume and (config or chosen or labels or conditional or start):
         options = "--config, --set, --seed, --labels, --conditional and --start"

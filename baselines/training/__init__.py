@@ -9,6 +9,7 @@
     rooms.py        images and cameras of rooms
     questions.py    images and answers of questions
     rotations.py    rotations spread evenly
+    test_sets.py    named test sets are not learned from
 
 A baseline adds its networks, its batches and its losses. Its module has a dataclass `Settings` and
 two functions:

@@ -24,7 +24,7 @@ from scenegen.files.verify import (
     manifest_checks,
     spread_rows,
 )
-from scenegen.rendering.backend import select_variant, versions
+from scenegen.rendering.backend import exact_kind, select_variant
 
 
 def verify_split(
@@ -104,7 +104,7 @@ def _made_again(
     title = "made again from the seed"
     if spec == spec.public():
         return Check(title, True, "not checked: the files do not tell the seed")
-    here = {"variant": select_variant(device), "format_version": FORMAT_VERSION, **versions()}
+    here = {"format_version": FORMAT_VERSION, **exact_kind(select_variant(device))}
     others = made_elsewhere(told, here)
     if others:
         return Check(title, True, f"not checked: {'; '.join(others)}")

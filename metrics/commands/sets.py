@@ -83,13 +83,16 @@ def _run(words: list[str]) -> Any:
 
 def _is_published(folder: Path, test: Any) -> bool:
     """Print how a file compares with the published one; return whether they are equal."""
-    from metrics.scoring.truth_digests import file_digest
+    from metrics.scoring.truth_digests import file_digests
 
-    found, rows = file_digest(folder / test.file, test.task)
-    same = found == test.digest
-    what = "as published" if same else f"published: {test.rows:,} rows, {test.digest}"
-    print_line(f"{folder / test.file}: {rows:,} rows, {found}, {what}")
-    return same
+    truth, pictures, rows = file_digests(folder / test.file, test.task)
+    found = {"rows": rows, "truth": truth, "pictures": pictures}
+    published = {"rows": test.rows, "truth": test.digest, "pictures": test.pictures}
+    print_line(f"{folder / test.file}:")
+    for name, value in found.items():
+        same = value == published[name]
+        print_line(f"  {name} {value}, {'as published' if same else f'not {published[name]}'}")
+    return found == published
 
 
 COMMANDS = (sets_command,)

@@ -20,6 +20,7 @@ class KnownTest:
         rows: how many images or questions it has.
         command: what makes the set, but for its place.
         purpose: what it is for.
+        pictures: digest of the images.
         superseded: whether older code made it, whose bits were others.
     """
 
@@ -29,6 +30,7 @@ class KnownTest:
     rows: int
     command: str
     purpose: str = ""
+    pictures: str = ""
     superseded: bool = False
 
     @property
@@ -38,49 +40,79 @@ class KnownTest:
         return f"{part}/iqtt-test-answers.h5" if part else f"{self.name}.h5"
 
 
-_RENDER = "scenegen render --n 300 --seed 1000 --views 0,5,35,55,80"
+_RENDER = "scenegen render --n 300 --views 0,5,35,55,80"
 _QUESTIONS = "iqtt make-split --preset suite --train 0 --labeled 0 --val 0 --test 500"
-# The digests of the six files of rotation-1. `bench sets make rotation-1` prints those it makes.
-_ROTATION_1 = {
-    "matched": "",
-    "mirror-pair": "",
-    "mirror-pair-2": "",
-    "other": "",
-    "near": "",
-    "mirror": "",
+_ROOMS = {  # purpose, rows, command
+    "sample-1": ("the rooms in examples/sample", 8, "scenegen render --n 8 --size 48"),
+    "rooms-1": ("the headline: basic shapes", 1500, f"{_RENDER} --seed 1000 --size 64"),
+    "rooms-shadows-1": (
+        "other rooms of this kind, where objects cast shadows",
+        1500,
+        f"{_RENDER} --seed 2000 --size 64 --shadows",
+    ),
+    "rooms-128-1": ("the scenes of rooms-1 at 128 pixels", 1500, f"{_RENDER} --seed 1000"),
+    "objects-1": (
+        "built-in objects of the test split",
+        1500,
+        f"{_RENDER} --seed 1000 --size 64 --preset shapenet --object-split test",
+    ),
+}
+# Digests of truth and pictures. `bench sets make NAME` prints those of the files that it makes.
+_DIGESTS = {
+    "sample-1": (
+        "684016ef4ee8d4f1ba4690e48d74cb6a629a731417207aedd5e51ffaccac87e9",
+        "45788657b41edbf4c1458a3369070f77f33c566f61cdcdeb83e06159e2be9bd6",
+    ),
+    "rooms-1": (
+        "b77ff4bf7a8c552e3bdd1e4d973e88db53b8c4cec01d756fbdf31622f653c7e1",
+        "8af3bf531533c22d246505d93c540bf2efdc2ce7a0582c0e478b0579ea43b565",
+    ),
+    "rooms-shadows-1": (
+        "083e0a36482353f74c8aaf730970e1b08f7a33af54c10227f69105de5d765e65",
+        "c96a1253a6f590970ed9d84480e07d13d25632d49bcac2587371b7da86b454a0",
+    ),
+    "rooms-128-1": (
+        "0a4bd47f19e7b6d4d5c01e06b791bb8d47fd2e5e13363daaaaf90312e417e13b",
+        "ff0118405c21d0362e507bbb51ea2e2993858b005fca1eedf83b188830e18480",
+    ),
+    "objects-1": (
+        "d8a28d7e6ef90885a4f649b51adcbb30096547b5ab00df71931ba87834788101",
+        "1382577a054c986325744e6dc76009e5a68743c9279e064b66b2bc85a32f7101",
+    ),
+    "rotation-1/matched": (
+        "bb5a820ba6286741333664ea534ef90cacd2dad68928459b643c66c0172711d8",
+        "deb7a0473ce70c15e3f8a03a57b0ff67b8f37cc4652cf1b2ada5d84c2172fee6",
+    ),
+    "rotation-1/mirror-pair": (
+        "775e2b64d89fb6184416a74f6ec9438bde0958651263f35b501b4d45d2f7b9ab",
+        "ee9340b2f44fd2ce10dc361eb1bbb37503acc8eb245adf22f3471c672f87aa33",
+    ),
+    "rotation-1/mirror-pair-2": (
+        "43e197c6cdfa2d7b9a92d263a515b7a1b4f45685885982b7675f03009cfd0290",
+        "729c797650d4311aeaaadfb1923825eefb46b4a1b3218878fe4ba88ac0709265",
+    ),
+    "rotation-1/other": (
+        "e55df77274b4f65ad444b9a3d7b07ce254642d20b8b5673d6188c06cdc6f7b63",
+        "9a38a7132b24a2b3b7884e1ba7aaa3d30cffb23d09f24809e0633cff0250bf98",
+    ),
+    "rotation-1/near": (
+        "856fda0ceca7a25a94f748a1798e5f55c07507acdd10ae7b7c63f11e1aa45384",
+        "237cbe80134f7096f1d4571d44c43bd975463eadc11b2cc8b5c7539348bc95d1",
+    ),
+    "rotation-1/mirror": (
+        "56dc11d92a23defddd84b1c3a06a4e593d9e13251e0e25474d944dde5e4b5888",
+        "23b685fb1fcd5bd170ecb34acaa926904013188bd16413ed81ff4efc3cf6049a",
+    ),
 }
 KNOWN_TESTS = (
-    KnownTest(
-        "sample-1",
-        "rooms",
-        "",
-        8,
-        "scenegen render --n 8 --size 48",
-        "the rooms in examples/sample",
-    ),
-    KnownTest(
-        "rooms-1", "rooms", "", 1500, f"{_RENDER} --size 64", "the headline: rooms of basic shapes"
-    ),
-    KnownTest(
-        "rooms-shadows-1",
-        "rooms",
-        "",
-        1500,
-        f"{_RENDER} --size 64 --shadows",
-        "rooms-1 where objects cast shadows",
-    ),
-    KnownTest("rooms-128-1", "rooms", "", 1500, _RENDER, "rooms-1 at 128 pixels"),
-    KnownTest(
-        "objects-1",
-        "rooms",
-        "",
-        1500,
-        f"{_RENDER} --size 64 --preset shapenet --object-split test",
-        "rooms of built-in objects that no training set shows",
+    *(
+        KnownTest(name, "rooms", _DIGESTS[name][0], rows, command, purpose, _DIGESTS[name][1])
+        for name, (purpose, rows, command) in _ROOMS.items()
     ),
     *(
-        KnownTest(f"rotation-1/{kind}", "iqtt", digest, 500, _QUESTIONS, "mental rotation, by kind")
-        for kind, digest in _ROTATION_1.items()
+        KnownTest(name, "iqtt", truth, 500, _QUESTIONS, "mental rotation, by kind", pictures)
+        for name, (truth, pictures) in _DIGESTS.items()
+        if name.startswith("rotation-1/")
     ),
     KnownTest(
         "examples/sample",

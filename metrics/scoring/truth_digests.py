@@ -79,17 +79,21 @@ def _checked(
     )
 
 
-def file_digest(path: Path, task: str) -> tuple[str, int]:
-    """Return the digest of a file's truth, computed from all its values, and its number of rows.
+def file_digests(path: Path, task: str) -> tuple[str, str, int]:
+    """Return the digests of a file's truth, from all its values, and of its pictures; and its rows.
+
+    The pictures of a file of answers lie beside it. Their digest is the one stored with them.
 
     Raises FileFormatError for a file that is none, and ScoringError as `rooms_digest`.
     """
     if task == "rooms":
         with RoomsFile(path) as rooms:
-            return rooms_digest(rooms, {}), len(rooms)
+            return rooms_digest(rooms, {}), rooms.stored_digests()["image"], len(rooms)
     from iqtt.files.layout import SCORED as OF_ANSWERS
-    from iqtt.files.reader import AnswersFile
+    from iqtt.files.reader import AnswersFile, QuestionsFile
 
+    with QuestionsFile(path.with_name(path.name.replace("-answers", ""))) as questions:
+        pictures = questions.stored_digests()["questions"]
     with AnswersFile(path) as answers:
         columns = {name: answers.read(name, slice(None)) for name in OF_ANSWERS}
-        return answers_digest(answers, columns), len(answers)
+        return answers_digest(answers, columns), pictures, len(answers)

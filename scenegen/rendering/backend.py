@@ -19,7 +19,9 @@ from pathlib import Path
 
 from scenegen.common.errors import BackendError
 from scenegen.common.names import check_choice
+from scenegen.files.row_file import writer_name
 
+EXACT_VARIANT = "llvm_ad_rgb"  # whose bits depend on no processor
 LLVM_VARIABLE = "DRJIT_LIBLLVM_PATH"
 LLVM_WHEEL = "karellen-llvm-core"
 OLDEST_LLVM = 16
@@ -80,7 +82,7 @@ def find_llvm() -> str | None:
 def versions() -> dict[str, str]:
     """Return the versions of what renders here, by the names in `VERSION_ATTRIBUTES`.
 
-    The bits of a pixel depend on them. A version is "unknown" where nothing is installed that
+    A version is "unknown" where nothing is installed that
     tells it. Nothing is imported for this. For the LLVM that Dr.Jit uses, call it after
     `select_variant`.
     """
@@ -90,6 +92,16 @@ def versions() -> dict[str, str]:
     llvm = ".".join(map(str, numbers)) if numbers[0] > 0 else UNKNOWN
     releases = (_release("mitsuba"), _release("drjit"), llvm)
     return dict(zip(VERSION_ATTRIBUTES, releases, strict=True))
+
+
+def exact_kind(variant: str) -> dict[str, str]:
+    """Return by which attributes a file has the bits that this variant computes here.
+
+    The LLVM variant has the same bits with every LLVM and on every x86-64 processor.
+    """
+    kind = {"variant": variant, "writer": writer_name(), **versions()}
+    del kind["llvm_version"]
+    return kind
 
 
 def _release(package: str) -> str:

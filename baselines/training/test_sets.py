@@ -1,0 +1,57 @@
+"""Test sets are not trained on, unless somebody means it."""
+
+import json
+import shlex
+from typing import Any
+
+import h5py
+
+from metrics.scoring.known_tests import KNOWN_TESTS, KnownTest, known_test
+from scenegen.common.errors import SpecError
+
+SAME = ("seed", "source", "shapes", "object_split")  # settings that make the same scenes
+
+
+def refuse_test_set(data: str, allowed: bool = False) -> None:
+    """Refuse a file to learn from that is a named test set, or rooms of its seed and objects.
+
+    Raises SpecError. Other files, and those that are no HDF5, pass.
+    """
+    if allowed or not h5py.is_hdf5(data):
+        return
+    with h5py.File(data) as file:
+        texts = {name: str(value) for name, value in file.attrs.items()}
+    test = known_test(texts.get("truth_digest", "")) or _like(texts.get("spec", ""))
+    if test:
+        hint = "take another --seed for training, or say --allow-test-set"
+        raise SpecError(data, f"the test set {test.name}, or its scenes", "training data", hint)
+
+
+def _like(text: str) -> KnownTest | None:
+    """Return the test set of rooms that has the seed and the objects of a specification."""
+    try:
+        found: Any = json.loads(text)
+    except ValueError:
+        return None
+    return next(
+        (test for test in KNOWN_TESTS if test.task == "rooms" and _settings(test) == _chosen(found)),
+        None,
+    )
+
+
+def _chosen(spec: Any) -> list[Any]:
+    values = [spec.get(name) if isinstance(spec, dict) else None for name in SAME]
+    return [*values[:2], *(list(x) if isinstance(x, list) else x for x in values[2:])]
+
+
+def _settings(test: KnownTest) -> list[Any]:
+    """Return `SAME` of the scenes of a set; nothing of one whose seed is the default."""
+    from scenegen.description.presets import preset_spec
+
+    words = shlex.split(test.command)
+    given = dict(zip(words, words[1:], strict=False))
+    if "--seed" not in given:
+        return []
+    split = {"object_split": given["--object-split"]} if "--object-split" in given else {}
+    spec = preset_spec(given.get("--preset", "shapes"), seed=int(given["--seed"]), **split)
+    return _chosen(json.loads(spec.to_json()))
