@@ -236,8 +236,13 @@ def _trees(features: Array, relief: Array) -> Callable[[Array], Array]:
         loss="absolute_error", max_iter=100, learning_rate=0.2, early_stopping=False, random_state=0
     )
 
-    trees.fit(features[::8], relief[::8])
-    return lambda values: np.asarray(trees.predict(values))
+    def lift(values: Array) -> Array:
+        with one_thread():  # OpenMP came with scikit-learn just now
+            return np.asarray(trees.predict(values))
+
+    with one_thread():  # sums then have one order
+        trees.fit(features[::8], relief[::8])
+    return lift
 
 
 def _left_over(rooms: RoomsFile, row: int) -> Array:

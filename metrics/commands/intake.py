@@ -234,7 +234,7 @@ def run(
             error.hint = "; ".join(filter(None, (error.hint, "--traceback shows all of it")))
         raise
     except KeyboardInterrupt:
-        at = f" at {loaded.at}" if loaded is not None and loaded.at else ""
+        at = f" at {loaded.calls[0]}" if loaded is not None and loaded.calls else ""
         print_line(f"stopped{at}; the same command goes on with the rows in {out}.rows", err=True)
         raise
     print_line(f"{out}: {said}")

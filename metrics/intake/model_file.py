@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
@@ -48,11 +49,11 @@ class Model:
         sha256: of the file, and of names, sizes and dates of the weights beside it.
         takes_batches: whether it has infer_batch.
         takes_intrinsics: whether infer_batch, or infer where it has none, does.
-        at: the call that it is at, in words; empty for none.
+        calls: that have begun and whose results were not waited for, in words, the oldest first.
     """
 
     def __init__(self, path: Path, timeout: float | None, note: Note) -> None:
-        self.path, self.sha256, self.at = path, _digest(path), ""
+        self.path, self.sha256, self.calls = path, _digest(path), deque[str]()
         self._timeout, self._note = timeout, note
         # -P: the folder of the runner must not be among those of imports.
         command = [sys.executable, "-P", model_runner.__file__]
@@ -65,7 +66,8 @@ class Model:
 
     def load(self, settings: Mapping[str, Any]) -> None:
         """Let the process import the file and make the model. Raises ModelError."""
-        about = self._wait(self._ask((str(self.path), dict(settings))), "import and load()", None)
+        where = "import and load()"
+        about = self._wait(self._ask((str(self.path), dict(settings)), where), where, None)
         self.takes_batches, self.takes_intrinsics = about["batch"], about["intrinsics"]
 
     def begin(self, function: str, where: str, *arguments: Any) -> Callable[[], Any]:
@@ -73,7 +75,7 @@ class Model:
 
         The result has Python's own values and arrays of NumPy. Raises ModelError, with `where`.
         """
-        asked = self._ask((function, arguments))
+        asked = self._ask((function, arguments), where)
         return lambda: self._wait(asked, where, self._timeout)
 
     def close(self) -> None:
@@ -93,7 +95,8 @@ class Model:
         with suppress(OSError), self._process:
             pass
 
-    def _ask(self, request: Any) -> Future[bytes]:
+    def _ask(self, request: Any, where: str) -> Future[bytes]:
+        self.calls.append(where)
         return self._asking.submit(self._answer, pickle.dumps(request, 5))
 
     def _answer(self, message: bytes) -> bytes:
@@ -107,7 +110,7 @@ class Model:
 
     def _wait(self, asked: Future[bytes], where: str, timeout: float | None) -> Any:
         """Return the result of a call; tells where it is meanwhile."""
-        begun, self.at, told = time.monotonic(), where, SILENCE
+        begun, told = time.monotonic(), SILENCE
         place = f"{self.path}: {where}"
         while True:
             try:
@@ -127,9 +130,9 @@ class Model:
                 found, hint = f"no answer after {timeout:g} s", "--timeout may give it more"
                 raise ModelError(place, found, "", hint)
             if seconds > told:
-                self._note(f"{place}: at work for {seconds:.0f} s; --timeout ends what hangs")
+                self._note(f"{place}: at work for {seconds:.0f} s; Ctrl-C ends it")
                 told *= 2
-        self.at = ""
+        self.calls.popleft()
         succeeded, content = answer[:1] == b"+", pickle.loads(answer[1:])
         if succeeded:
             return _with_types(content)

@@ -9,6 +9,7 @@ import importlib.util
 import inspect
 import os
 import pickle
+import signal
 import sys
 import threading
 import traceback
@@ -56,11 +57,16 @@ def main() -> None:
 
 
 def _listen(requests: IO[bytes], messages: "SimpleQueue[bytes]") -> None:
-    """Pass messages on. Ends this process, whatever it does, when the one that started it ends."""
+    """Pass messages on. Ends this process, whatever it does, when the one that started it ends.
+
+    What the model has started ends, too, as this process leads a group of its own.
+    """
     while True:
         try:
             messages.put(read(requests))
         except (OSError, EOFError):
+            if hasattr(os, "killpg") and os.getpgid(0) == os.getpid():
+                os.killpg(0, signal.SIGKILL)
             os._exit(1)
 
 

@@ -15,7 +15,10 @@ ONE_THREAD = {
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Let the libraries that are loaded use one thread: sums then have one order, too."""
+    """Let the libraries that are loaded use one thread: sums then have one order, too.
+
+    A library that the block loads first is not among them. It takes some milliseconds.
+    """
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(1):

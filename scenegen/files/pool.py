@@ -66,7 +66,10 @@ class Pool:
 
     def _do(self, task: Any) -> Any:
         message = pickle.dumps(task)
-        process = self._idle.pop() if self._idle else self._start()
+        try:
+            process = self._idle.pop()
+        except IndexError:
+            process = self._start()
         succeeded, result = process.answer(message)
         self._idle.append(process)
         if not succeeded:

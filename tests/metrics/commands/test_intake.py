@@ -88,13 +88,13 @@ def infer(image):
 """
 
 
-def test_a_model_is_run(truths, tmp_path):
+def test_a_model_is_run(truths, tmp_path, capfd):
     (tmp_path / "wall.py").write_text(MODEL)
     out = tmp_path / "p.h5"
     done = bench("run", tmp_path / "wall.py", "--data", truths.rooms, "--out", out)
     assert done.exit_code == 0, done.output
     assert done.stdout.splitlines()[-1] == f"now: bench score {out} --truth {truths.rooms}"
-    assert "looking" in done.stderr
+    assert "looking" in capfd.readouterr().err  # of its process, which has no other output
     assert "looking" not in done.stdout
     with open_predictions(out) as found:
         assert found.method == "wall"
@@ -105,7 +105,7 @@ def test_an_error_of_the_model_is_one_line_unless_all_is_asked_for(truths, tmp_p
     line = ["run", tmp_path / "wall.py", "--data", truths.rooms, "--out", tmp_path / "p.h5"]
     done = bench(*line)
     assert (done.exit_code, done.stdout) == (2, "")
-    assert done.stderr.splitlines()[1:] == [done.stderr.splitlines()[-1]]
+    assert len(done.stderr.splitlines()) == 1
     assert "line 5: row 0" in done.stderr
     assert "Traceback" in bench(*line, "--traceback").stderr
     assert [path.name for path in tmp_path.iterdir() if path.suffix] == ["wall.py"]

@@ -1,6 +1,8 @@
 """Models of many shapes are run, resumed and refused."""
 
 import os
+import signal
+import subprocess
 import sys
 import time
 from pathlib import Path
@@ -273,6 +275,29 @@ def test_what_ends_or_hangs_is_named_by_its_row_and_rows_are_kept(how, run, tmp_
     assert any("row 5" in note for note in run.notes) == ("hang" in how)
     assert gone(int((tmp_path / "group").read_text())), "the model, or what it has started, lives"
     assert run(INFER, keep="resume") == "depth_metric of 8 rows, 5 of them from an earlier run"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="signals of Linux")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+def test_a_hanging_model_ends_with_the_command(number, tmp_path, truths):
+    text = INFER.replace("    return", "    if next(N) == 5: print(os.getpid(), flush=True);"
+                         " subprocess.run(['sleep', '1000'])\n    return")  # fmt: skip
+    text = f"import itertools, os, subprocess\nN = itertools.count()\n{text}"
+    (tmp_path / "my_model.py").write_text(text)
+    code = "import cli; cli.bench()"
+    words = ["run", "my_model.py", "--data", str(truths.rooms), "--out", "p.h5"]
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])},
+    ) as command:  # fmt: skip
+        group = next(int(line) for line in command.stderr if line.strip().isdecimal())
+        while len(list((tmp_path / "p.h5.rows").glob("*.npz"))) < 5:
+            time.sleep(0.05)
+        command.send_signal(number)
+        said = command.stderr.read()
+    assert gone(group), "the model, or what it has started, lives"
+    assert ("stopped at row 5" in said) == (number != signal.SIGKILL)
+    assert len(list((tmp_path / "p.h5.rows").glob("*.npz"))) == 5
 
 
 def test_what_a_model_prints_and_reads_is_kept_apart(run, capfd):
