@@ -59,6 +59,8 @@ def _main_scores(scores: ScoreFile) -> list[str]:
 def _verdict(skill: Skill) -> str:
     if skill.value == 1.0:
         return "perfect"
+    if skill.is_floor:
+        return "the floor itself"
     if skill.low is None or skill.high is None:
         where = "above" if skill.value > 0.0 else "not above"
         return f"{where} the floor, but too little was scored for an interval"
