@@ -19,6 +19,7 @@ from metrics.scoring.known_tests import KnownTest, sets
 from metrics.scoring.truth_digests import file_digests
 from scenegen.common.errors import SpecError
 
+
 @pytest.fixture
 def run_command():
     def call(group, *arguments):
