@@ -88,7 +88,7 @@ def test_the_sample_has_its_documented_scores(tmp_path):
             wanted = pytest.approx(getattr(expected, part), rel=1e-9, abs=1e-12)
             assert getattr(found.metrics[name], part) == wanted, (name, part)
     assert (found.comparable, found.meta.truth_source) == (True, "known")
-    assert known_test(found.meta.truth_digest).name == "examples/sample"
+    assert known_test(found.meta.truth_digest).name == "sample-1"
     assert found.meta.truth_digest == told.meta.truth_digest
     assert found.meta.truth_fingerprint == told.meta.truth_fingerprint
     assert found.meta.submissions[0].sha256 == told.meta.submissions[0].sha256

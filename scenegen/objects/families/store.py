@@ -16,7 +16,10 @@ from scenegen.objects.families.parts.assembly import UPRIGHT
 from scenegen.objects.solids import Array, Mesh, UnitShape, no_mesh
 
 MOST_FACES_KEPT = 4_000_000  # of the meshes in memory; a face takes some 20 bytes
-_SOURCES = ("common/rotations.py", "objects/solids.py", "objects/cast_meshes.py")
+_SOURCES = (
+    "common/rotations.py",
+    *(f"objects/{name}.py" for name in ("solids", "cast_meshes", "coarse_hulls")),
+)
 _OUTLINE, _MESH = ("hull_points", "hull_discs"), ("vertices", "faces", "normals")
 
 

@@ -109,7 +109,8 @@ def test_the_teapot_is_open_at_its_seams_only():
 @pytest.mark.parametrize("name", SHAPE_NAMES)
 def test_support_bounds_the_mesh_closely(name):
     shape, most = unit_shape(name), 3e-3 if name == "teapot" else 5e-5
-    check_body(shape, welded(shape).vertices, most, unit_vectors(200))
+    rounding = 3e-8 if name == "teapot" else 0  # its triangles are rounded after the body
+    check_body(shape, (1 - rounding) * welded(shape).vertices, most, unit_vectors(200))
 
 
 @pytest.mark.parametrize("name", SHAPE_NAMES)
