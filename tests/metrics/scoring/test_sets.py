@@ -5,6 +5,7 @@ import json
 from click.testing import CliRunner
 
 import cli
+from scenegen.files.info import size_text
 
 
 def call(program, *arguments):
@@ -34,7 +35,7 @@ def test_every_command_takes_a_set(make_rooms, tmp_path):
     sizes = [sum(p.stat().st_size for p in (tmp_path / "set").glob("rooms-*.h5"))]
     sizes.insert(0, (tmp_path / "one" / "rooms.h5").stat().st_size)
     for text, size in zip(told, sizes, strict=True):
-        assert text.splitlines()[0].endswith(f"8 images of 32x32, {size / 1e6:.1f} MB")
+        assert text.splitlines()[0].endswith(f"8 images of 32x32, {size_text(size)}")
     for file in ("sheet.png", "rooms-000007.ply"):
         assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "set" / file).read_bytes()
     verified = call(cli.scenegen, "verify", tmp_path / "set", "--items", 2)

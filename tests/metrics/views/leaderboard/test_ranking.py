@@ -188,7 +188,7 @@ def test_skill_stands_before_the_score_and_floors_below_the_methods():
     assert cells["better"][2] == "0.5"
     assert cells["floor: empty room"] == ["-", "0.4000", "0"]
     assert rests(table)["better"][2] == "[-0.5, 0.9]"
-    assert best(table)[2:] == [[False] * 3] * 2
+    assert best(table)[2:] == [[False] * 3]
     right = Skill(0.25, 0.1, 0.4, 0.5, "outline")
     table = leaderboard([iqtt_scores("q", [1, 0], skills={"iqtt_accuracy": right})])[0]
     assert table.head[2] == "IQTT accuracy: skill ↑"
@@ -259,7 +259,8 @@ def test_what_is_too_wide_becomes_two_tables():
 def test_a_test_set_has_one_floor():
     """Which every comparable file of it states; another one is forged, or of another release."""
     skill = Skill(0.9, 0.8, 1.0, 2.0, "empty_room_chamfer")
-    with refused(FloorError, "b.json: skills.chamfer.floor", "2.0", "0.4, as in a.json"):
+    where = "b.json: skills.chamfer.floor (empty_room_chamfer)"
+    with refused(FloorError, where, "2.0", "0.4, as in a.json"):
         leaderboard([skilled("a"), skilled("b", skills={"chamfer": skill})])
     part = skilled("b", skills={"chamfer": skill}, comparable=False)
     assert leaderboard([part, skilled("a")])[0].rows[2].cells[-1].value != "2.000"
