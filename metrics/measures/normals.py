@@ -5,6 +5,7 @@ decides which pixels are scored. Angles are in degrees. The paper reports no err
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -53,21 +54,36 @@ def angular_errors_degrees(
     inside = require_mask(mask, t.shape[:-1])
     require_finite(p, "predicted normals", inside)
     require_finite(t, "true normals", inside)
-    p, t = _unit(p[inside], "predicted normals"), _unit(t[inside], "true normals")
-    cross = np.linalg.norm(np.cross(p, t), axis=-1)
-    angles: Array = np.degrees(np.arctan2(cross, (p * t).sum(axis=-1)))
+    a, b = _unit(p[inside], "predicted normals"), _unit(t[inside], "true normals")
+    angles: Array = np.degrees(np.arctan2(_length(_cross(a, b)), _dot(a, b)))
     return angles
 
 
+# Components lie apart, (3, ...): sums over the last axis of (..., 3) take several times as long.
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
+
+
+def _length(a: Array) -> Array:
+    return np.sqrt(_dot(a, a))
+
+
+def _cross(a: Sequence[Array] | Array, b: Sequence[Array] | Array) -> Array:
+    x, y, z = a
+    u, v, w = b
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u])
+
+
 def _unit(vectors: Array, what: str) -> Array:
+    """Return unit vectors (3, N) of vectors (N, 3)."""
+    parts = np.ascontiguousarray(vectors.T)
     # Dividing by the largest component first keeps the squares from overflowing or vanishing.
-    largest = np.abs(vectors).max(axis=-1, keepdims=True)
+    largest = np.abs(parts).max(axis=0)
     if not largest.all():
         count = np.count_nonzero(largest == 0.0)
         raise NoDirectionError(what, f"{count} vectors of length 0", "directions")
-    scaled = vectors / largest
-    unit: Array = scaled / np.linalg.norm(scaled, axis=-1, keepdims=True)
-    return unit
+    scaled = parts / largest
+    return np.asarray(scaled / _length(scaled))
 
 
 def normal_scores(angles: Array) -> dict[str, float]:
@@ -119,15 +135,16 @@ def normals_from_points(points: ArrayLike, fov_y_degrees: float, mask: Mask) -> 
     image = np.where(inside[..., None], as_float64(points, "points"), 0.0)
     require_finite(image, "points")
     height, width = inside.shape
-    rays = np.moveaxis(pixel_directions(height, width, fov_y_degrees), -1, 0)
-    rays = rays / np.linalg.norm(rays, axis=0)
-    steps, counted, near = _neighbours(np.moveaxis(image, -1, 0), rays, inside)
+    rays = np.ascontiguousarray(np.moveaxis(pixel_directions(height, width, fov_y_degrees), -1, 0))
+    rays /= _length(rays)
+    parts = np.ascontiguousarray(np.moveaxis(image, -1, 0))
+    steps, counted, near = _neighbours(parts, rays, inside)
     normals, on_surface = _fit_planes(steps, near, rays)
     on_surface &= inside
     rest = inside & ~on_surface
     loose, spanned = _fit_planes(steps[:, :, rest], counted[:, rest], rays[:, rest])
     normals[:, rest] = np.where(spanned, loose, -rays[:, rest])
-    normals *= np.where(inside, -np.copysign(1.0, (normals * rays).sum(axis=0)), 0.0)
+    normals *= np.where(inside, -np.copysign(1.0, _dot(normals, rays)), 0.0)
     return np.moveaxis(normals, 0, -1), on_surface
 
 
@@ -136,13 +153,16 @@ def _neighbours(points: Array, rays: Array, inside: Mask) -> tuple[Array, Mask, 
     height, width = inside.shape
     padded, padded_inside = np.pad(points, ((0, 0), (1, 1), (1, 1))), np.pad(inside, 1)
     windows = [(..., slice(i, i + height), slice(j, j + width)) for i, j in _NEIGHBOURS]
-    steps = np.stack([padded[window] - points for window in windows])
+    steps = np.empty((8, 3, height, width))
+    for step, window in zip(steps, windows, strict=True):
+        np.subtract(padded[window], points, out=step)
     counted = np.stack([padded_inside[window] for window in windows]) & inside
     steps *= counted[:, None]
     # Only the shape of the patch matters. Dividing by its size keeps powers from overflowing.
-    size = np.abs(steps).max(axis=(0, 1))
+    size = np.maximum(steps.max(axis=(0, 1)), -steps.min(axis=(0, 1)))
     steps /= np.where(size > 0.0, size, 1.0)
-    along, lengths = (steps * rays).sum(axis=1), np.square(steps).sum(axis=1)
+    x, y, z = np.moveaxis(steps, 1, 0)
+    along, lengths = x * rays[0] + y * rays[1] + z * rays[2], x * x + y * y + z * z
     grazing = math.cos(math.radians(GRAZING_DEGREES)) ** 2
     return steps, counted, counted & (np.square(along) <= grazing * lengths)
 
@@ -155,14 +175,18 @@ def _fit_planes(steps: Array, counted: Mask, rays: Array) -> tuple[Array, Mask]:
     choose which side of it faces the viewer.
     """
     number = 1.0 + counted.sum(axis=0)
-    kept = steps * counted[:, None]
+    kept = steps if counted.all() else steps * counted[:, None]
     mean = kept.sum(axis=0) / number
-    scatter = {
-        (a, b): (kept[:, a] * kept[:, b]).sum(axis=0) / number - mean[a] * mean[b]
-        for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
-    }
-    normals, clear = _least_axis(*scatter.values())
-    return normals, clear & (np.abs((normals * rays).sum(axis=0)) > _EDGE_ON)
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
+    scatter = np.zeros((6, *mean.shape[1:]))
+    for step in kept:
+        for total, (a, b) in zip(scatter, pairs, strict=True):
+            total += step[a] * step[b]
+    for total, (a, b) in zip(scatter, pairs, strict=True):
+        total /= number
+        total -= mean[a] * mean[b]
+    normals, clear = _least_axis(*scatter)
+    return normals, clear & (np.abs(_dot(normals, rays)) > _EDGE_ON)
 
 
 def _least_axis(
@@ -182,13 +206,17 @@ def _least_axis(
     angle = np.arccos(np.clip(cosine, -1.0, 1.0)) / 3.0
     largest = third + 2.0 * spread * np.cos(angle)
     least = third + 2.0 * spread * np.cos(angle + 2.0 * math.pi / 3.0)
-    rows = np.array([[xx - least, xy, xz], [xy, yy - least, yz], [xz, yz, zz - least]])
+    rows = (xx - least, xy, xz), (xy, yy - least, yz), (xz, yz, zz - least)
     # The cross product of two independent rows is the eigenvector; the longest one is most exact.
-    candidates = np.stack([np.cross(rows[i], rows[i - 1], axis=0) for i in range(3)])
-    lengths = np.linalg.norm(candidates, axis=1)
-    best = lengths.argmax(axis=0)[None]
-    axis = np.take_along_axis(candidates, best[:, None], axis=0)[0]
-    length = np.take_along_axis(lengths, best, axis=0)[0]
+    axis = _cross(rows[0], rows[2])
+    length = _dot(axis, axis)
+    for i in (1, 2):
+        other = _cross(rows[i], rows[i - 1])
+        square = _dot(other, other)
+        longer = square > length
+        np.copyto(axis, other, where=longer)
+        np.copyto(length, square, where=longer)
+    length = np.sqrt(length)
     middle = 3.0 * third - largest - least
     # With three equal eigenvalues all rows are 0, and there is no smallest axis.
     clear = (middle > _THINNEST * largest) & (length > 1e-12 * largest * largest)
