@@ -60,10 +60,17 @@ def fitted_geometry(
 
 def depth_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees: float) -> Array:
     """Return planar depth (H, W) as scores see it, for pictures; no value needs to be finite."""
+    return np.asarray(-points_as_scored(predicted, true_depth, fov_y_degrees)[..., 2])
+
+
+def points_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees: float) -> Array:
+    """Return points (H, W, 3) as scores see them, NaN where one of both is not finite."""
     known = np.isfinite(true_depth)
     finite = np.isfinite(predicted.geometry)
     known &= finite.all(axis=-1) if predicted.kind == "points" else finite
-    return fitted_geometry(predicted, true_depth, fov_y_degrees, known).depth
+    image = np.full((*known.shape, 3), np.nan)
+    image[known] = fitted_geometry(predicted, true_depth, fov_y_degrees, known).points
+    return image
 
 
 def scored_alignment(kind: str, alignment: Alignment) -> Alignment:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.normals import angular_errors_degrees
-from metrics.scoring.geometry import depth_as_scored
+from metrics.scoring.geometry import points_as_scored
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.submissions.reader import RoomPredictions
 from metrics.viewing.order import RowScores, sortable, worst_first
@@ -105,17 +105,17 @@ class PredictionPage(ScenePage):
         self._legend.visible = self.controls["error"].value == ERROR
         clouds = list[Cloud]()
         for room in shown:
-            depth = self._depth(room)
-            surfels = surfels_of(room, depth)
+            points = self._points(room)
+            depth, surfels = -points[..., 2], surfels_of(room, points)
             surfels = surfels.moved(aside(room)) if place == BESIDE else surfels
             colors = self._colors(room, depth, surfels)
             clouds.append(Cloud(f"/prediction/{room.index}", room, surfels, colors))
             clouds += [] if place == ALONE else [self.truth_cloud(room)]
         return clouds
 
-    def _depth(self, room: Room) -> Array:
+    def _points(self, room: Room) -> Array:
         predicted = self._predictions.view(self._entries[room.index])
-        return depth_as_scored(predicted, room.depth, room.fov_y_degrees)
+        return points_as_scored(predicted, room.depth, room.fov_y_degrees)
 
     def _normal(self, room: Room) -> Array | None:
         if not self._predictions.has_normals:
@@ -140,7 +140,7 @@ class PredictionPage(ScenePage):
             scores = self._scores.of(room.index)
             names = [n for n in dict.fromkeys((chosen, *SHOWN_SCORES)) if n in scores]
             lines = {metric(name).title: _score(name, scores[name]) for name in names}
-            absent = np.count_nonzero(~has_surfel(self._depth(room)))
+            absent = np.count_nonzero(~has_surfel(-self._points(room)[..., 2]))
             if absent:
                 lines["Not shown"] = f"{absent} pixels whose depth is no place in view"
             text += paragraph(view_label(room)) + table(lines)
@@ -149,7 +149,7 @@ class PredictionPage(ScenePage):
     def describe_surfel(self, cloud: Cloud, i: int) -> dict[str, str]:
         """Return both depths of a surfel's pixel, and the angle between its normals."""
         room, (y, x) = cloud.room, cloud.surfels.pixels[i]
-        true, predicted = float(room.depth[y, x]), float(self._depth(room)[y, x])
+        true, predicted = float(room.depth[y, x]), float(-self._points(room)[y, x, 2])
         lines = {
             "true depth": f"{true:.5f}",
             "predicted depth": f"{predicted:.5f}",

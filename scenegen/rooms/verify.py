@@ -188,8 +188,10 @@ def _rendered_again(rooms: RoomsFile, rows: Sequence[int], device: str, objects:
         with np.errstate(all="ignore"):
             edges = _edges(pixels["object_id"], pixels["normal"]) if rounded else None
             differs = [
-                name for name in differs
-                if name not in rounded or not _within_tolerance(name, *pairs[name], edges, rooms.spec)
+                name
+                for name in differs
+                if name not in rounded
+                or not _within_tolerance(name, *pairs[name], edges, rooms.spec)
             ]
         if differs:
             wrong.append(f"row {row} ({', '.join(differs)})")

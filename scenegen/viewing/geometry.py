@@ -58,11 +58,12 @@ def has_surfel(depth: Array) -> Array:
     return np.asarray(np.isfinite(depth) & (depth > 0) & (depth <= FARTHEST))
 
 
-def surfels_of(room: Room, depth: Array | None = None) -> Surfels:
-    """Return the surfels of a view, or of another planar depth map, (H, W), scene units."""
-    depth = room.depth if depth is None else depth
-    seen = has_surfel(depth)
-    points = back_project(depth, room.fov_y_degrees)[seen]
+def surfels_of(room: Room, predicted: Array | None = None) -> Surfels:
+    """Return the surfels of a view, or of other points, (H, W, 3), camera frame, scene units."""
+    image = back_project(room.depth, room.fov_y_degrees) if predicted is None else predicted
+    depth = -image[..., 2]
+    seen = has_surfel(depth) & (np.abs(image) <= FARTHEST).all(axis=-1)
+    points = image[seen]
     middle = float(np.median(depth[seen])) if len(points) else 0.0
     spacing = pixel_size(len(depth), room.fov_y_degrees) * middle
     points = transform_points(room.world_from_camera, points).astype(np.float32)

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from scenegen import open_rooms
+from scenegen.camera import back_project
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.objects.catalogue import built_in_shape
 from scenegen.viewing.geometry import (
@@ -29,7 +30,7 @@ def rooms(rooms_path):
 
 def surfels(room, depth=None):
     depth = room.depth if depth is None else depth
-    return surfels_of(room, depth)
+    return surfels_of(room, back_project(depth, room.fov_y_degrees))
 
 
 def test_pixels_without_a_depth_in_view_have_no_surfel(rooms):
