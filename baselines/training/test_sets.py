@@ -1,5 +1,6 @@
 """Test sets are not trained on, unless somebody means it."""
 
+import itertools
 import json
 import shlex
 from typing import Any
@@ -30,28 +31,20 @@ def refuse_test_set(data: str, allowed: bool = False) -> None:
 def _like(text: str) -> KnownTest | None:
     """Return the test set of rooms that has the seed and the objects of a specification."""
     try:
-        found: Any = json.loads(text)
-    except ValueError:
+        spec: Any = json.loads(text)
+        found = [spec[name] for name in SAME]
+    except (ValueError, TypeError, KeyError):
         return None
-    return next(
-        (test for test in KNOWN_TESTS if test.task == "rooms" and _settings(test) == _chosen(found)),
-        None,
-    )
-
-
-def _chosen(spec: Any) -> list[Any]:
-    values = [spec.get(name) if isinstance(spec, dict) else None for name in SAME]
-    return [*values[:2], *(list(x) if isinstance(x, list) else x for x in values[2:])]
+    return next((test for test in KNOWN_TESTS if _settings(test) == found), None)
 
 
 def _settings(test: KnownTest) -> list[Any]:
-    """Return `SAME` of the scenes of a set; nothing of one whose seed is the default."""
+    """Return `SAME` of the scenes of a set of rooms; nothing where the seed is the default."""
     from scenegen.description.presets import preset_spec
 
-    words = shlex.split(test.command)
-    given = dict(zip(words, words[1:], strict=False))
-    if "--seed" not in given:
+    given = dict(itertools.pairwise(shlex.split(test.command)))
+    if test.task != "rooms" or "--seed" not in given:
         return []
     split = {"object_split": given["--object-split"]} if "--object-split" in given else {}
     spec = preset_spec(given.get("--preset", "shapes"), seed=int(given["--seed"]), **split)
-    return _chosen(json.loads(spec.to_json()))
+    return [json.loads(spec.to_json())[name] for name in SAME]

@@ -28,15 +28,11 @@ def _list() -> None:
         print_line(f"{name}: {files[0].purpose}")
         print_line(f"  {files[0].command}")
         for test in files:
-            print_line(f"  {test.digest}  {test.rows:,} {_rows(test.task)}, {test.file}")
+            print_line(f"  {test.digest}  {test.rows:,} rows, {test.file}")
     print_line("made by older versions, whose bits were others:")
     for test in known_tests.KNOWN_TESTS:
         if test.superseded:
-            print_line(f"  {test.digest}  {test.rows:,} {_rows(test.task)}, {test.name}")
-
-
-def _rows(task: str) -> str:
-    return "images" if task == "rooms" else "questions"
+            print_line(f"  {test.digest}  {test.rows:,} rows, {test.name}")
 
 
 @sets_command.command("make", epilog=EXAMPLE + "bench sets make rooms-1 --out sets")

@@ -104,6 +104,26 @@ _DIGESTS = {
         "23b685fb1fcd5bd170ecb34acaa926904013188bd16413ed81ff4efc3cf6049a",
     ),
 }
+# What older code made, whose bits were others: name, rows, digest of the truth, options.
+_VIEWS = "--views 0,5,35,55,80 --seed 1000"
+_SUPERSEDED = (
+    ("examples/sample", 8,
+     "6d2a4170b2a42be92410c52c81a2c56d108523820a988704564a7e9b22ee0f4b", "--n 8 --size 48"),
+    ("1,000 rooms, seed 1000", 1000,
+     "db8c4f30cf0da0c6ce37c09c642b25af9d6e10eb4bca11efb4ef5ca919824107", "--n 1000 --seed 1000"),
+    ("300 rooms of the README", 1500,
+     "f40106593f40af3e40f298efbd74f7abade2909a6c6edfd182151279e2c50c06",
+     f"--n 300 --size 64 {_VIEWS}"),
+    ("test-shapes-single", 5000,
+     "d5464a3807a180002dfc0bddf5c1745d862564c15874223e64a990292a8bf3dc",
+     f"--preset shapes-single --n 1000 {_VIEWS}"),
+    ("test-shapes", 5000,
+     "d025e6fc432363c08b068a8b0573ceacbcc2d9d0efa6d90ec4fabaded989b634",
+     f"--preset shapes --n 1000 {_VIEWS}"),
+    ("test-shapenet", 5000,
+     "bfa4bdaf2f5c1e64a81c8299ca20da9f3599b825b97e2162e91170529cf5fe67",
+     f"--preset shapenet --object-split test --n 1000 {_VIEWS}"),
+)  # fmt: skip
 KNOWN_TESTS = (
     *(
         KnownTest(name, "rooms", _DIGESTS[name][0], rows, command, purpose, _DIGESTS[name][1])
@@ -114,54 +134,9 @@ KNOWN_TESTS = (
         for name, (truth, pictures) in _DIGESTS.items()
         if name.startswith("rotation-1/")
     ),
-    KnownTest(
-        "examples/sample",
-        "rooms",
-        "6d2a4170b2a42be92410c52c81a2c56d108523820a988704564a7e9b22ee0f4b",
-        8,
-        "scenegen render --n 8 --size 48 --out rooms.h5",
-        superseded=True,
-    ),
-    KnownTest(
-        "1,000 rooms, seed 1000",
-        "rooms",
-        "db8c4f30cf0da0c6ce37c09c642b25af9d6e10eb4bca11efb4ef5ca919824107",
-        1000,
-        "scenegen render --n 1000 --seed 1000",
-        superseded=True,
-    ),
-    KnownTest(
-        "300 rooms of the README",
-        "rooms",
-        "f40106593f40af3e40f298efbd74f7abade2909a6c6edfd182151279e2c50c06",
-        1500,
-        "scenegen render --preset shapes --views 0,5,35,55,80 --n 300 --seed 1000 --size 64",
-        superseded=True,
-    ),
-    KnownTest(
-        "test-shapes-single",
-        "rooms",
-        "d5464a3807a180002dfc0bddf5c1745d862564c15874223e64a990292a8bf3dc",
-        5000,
-        "scenegen render --preset shapes-single --n 1000 --views 0,5,35,55,80 --seed 1000",
-        superseded=True,
-    ),
-    KnownTest(
-        "test-shapes",
-        "rooms",
-        "d025e6fc432363c08b068a8b0573ceacbcc2d9d0efa6d90ec4fabaded989b634",
-        5000,
-        "scenegen render --preset shapes --n 1000 --views 0,5,35,55,80 --seed 1000",
-        superseded=True,
-    ),
-    KnownTest(
-        "test-shapenet",
-        "rooms",
-        "bfa4bdaf2f5c1e64a81c8299ca20da9f3599b825b97e2162e91170529cf5fe67",
-        5000,
-        "scenegen render --preset shapenet --object-split test "
-        "--n 1000 --views 0,5,35,55,80 --seed 1000",
-        superseded=True,
+    *(
+        KnownTest(name, "rooms", digest, rows, f"scenegen render {options}", superseded=True)
+        for name, rows, digest, options in _SUPERSEDED
     ),
 )
 

@@ -83,9 +83,8 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
     threads = sizes[model]
     first_thread = np.cumsum(threads) - threads
     turn = np.swapaxes(batch.world_from_camera[:, :3, :3], 1, 2)
-    camera_from_world = np.concatenate(
-        [turn, -product(turn, batch.world_from_camera[:, :3, 3:])], 2
-    )
+    moved = -product(turn, batch.world_from_camera[:, :3, 3:])
+    camera_from_world = np.concatenate([turn, moved], axis=2)
     placed = np.zeros((max(1, len(model)), 13))
     moved = product(camera_from_world[image], batch.world_from_object[image, slot])
     placed[: len(model), :12] = moved.reshape(-1, 12)

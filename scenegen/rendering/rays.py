@@ -172,7 +172,7 @@ def _exact_hit(scenes: Scenes, first: Any, face: Any, o: Any, u: Any) -> Any:
         planes = [edge_plane(b, c), edge_plane(c, a), edge_plane(a, b)]
         sides = mi.Vector3f(*(dr.dot(plane, u) for plane in planes))
         total = sides.x + sides.y + sides.z
-        sides = sides * dr.sign(total)
+        sides = dr.select(total < 0, -sides, sides)
         least = dr.min(sides)
         inside = (least >= 0) & (total != 0)
         normal = dr.cross(b - a, c - a)

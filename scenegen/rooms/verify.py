@@ -186,12 +186,11 @@ def _rendered_again(rooms: RoomsFile, rows: Sequence[int], device: str, objects:
         off += bool(differs)
         rounded = differs if others else ["image"] if rooms.spec.shading == "path" else []
         with np.errstate(all="ignore"):
-            edges = _edges(pixels["object_id"], pixels["normal"]) if rounded else None
+            edges = _edges(pixels["object_id"], pixels["normal"])
             differs = [
-                name
-                for name in differs
-                if name not in rounded
-                or not _within_tolerance(name, *pairs[name], edges, rooms.spec)
+                x
+                for x in differs
+                if x not in rounded or not _within_tolerance(x, *pairs[x], edges, rooms.spec)
             ]
         if differs:
             wrong.append(f"row {row} ({', '.join(differs)})")

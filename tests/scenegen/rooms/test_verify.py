@@ -150,7 +150,8 @@ def nudged(name, by):
         (at_edge, True),
         (put("object_id", (2, 7, slice(9, 13)), 3), False),
     ],
-    ids=["as rendered", "depth 5e-5", "one depth", "depth 1e-2", "normal 5e-4", "normal 5e-3", "image 1",
+    ids=["as rendered", "depth 5e-5", "one depth", "depth 1e-2", "normal 5e-4", "normal 5e-3",
+         "image 1",
          "image 3", "one id", "one id at an edge", "four ids"],
 )  # fmt: skip
 def test_other_versions_are_told_and_compared_within_a_tolerance(damaged, other, edit, alike):

@@ -210,8 +210,7 @@ def test_samples_in_several_goes_make_the_same_picture(spp, monkeypatch, variant
     best = render(pack(replace(PATH, spp=512), [scene])).image  # in one go: shares no noise
     once, two = render(batch).image, render(pack(replace(PATH, spp=2), [scene])).image
     path_tracer = importlib.import_module("scenegen.rendering.path_tracing.path_tracer")
-    tracer = "scenegen.rendering.path_tracing.path_tracer"
-    monkeypatch.setattr(importlib.import_module(tracer), "RAYS_AT_ONCE", 2 * 24 * 32)
+    monkeypatch.setattr(path_tracer, "RAYS_AT_ONCE", 2 * 24 * 32)
     parts = render(batch).image
     assert parts.tobytes() != once.tobytes()
     error_once, error_parts, error_two = (
@@ -227,8 +226,8 @@ def test_noise_of_neighbours_is_independent_and_falls_with_the_samples(
 ):
     """However many passes an image takes."""
     side, spp = 192, 16
-    tracer = "scenegen.rendering.path_tracing.path_tracer"
-    monkeypatch.setattr(importlib.import_module(tracer), "RAYS_AT_ONCE", side * side * spp // passes)
+    path_tracer = importlib.import_module("scenegen.rendering.path_tracing.path_tracer")
+    monkeypatch.setattr(path_tracer, "RAYS_AT_ONCE", side * side * spp // passes)
     room = replace(OPEN, objects=(), room_reflectance=(0.7,) * 3, ambient=(0.3,) * 3)
     spec = replace(PATH, height=side, width=side, objects=(0, 0), lights=(1, 1), spp=spp)
 
