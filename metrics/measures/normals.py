@@ -179,12 +179,10 @@ def _fit_planes(steps: Array, counted: Mask, rays: Array) -> tuple[Array, Mask]:
     mean = kept.sum(axis=0) / number
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
     scatter = np.zeros((6, *mean.shape[1:]))
-    for step in kept:
-        for total, (a, b) in zip(scatter, pairs, strict=True):
-            total += step[a] * step[b]
-    for total, (a, b) in zip(scatter, pairs, strict=True):
-        total /= number
-        total -= mean[a] * mean[b]
+    for k, (a, b) in enumerate(pairs):
+        for step in kept:
+            scatter[k] += step[a] * step[b]
+        scatter[k] = scatter[k] / number - mean[a] * mean[b]
     normals, clear = _least_axis(*scatter)
     return normals, clear & (np.abs(_dot(normals, rays)) > _EDGE_ON)
 
