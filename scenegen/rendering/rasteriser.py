@@ -69,6 +69,18 @@ class Triangles:
     slot: Any
 
 
+def _unsheared(world_from_camera: Array) -> Array:
+    """Return the inverses, (B, 3, 3), of rotations, or of such whose third column is sheared.
+
+    Those of rotations are the transposed, to the bit.
+    """
+    right, up, sheared = np.moveaxis(world_from_camera, 2, 0)
+    aside = [(axis * sheared).sum(axis=1, keepdims=True) for axis in (right, up)]
+    across, above = (np.where(np.abs(value) < 1e-9, 0.0, value) for value in aside)
+    back = sheared - across * right - above * up
+    return np.stack([right - across * back, up - above * back, back], axis=1)
+
+
 def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Triangles:
     """Copy the meshes of a batch, as from `cast_mesh` for each of its names, to the device."""
     spec = batch.spec
@@ -82,7 +94,7 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
     model = batch.shape[image, slot]
     threads = sizes[model]
     first_thread = np.cumsum(threads) - threads
-    turn = np.swapaxes(batch.world_from_camera[:, :3, :3], 1, 2)
+    turn = _unsheared(batch.world_from_camera[:, :3, :3])
     moved = -product(turn, batch.world_from_camera[:, :3, 3:])
     camera_from_world = np.concatenate([turn, moved], axis=2)
     placed = np.zeros((max(1, len(model)), 13))

@@ -30,7 +30,7 @@ def point_hints(samples: Sequence[Sample], alignment: Alignment) -> list[Problem
 def _point_hints(samples: Sequence[Sample], alignment: Alignment) -> list[Problem]:
     if not samples:
         return []
-    off = np.array([np.median(pixels_off_rays(*_seen(s), s.pitch)) for s in samples])
+    off = np.array([_off(s, alignment) for s in samples])
     found = []
     if np.median(off) > OFF_PIXELS:
         found.append(f"points leave the rays of their pixels by {np.median(off):.1f} pixels")
@@ -86,8 +86,10 @@ def _points(sample: Sample) -> Array:
     return sample.points[sample.mask]
 
 
-def _seen(sample: Sample) -> tuple[Array, Array]:
-    return _points(sample), sample.rays[sample.mask]
+def _off(sample: Sample, alignment: Alignment) -> float:
+    """Return the median distance from the rays in pixels, after the declared alignment."""
+    points = align_points(_points(sample), sample.true_points, alignment)
+    return float(np.median(pixels_off_rays(points, sample.rays[sample.mask], sample.pitch)))
 
 
 def _error(sample: Sample, points: Array, alignment: Alignment) -> float:

@@ -63,7 +63,7 @@ def found(points, normals, true, true_normals, mask, pitch, on_rays=False):
 
 CASES = {
     "noise": lambda t: t * RNG.uniform(0.98, 1.02, (*t.shape[:2], 1)),
-    "wide": lambda t: t * [1.3, 0.9, 1.0],
+    "wide": lambda t: t * [1.31, 0.9, 1.0],
     "mirrored": lambda t: t * [-1.0, 1.0, 1.0],
     "behind": lambda t: t * np.where(np.arange(t.shape[1]) < 3, -1.0, 1.0)[:, None],
     "aside": lambda t: t + np.array([5.0, 0.0, 0.0]),

@@ -16,7 +16,7 @@ from object_folders import SMALL, Run, models_of, render
 def test_a_broken_model_is_passed_over_and_told_of(run: Run, meshes: Path) -> None:
     result = render(run, "--objects-root", meshes, count=20)
     assert result.stdout.startswith("rooms.h5: 20 images, ")
-    assert len(result.stdout.splitlines()) == 1
+    assert len(result.stdout.splitlines()) == 2, "images, and how much of them is saturated"
     note, _ = result.stderr.splitlines()  # the other is on the axis of .stl files
     assert note.startswith("note: mug/broken was passed over: ")
     used = set(models_of())

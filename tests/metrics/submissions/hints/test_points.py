@@ -47,7 +47,8 @@ def test_mistakes(rooms_path, tmp_path, name):
 @pytest.mark.parametrize("alignment", ["none", "scale", "scale_shift"])
 def test_points_on_their_rays_get_no_hint(rooms_path, tmp_path, alignment):
     factor = 1.0 if alignment == "none" else 3.0
-    assert told(rooms_path, tmp_path / "p.h5", lambda p, *_: factor * p, alignment) == []
+    shift = np.array([0.5, -0.2, -1.0]) * (alignment == "scale_shift")
+    assert told(rooms_path, tmp_path / "p.h5", lambda p, *_: factor * p + shift, alignment) == []
 
 
 def test_points_that_nothing_explains_are_only_off_their_rays(rooms_path, tmp_path):
