@@ -28,7 +28,7 @@ def make_meta(method, runs=1, truth=TRUTH, digest=DIGEST, **other):
         Submission(f"{method}-{i}.h5", f"{number}{i:x}".rjust(64, "0"), f"seed {i}")
         for i in range(runs)
     )
-    fields = {"truth_path": "rooms.h5", "writer": "bench 0.1.0", "truth_digest": digest}
+    fields = {"truth_path": "rooms.h5", "writer": "bench 0.2.0", "truth_digest": digest}
     fields |= {"versions": {"numpy": "2.4.6", "h5py": "3.12"}, "truth_given": True}
     fields |= {"seed": 0, "resamples": 2000}
     return Meta(truth_fingerprint=truth, submissions=submissions, **{**fields, **other})
