@@ -124,8 +124,9 @@ def normals_from_points(points: ArrayLike, fov_y_degrees: float, mask: Mask) -> 
     pixel and its 8 neighbours (total least squares, Hoppe et al. 1992), and faces the viewer. A
     neighbour does not count if it is outside the image or the mask, or
     across a depth discontinuity: if the line to it is within 10 degrees of the viewing ray. Where
-    fewer than 2 are left, or all lie on one line, every neighbour in the mask counts; if those do
-    not span a plane either, the normal points at the viewer. Outside the mask normals are 0.
+    fewer than 2 are left, all lie on one line, or the plane is seen edge-on, every neighbour in the
+    mask counts; if those do not tell a plane either, the normal points at the viewer. Outside the
+    mask normals are 0.
 
     Normals are reliable where the first rule sufficed. Score the pixels where that holds for the
     truth. A prediction has a normal at every pixel of the mask, so that noisy depth takes no pixel

@@ -41,8 +41,8 @@ class Settings:
     Attributes:
         seed, resamples: seed and number of samples of the bootstrap.
         allow_partial: score the rows that are there; the result is not comparable.
-        non_finite: "error", or "penalise" (see `image_scores.score_view`); where a value had to be
-            penalised, the result is not comparable.
+        non_finite: "error", or "penalise" (see `image_scores.score_prediction`); where a value had
+            to be penalised, the result is not comparable.
         processes: how many processes score rooms; None for one a core. Changes no number.
         cluster: whose workers score rooms instead; they must see the files. Changes no number.
         floors: a file of floors of questions, as `iqtt floors` writes it; None for those of the
