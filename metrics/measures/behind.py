@@ -42,7 +42,8 @@ def hidden_from(
     row = np.floor(height / 2.0 - seen[:, 1] / ahead / pitch)
     outside = (depth <= 0.0) | (column < 0) | (column >= width) | (row < 0) | (row >= height)
     away = ((origin - points) * normals).sum(axis=1) <= 0.0
-    padded = np.pad(np.where(np.isfinite(first_depth), first_depth, np.inf), 1, mode="edge")
+    seen_depth = np.where(np.isfinite(first_depth), first_depth, np.inf).astype(np.float64)
+    padded = np.pad(seen_depth, 1, mode="edge")
     farthest = np.maximum.reduce(
         [padded[i : i + height, j : j + width] for i, j in np.ndindex(3, 3)]
     )

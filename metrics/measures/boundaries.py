@@ -34,7 +34,9 @@ def boundary_scores(depth: Array, true_depth: Array, mask: Array) -> dict[str, f
     Args:
         mask: the scored pixels, (H, W); pairs of two of them count.
     """
-    said, true = (np.where(mask, np.maximum(d, NEAREST), 1.0) for d in (depth, true_depth))
+    said, true = (
+        np.where(mask, np.maximum(d.astype(np.float64), NEAREST), 1.0) for d in (depth, true_depth)
+    )
     counts = np.zeros((4, 3, len(RATIOS)))
     pairs = zip(*map(_pairs, (said, true, mask)), strict=True)
     for i, (near, truly, both) in enumerate(pairs):

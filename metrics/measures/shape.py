@@ -86,7 +86,8 @@ def shape_scores(
 def _beside_plane(points: Array) -> Array:
     """Return the depth of points (N, 3), up to sign, without its least-squares plane z(x, y)."""
     x, y, z = (axis / (float(np.abs(axis).max()) or 1.0) for axis in points.T)
-    basis = np.linalg.qr(np.stack([np.ones_like(x), x, y], axis=1))[0]
+    basis, r = np.linalg.qr(np.stack([np.ones_like(x), x, y], axis=1))
+    basis = basis[:, np.abs(np.diag(r)) > 1e-9]  # without x and y that say nothing
     return np.asarray((z - basis @ (basis.T @ z)) * float(np.abs(points[:, 2]).max()))
 
 
@@ -107,7 +108,7 @@ def one_normal_degrees(normals: Array, inside: Array) -> float:
     """
     if not len(inside):
         return np.nan
-    angles = np.empty(len(inside))
+    normals, angles = normals.astype(np.float64), np.empty(len(inside))
     for mask in _each(inside):
         mean = normals[mask].mean(axis=0)
         cosine = normals[mask] @ mean / max(float(np.linalg.norm(mean)), 1e-12)
