@@ -1,4 +1,4 @@
-"""Scores of rooms once more, in plain numpy, written from docs/definitions.md and not from the code.
+"""Scores of rooms in plain numpy, written from docs/definitions.md and not from the code.
 
 Names and order are those of the page. Arrays of pixels are (H, W, ...), with NaN at pixels that are
 not scored, or (N, ...) over the N scored pixels. Nothing here is fast.
@@ -22,12 +22,10 @@ ALIGNMENTS = {
     ("depth", "scale_shift"): ("scale_shift", "scale_shift_l1"),
     ("disparity", "scale_shift"): ("disparity_scale_shift",),
 }
-EMPTY_ROOM = "chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness"
 
 
-def items(truth: Path, submission: Path) -> dict[str, Array]:
+def items(views: list[SimpleNamespace], submission: Path) -> dict[str, Array]:
     """Return every column of `items`: (rows,), with NaN where a score is missing."""
-    views = read_truth(truth)
     with h5py.File(submission) as file:
         kind = next(k for k in ("depth", "disparity", "points") if k in file)
         alignment = file.attrs.get("alignment", "scale_shift" if kind == "disparity" else "none")
@@ -50,13 +48,7 @@ def items(truth: Path, submission: Path) -> dict[str, Array]:
             scores["fov_error_degrees"] = abs(given["fov_y_degrees"][row] - view.fov)
         if others and "relief_iou" in scores:
             scores |= other_scene(view, views[others[row]], z, P, kind)
-        empty = geometry(view, view.Z[view.mask], (view.Z[..., None] * view.d)[view.mask], "depth")
-        names = {*EMPTY_ROOM, "behind_depth_error"} & empty.keys()
-        scores |= {f"empty_room_{name}": empty[name] for name in names}
-        scores |= cut_outs(view)
-        scores |= {"row": row, "scene_index": view.scene, "view_index": view.view}
-        scores["view_angle_degrees"] = view_angle(view)
-        table.append(scores)
+        table.append(scores | view.floors | {"row": row})
     names = {name for scores in table for name in scores}
     return {name: np.array([scores.get(name, np.nan) for scores in table]) for name in names}
 
@@ -79,10 +71,15 @@ def read_truth(path: Path) -> list[SimpleNamespace]:
         same = [one for one in views if one.scene == view.scene and one.view == 0]
         view.first = same[0] if same else None
         view.hidden = hidden(view)
+        view.floors = cut_outs(view) | empty_room_scores(view)
+        view.floors |= {"scene_index": view.scene, "view_index": view.view}
+        view.floors["view_angle_degrees"] = view_angle(view)
     return views
 
 
-def view_of(depth: Array, normal: Array, ids: Array, pose: Array, fov: float, scene: int, view: int):
+def view_of(
+    depth: Array, normal: Array, ids: Array, pose: Array, fov: float, scene: int, view: int
+):
     height, width = depth.shape
     v = SimpleNamespace(scene=scene, view=view, fov=fov, H=height, W=width, stored=depth)
     v.s = 2 * np.tan(np.radians(fov) / 2) / height
@@ -215,7 +212,9 @@ def align_points(p: Array, T: Array, alignment: str) -> Array:
 def geometry(view, z: Array, P: Array, kind: str) -> dict[str, float]:
     """Return the scores of depth and points, without those after another alignment."""
     scores = depth_scores(z, view.t) | boundaries(view, z) | normals(view, P)
-    f, b = surfaces(view, P, kind)
+    between_points = nearest(P, view.T)
+    scores |= distances("paper_", *between_points)
+    f, b = surfaces(view, P, kind, *between_points)
     scores |= surface_scores(view, f, b, z)
     departure = (z - view.t)[:, None]
     if kind == "points":
@@ -343,17 +342,15 @@ def normals(view, P: Array) -> dict[str, float]:
     angles = angle(derived_normals(view, P)[0], view.derived)
     scores = normal_scores("derived_normal_", angles[view.smooth])
     scores |= part("derived_object_normal_mean_degrees", angles, smooth_part(view, view.counts))
-    return scores | part(
-        "derived_shape_normal_degrees", angles, smooth_part(view, view.inside > 0)
-    )
+    return scores | part("derived_shape_normal_degrees", angles, smooth_part(view, view.inside > 0))
 
 
 # Surfaces
 
 
-def surfaces(view, P: Array, kind: str) -> tuple[Array, Array]:
-    """Return f of each predicted and b of each true point."""
-    f, b = nearest(P, view.T), nearest(view.T, P)
+def surfaces(view, P: Array, kind: str, f: Array, b: Array) -> tuple[Array, Array]:
+    """Return f and b, given the distances between points alone."""
+    f, b = f.copy(), b.copy()
     normal = derived_normals(view, P)[0]
     index = np.full((view.H + 2, view.W + 2), -1)
     index[1:-1, 1:-1][view.mask] = np.arange(len(P))
@@ -378,10 +375,12 @@ def pixel_of(view, y: Array, s: float) -> tuple[Array, Array]:
     return np.floor(view.H / 2 - y[:, 1] / (-y[:, 2] * s)), column
 
 
-def nearest(a: Array, b: Array) -> Array:
-    """Return the distance of each a from the nearest b."""
-    found = [((b**2).sum(1) - 2 * part @ b.T).argmin(1) for part in np.array_split(a, 8)]
-    return length(a - b[np.concatenate(found)])
+def nearest(P: Array, T: Array) -> tuple[Array, Array]:
+    """Return the distance of each P from the nearest T, and of each T from the nearest P."""
+    squared = P @ (-2 * T.T)
+    squared += (T**2).sum(1)
+    squared += (P**2).sum(1)[:, None]  # not exact enough near 0
+    return length(P - T[squared.argmin(1)]), length(T - P[squared.argmin(0)])
 
 
 def patch(p: Array, m: Array, q: Array, s: float) -> Array:
@@ -477,6 +476,14 @@ def empty_room(view, lines: Array) -> Array:
     return np.where(met, depth, depth[met].max() if met.any() else 1)
 
 
+def empty_room_scores(view) -> dict[str, float]:
+    Z = view.Z[view.mask]
+    scores = geometry(view, Z, Z[:, None] * view.rays, "depth")
+    names = {"chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness"}
+    names = {*names, "behind_depth_error"} & scores.keys()
+    return {f"empty_room_{name}": scores[name] for name in names}
+
+
 def predicted_relief(view, z: Array, P: Array, kind: str) -> Array:
     Z = view.Z[view.mask].copy()
     ahead = P[:, 2] < 0
@@ -531,7 +538,6 @@ def points_scores(P: Array, T: Array) -> dict[str, float]:
 
 def points(view, P: Array) -> dict[str, float]:
     scores = points_scores(P, view.T)
-    scores |= distances("paper_", nearest(P, view.T), nearest(view.T, P))
     ks = []
     for k in view.objects:
         T = view.T[view.ids == k]
@@ -617,3 +623,43 @@ def view_angle(view) -> float:
         return np.nan
     azimuths = [np.degrees(np.arctan2(v.R[0, 2], v.R[2, 2])) for v in (view, view.first)]
     return 180 - (180 - np.round(azimuths[0] - azimuths[1])) % 360
+
+
+# Means and skills
+
+
+def scene_means(columns: dict[str, Array], values: Array) -> Array:
+    """Return the mean of each scene that has the score."""
+    there = ~np.isnan(values)
+    scenes, values = columns["scene_index"][there], values[there]
+    return np.array([values[scenes == scene].mean() for scene in np.unique(scenes)])
+
+
+def means(columns: dict[str, Array]) -> dict[str, float]:
+    return {name: scene_means(columns, values).mean() for name, values in columns.items()}
+
+
+def skills(columns: dict[str, Array]) -> dict[str, float]:
+    """Return the skills of a submission that was shown the scored view."""
+    found = {}
+    behind = [
+        f"{guess}_behind_depth_error" for guess in ("empty_room", "cut_out", "balls", "blocks")
+    ]
+    behind = sorted(
+        (name for name in behind if name in columns), key=lambda n: np.nanmean(columns[n])
+    )
+    for name, values in columns.items():
+        floors = [f"{kind}_{name}" for kind in ("empty_room", "cut_out", "other_scene")]
+        floor = next((f for f in floors if f in columns), None)
+        floor = behind[0] if name == "behind_depth_error" else floor
+        if floor is None:
+            continue
+        missing = np.isnan(values) | np.isnan(columns[floor])
+        pair = (np.where(missing, np.nan, x) for x in (values, columns[floor]))
+        a, b = (scene_means(columns, x).mean() for x in pair)
+        if floor.startswith("other_scene"):
+            b = max(b, 0)
+            a, b = 1 - a, 1 - b
+        if b > 0:
+            found[name] = 1 - a / b
+    return found

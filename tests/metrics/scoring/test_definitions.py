@@ -11,32 +11,36 @@ from scenegen.description.presets import preset_spec
 from scenegen.rooms.make import make_dataset
 
 PRESETS = {
-    "shapes": {"count": 3, "views": (0.0, 80.0)},
-    "shapenet": {"count": 4, "height": 40, "width": 32},
-    "shapes-single": {"count": 3, "allow_cropped": True, "fov_degrees": 40.0, "fov_spread_degrees": 40.0},
+    "shapes": {"views": (0.0, 80.0)},
+    "shapenet": {"height": 40},
+    "shapes-single": {"allow_cropped": True, "fov_degrees": 40.0, "fov_spread_degrees": 40.0},
 }
+
+
+def make(preset, path, **settings):
+    settings = {"height": 32, "width": 32, "seed": 8, **PRESETS[preset], **settings}
+    make_dataset(path, preset_spec(preset, **settings), 3, command="tests")
+    return path, definitions.read_truth(path)
 
 
 @pytest.fixture(scope="session", params=PRESETS)
 def truth(request, tmp_path_factory):
-    path = tmp_path_factory.mktemp("definitions") / "rooms.h5"
-    settings = {"height": 40, "width": 40, "seed": 8, **PRESETS[request.param]}
-    count = settings.pop("count")
-    make_dataset(path, preset_spec(request.param, **settings), count, command="tests")
-    return path
+    return make(request.param, tmp_path_factory.mktemp("definitions") / "rooms.h5")
 
 
 def noisy(a, rng, size=0.02):
     return a + size * rng.standard_normal(a.shape)
 
 
-def blurred(a, rng):
-    return sum(np.roll(a, (i, j), (1, 2)) for i in (-1, 0, 1) for j in (-1, 0, 1)) / 9
+def blurred(a):
+    a = np.pad(np.nan_to_num(a, nan=1.0), ((0, 0), (1, 1), (1, 1)), mode="edge")
+    height, width = a.shape[1] - 2, a.shape[2] - 2
+    return sum(a[:, i : i + height, j : j + width] for i in range(3) for j in range(3)) / 9
 
 
 def holes_filled(truth):
     """Objects give way to the farthest surface of their row of pixels."""
-    far = np.nanmax(truth["depth"], axis=2, keepdims=True)
+    far = np.nan_to_num(truth["depth"]).max(axis=2, keepdims=True)
     return np.where(truth["object_id"] > 0, far, truth["depth"])
 
 
@@ -56,8 +60,8 @@ SUBMISSIONS = {
     "median": ("depth", "median_scale", lambda t, rng: 3 * noisy(t["depth"], rng, 0.05)),
     "affine": ("depth", "scale_shift", lambda t, rng: 0.4 * noisy(t["depth"], rng) + 2),
     "constant": ("depth", "none", lambda t, rng: np.full_like(t["depth"], 1.4)),
-    "blurred": ("depth", "none", lambda t, rng: blurred(t["depth"], rng)),
-    "wild": ("depth", "none", lambda t, rng: noisy(t["depth"] - 1, rng, 0.5)),
+    "blurred": ("depth", "none", lambda t, rng: blurred(t["depth"])),
+    "wild": ("depth", "none", lambda t, rng: noisy(t["depth"] - 1, rng, 0.4)),
     "disparity": ("disparity", None, lambda t, rng: 3 / noisy(t["depth"], rng, 0.01) + 1),
     "points": ("points", "none", lambda t, rng: noisy(t["points"], rng, 0.005)),
     "mirrored": ("points", "none", lambda t, rng: t["points"] * [-1, 1, 1]),
@@ -68,13 +72,13 @@ SUBMISSIONS = {
 }
 
 
-def write(path, truth, kind, alignment, predict):
+def write(path, truth, views, kind, alignment, predict):
     """Write a submission with plain h5py, rows in any order, some with normals and camera."""
     rng = np.random.default_rng(3)
     with h5py.File(truth) as file:
         arrays = {name: file[name][()] for name in ("depth", "normal", "object_id")}
         fov, fingerprint = file["camera/fov_y_degrees"][()], file.attrs["fingerprint"]
-    views = arrays["views"] = definitions.read_truth(truth)
+    arrays["views"] = views
     arrays["points"] = arrays["depth"][..., None] * np.stack([view.d for view in views])
     order = rng.permutation(len(views))
     with h5py.File(path, "w") as file:
@@ -91,17 +95,37 @@ def write(path, truth, kind, alignment, predict):
             file["fov_y_degrees"] = noisy(fov, rng)[order]
 
 
-@pytest.mark.parametrize("name", SUBMISSIONS)
-def test_the_page_gives_the_numbers(name, truth, tmp_path):
-    write(tmp_path / "mine.h5", truth, *SUBMISSIONS[name])
-    found = score([tmp_path / "mine.h5"], truth, Settings(processes=1, resamples=20))
+def check(truth, submission, name):
+    path, views = truth
+    write(submission, path, views, *SUBMISSIONS[name])
+    found = score([submission], path, Settings(processes=1, resamples=100))
     columns = {**found.columns, **found.items}
-    columns = {name: values for name, values in columns.items() if not np.isnan(values).all()}
-    expected = definitions.items(truth, tmp_path / "mine.h5")
+    columns = {column: v for column, v in columns.items() if not np.isnan(v).all()}
+    expected = definitions.items(views, submission)
     assert columns.keys() == expected.keys()
+    agree(columns, expected)
+    means, skills = definitions.means(expected), definitions.skills(expected)
+    agree({key: one.value for key, one in found.metrics.items()}, means)
+    agree({key: one.value for key, one in found.skills.items()}, skills, 1e-5)
+
+
+def agree(found, expected, near_zero=1e-6):
     wrong = {
-        column: (columns[column], values)
-        for column, values in expected.items()
-        if columns[column] != pytest.approx(values, rel=1e-6, abs=1e-6, nan_ok=True)
+        column: (values, expected.get(column))
+        for column, values in found.items()
+        if values != pytest.approx(expected.get(column), rel=1e-6, abs=near_zero, nan_ok=True)
     }
     assert wrong == {}
+
+
+@pytest.mark.parametrize("name", SUBMISSIONS)
+def test_the_page_gives_the_numbers(name, truth, tmp_path):
+    check(truth, tmp_path / "mine.h5", name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_page_gives_the_numbers_of_other_rooms(preset, tmp_path):
+    made = make(preset, tmp_path / "rooms.h5", seed=21, height=48, width=44)
+    for number, name in enumerate(SUBMISSIONS):
+        check(made, tmp_path / f"{number}.h5", name)
