@@ -311,7 +311,10 @@ def _columns(
         if name in whole:
             limits = _LIMITS.get(name, (0, LARGEST_WHOLE))
             # An angle may be unknown, null.
-            columns[name] = _numbers(where, values, *limits, whole=name != "view_angle_degrees")
+            angles = name == "view_angle_degrees"
+            columns[name] = _numbers(where, values, *limits, whole=not angles)
+            if angles and (columns[name] % 1.0 > 0.0).any():
+                raise refusal(where, "part of a degree", "whole degrees, or null")
         elif name == SHAPE_COLUMN and place == "objects":
             with _naming(where):
                 columns[name] = np.array(validated(_LABELS, values), object)

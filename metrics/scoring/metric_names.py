@@ -64,7 +64,8 @@ SHOWN_AS_MUCH = {
 # Scores that have another definition in score files of format 1.0.
 _SURFACES = (
     "chamfer", "accuracy_distance", "completeness_distance", "hausdorff", "f_score_",
-    "object_completeness", "object_recall_", "behind_recall_", "boundary_", "derived_",
+    "object_completeness", "object_recall_", "boundary_", "derived_",
+    "behind_", "relief_", "shape_", "points_", "local_points_",  # those of points alone
 )  # fmt: skip
 WHOSE = {
     EMPTY_ROOM: "empty room",

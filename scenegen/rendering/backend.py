@@ -10,6 +10,7 @@ import ctypes.util
 import glob
 import importlib.metadata
 import os
+import platform
 import re
 import sys
 import warnings
@@ -97,10 +98,13 @@ def versions() -> dict[str, str]:
 def exact_kind(variant: str) -> dict[str, str]:
     """Return by which attributes a file has the bits that this variant computes here.
 
-    The LLVM variant has the same bits with every LLVM and on every x86-64 processor.
+    The LLVM variant has the same bits with every LLVM and on every x86-64 processor. No file has
+    the key `machine`, so none is of the kind of another processor.
     """
     kind = {"variant": variant, "writer": writer_name(), **versions()}
     del kind["llvm_version"]
+    if platform.machine().lower() not in ("x86_64", "amd64"):
+        kind["machine"] = platform.machine()
     return kind
 
 

@@ -274,7 +274,7 @@ def _within_tolerance(
     close = (np.abs(a - b) <= most) | (np.isnan(a) & np.isnan(b))
     # At an edge a pixel may show what a neighbour shows; in an image, at that of a shadow, too.
     near = _around(b)
-    low, high = np.nanmin(near, axis=(-2, -1)), np.nanmax(near, axis=(-2, -1))
+    low, high = (np.asarray(f.reduce(near, axis=(-2, -1))) for f in (np.fmin, np.fmax))
     beside = (low - most <= a) & (a <= high + most)
     beside |= np.isnan(a) & np.isnan(near).any(axis=(-2, -1))
     if name != "image":

@@ -52,7 +52,7 @@ def require_same_test(
             )
 
     def shown() -> list[str]:  # a test set of single views, say, has nothing behind
-        return [n for n in HEADLINE[first.task] if any(n in file.headline for file in files)]
+        return [n for n in HEADLINE[first.task] if all(n in file.headline for file in files)]
 
     names = tuple(dict.fromkeys(metrics or shown() or HEADLINE[first.task]))
     for name in names:
