@@ -103,10 +103,12 @@ def check(truth, submission, name):
     columns = {column: v for column, v in columns.items() if not np.isnan(v).all()}
     expected = definitions.items(views, submission)
     assert columns.keys() == expected.keys()
+    single = "cut_out_shape_normal_degrees"  # in single precision, as the page says
+    agree({single: columns.pop(single)} if single in columns else {}, expected, 0.01)
     agree(columns, expected)
     means, skills = definitions.means(expected), definitions.skills(expected)
     agree({key: one.value for key, one in found.metrics.items()}, means)
-    agree({key: one.value for key, one in found.skills.items()}, skills, 1e-5)
+    agree({key: one.value for key, one in found.skills.items()}, skills, 2e-4)  # one has that floor
 
 
 def agree(found, expected, near_zero=1e-6):
