@@ -263,7 +263,7 @@ def after_alignment(view, z: Array, P: Array, kind: str, declared: str) -> dict[
 
 def boundaries(view, z: Array) -> dict[str, float]:
     D = np.maximum(on_grid(view, z), 1e-6)
-    E = np.maximum(view.stored, np.float32(1e-6))
+    E = np.maximum(on_grid(view, view.t), 1e-6)
     thresholds = np.linspace(1.05, 1.25, 10)
     weights = thresholds / thresholds.sum()
     pairs = []
@@ -317,7 +317,7 @@ def planes(steps: Array, chosen: Array, u: Array) -> tuple[Array, Array]:
     l1, l2, l3 = values.T
     n = vectors[:, :, 0]
     apart = (l2 - l1) * (l3 - l1) * abs(n).max(1) > 1e-12 * l3**2
-    return n, (l2 > 1e-6 * l3) & apart & (abs((n * u).sum(1)) > 1e-6)
+    return n, (l2 > 1e-6 * l3) & apart & (abs((n * u).sum(1)) > 1e-4)
 
 
 def angle(a: Array, b: Array) -> Array:
