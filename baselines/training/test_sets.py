@@ -29,7 +29,8 @@ def refuse_test_set(data: str, allowed: bool = False) -> None:
     test = test or next((t for t in KNOWN_TESTS if pictures and t.pictures == pictures), None)
     if test:
         hint = "take another --seed for training, or say --allow-test-set"
-        raise SpecError(data, f"the seed and the objects of the test set {test.name}", "training data", hint)
+        found = f"the seed and the objects of the test set {test.name}"
+        raise SpecError(data, found, "training data", hint)
 
 
 def _like(text: str) -> KnownTest | None:

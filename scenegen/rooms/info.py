@@ -25,7 +25,7 @@ def describe(path: str | Path) -> str:
     """
     with RoomsFile(path) as rooms:
         spec, texts = rooms.spec, rooms.attributes
-        size = size_text(sum(stored for stored, _ in rooms.stored_bytes().values()))
+        size = size_text(sum(path.stat().st_size for path, _ in rooms.parts))
         facts = {
             "format": f"{texts['format']} {texts['format_version']}",
             "written by": f"{texts['writer']}, {texts['variant']}",

@@ -275,7 +275,7 @@ def _within_tolerance(
     # At an edge a pixel may show what a neighbour shows; in an image, at that of a shadow, too.
     near = _around(b)
     low, high = (np.asarray(f.reduce(near, axis=(-2, -1))) for f in (np.fmin, np.fmax))
-    beside = (low - most <= a) & (a <= high + most)
+    beside = np.asarray((low - most <= a) & (a <= high + most))
     beside |= np.isnan(a) & np.isnan(near).any(axis=(-2, -1))
     if name != "image":
         beside &= edges.reshape(*edges.shape, *[1] * (a.ndim - 2))
