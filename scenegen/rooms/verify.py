@@ -281,4 +281,4 @@ def _within_tolerance(
         beside &= edges.reshape(*edges.shape, *[1] * (a.ndim - 2))
     off = ~close.reshape(*close.shape[:2], -1).all(axis=-1)
     found = beside.reshape(*beside.shape[:2], -1).all(axis=-1)
-    return bool(found[off].all() and off.mean() <= EDGE_SHARE)
+    return bool(np.asarray(found)[off].all() and off.mean() <= EDGE_SHARE)
