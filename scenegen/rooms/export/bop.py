@@ -25,6 +25,7 @@ from scenegen.rendering.packing import pack
 from scenegen.rooms.export.colmap import FLIP
 from scenegen.rooms.export.encoding import write_json, write_png
 from scenegen.rooms.export.nerfstudio import Z_UP
+from scenegen.rooms.export.symmetries import Symmetries, symmetries
 from scenegen.rooms.reader import Room
 
 Array = NDArray[Any]
@@ -170,11 +171,13 @@ def _box(mask: Array, origin: tuple[int, int] = (0, 0)) -> list[int]:
 
 def _write_models(folder: Path, models: dict[tuple[str, float], int], objects: Objects) -> None:
     folder.mkdir()
-    about = {}
+    about, alike = {}, dict[str, Symmetries]()
     for (shape, scale), number in models.items():
         mesh = welded(objects.shape(shape))
         mesh.apply_transform(Z_UP)
         mesh.apply_translation(-mesh.bounds.mean(axis=0))
+        if shape not in alike:
+            alike[shape] = symmetries(mesh)
         mesh.apply_scale(scale * MILLIMETRES)
         mesh.export(folder / f"obj_{number:06d}.ply", vertex_normal=True)
         low, size = mesh.bounds[0].tolist(), mesh.extents.tolist()
@@ -182,6 +185,7 @@ def _write_models(folder: Path, models: dict[tuple[str, float], int], objects: O
         about[str(number)] = {
             "diameter": diameter(np.asarray(mesh.vertices)),
             **dict(zip(names, [*low, *size], strict=True)),
+            **alike[shape].fields(scale * MILLIMETRES),
         }
     write_json(folder / "models_info.json", about)
 
