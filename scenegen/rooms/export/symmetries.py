@@ -69,7 +69,7 @@ def symmetries(mesh: trimesh.Trimesh) -> Symmetries:
             moved = turn.apply(points[some] - middle) + middle
             apart, near = tree.query(moved, k=NEAREST)
             off = np.abs(((moved[:, None] - points[near]) * normals[near]).sum(axis=2))
-            # In the plane of a sample and close to it. At an edge, some samples have its other side.
+            # In the plane of a sample, and close to it. At an edge, others have the other side.
             if np.maximum(off, apart / 5.0).min(axis=1).max() > within:
                 return False
         return True
