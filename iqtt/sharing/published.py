@@ -9,7 +9,7 @@ from iqtt.files.split import ANSWERS, FILES, MANIFEST
 from iqtt.questions.specs import SPLITS
 from iqtt.sharing.withheld import check_withheld
 from scenegen.common.errors import FileFormatError
-from scenegen.files.shards import OpenFile
+from scenegen.files.sets.shards import OpenFile
 
 
 @dataclass(frozen=True)

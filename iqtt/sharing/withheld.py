@@ -15,7 +15,7 @@ from scenegen.files.content import SHA256
 from scenegen.files.input_file import checking, describing
 from scenegen.files.rows import and_more
 from scenegen.files.schema import other_attributes
-from scenegen.files.shards import ROW_DIGESTS, SHARDS, OpenFile
+from scenegen.files.sets.shards import ROW_DIGESTS, SHARDS, OpenFile
 
 COMMAND = "creation_command"  # which may name the seed
 DATA = {"questions", SHARDS, ROW_DIGESTS}  # of a file of test questions

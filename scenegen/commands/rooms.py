@@ -85,7 +85,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
     """
-    from scenegen.files.manifest import Manifest, manifests_in
+    from scenegen.files.sets.manifest import Manifest, manifests_in
     from scenegen.files.verify import Check
     from scenegen.layout import FORMAT_NAME
     from scenegen.objects.sources import file_objects

@@ -13,9 +13,9 @@ from pathlib import Path
 
 from scenegen.common.records import check
 from scenegen.common.text_table import markdown, piped, printable
-from scenegen.files.manifest import file_sha256
 from scenegen.files.new_file import folder_written_beside
 from scenegen.files.schema import Column
+from scenegen.files.sets.manifest import file_sha256
 from scenegen.rendering.backend import VERSION_ATTRIBUTES
 
 CARD, CROISSANT, INDEX = "README.md", "croissant.json", "index.parquet"

@@ -18,7 +18,7 @@ from scenegen.common.records import check
 from scenegen.files.new_file import folder_written_beside
 from scenegen.files.rows import RowFile
 from scenegen.files.schema import Column
-from scenegen.files.shards import cut, shard_name
+from scenegen.files.sets.shards import cut, shard_name
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.sharing.stored import as_text, is_picture, stored_blocks
 

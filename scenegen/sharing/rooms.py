@@ -8,8 +8,8 @@ from typing import Any
 
 from scenegen.common.records import check
 from scenegen.description.specs import BUILT_IN
-from scenegen.files.manifest import manifest_path
 from scenegen.files.schema import Column
+from scenegen.files.sets.manifest import manifest_path
 from scenegen.layout import columns, fields, markdown_table
 from scenegen.rooms.reader import RoomsFile
 from scenegen.sharing.card import (

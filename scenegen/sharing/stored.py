@@ -8,7 +8,7 @@ import numpy as np
 from scenegen.common.errors import FileFormatError
 from scenegen.files.rows import RowBlock, RowFile
 from scenegen.files.schema import Column
-from scenegen.files.shards import cut
+from scenegen.files.sets.shards import cut
 
 BLOCK_BYTES = 2**25  # of rows that are in memory at once
 

@@ -14,7 +14,7 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.sharing.published import published_split
 from iqtt.sharing.withheld import check_withheld
 from scenegen.common.errors import SpecError
-from scenegen.files.shards import ROW_DIGESTS
+from scenegen.files.sets.shards import ROW_DIGESTS
 
 
 def seeded(file):
