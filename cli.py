@@ -8,7 +8,7 @@ ROOMS = tuple(
     f"scenegen.commands.{name}" for name in ("making", "rooms", "viewing", "sharing", "meshes")
 )
 QUESTIONS = (
-    *(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing")),
+    *(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing", "quiz")),
     "metrics.commands.people",
 )
 

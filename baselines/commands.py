@@ -200,7 +200,7 @@ def _check_task(name: str, data: str) -> None:
     """Raise UsageError for questions given to a baseline of rooms, or rooms to one of questions."""
     from metrics.submissions.layout import DATA_FORMATS
     from scenegen.files.attributes import read_text
-    from scenegen.files.shards import OpenFile
+    from scenegen.files.sets.shards import OpenFile
 
     if not Path(data).is_file():
         return  # its reader says so, after what is missing otherwise

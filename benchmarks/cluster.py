@@ -13,8 +13,8 @@ from pathlib import Path
 
 from benchmarks.markdown import table
 from scenegen.description.specs import DatasetSpec
-from scenegen.files.cluster import LOCAL, connected
-from scenegen.files.workers import processors
+from scenegen.files.sets.cluster import LOCAL, connected
+from scenegen.files.sets.workers import processors
 from scenegen.rendering.sameness import renderer_identity
 from scenegen.rooms.make import make_dataset
 

@@ -4,7 +4,8 @@ Score predictions in memory:   `metrics.evaluate(predictions, "rooms.h5").metric
 Those of one room:             `metrics.evaluate_room(depth, rooms[0])["relief_iou"]`
 
 `measures` turn arrays into numbers; `submissions` are the files that models hand in; `scoring`
-joins both; `report`, `comparison` and `leaderboard` show scores; `commands` are what `bench` runs.
+joins both; `views` and `viewing` show scores; `commands` are what `bench` runs. `intake` makes
+submissions of models and folders of files.
 Doors for other programs: `prediction_writer` writes submissions, `score_file` reads scores. Imports
 neither a renderer nor torch.
 """

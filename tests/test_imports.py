@@ -1,5 +1,6 @@
 """Who may import whom, and which heavy modules a start-up leaves out."""
 
+import ast
 import json
 import re
 import shutil
@@ -114,6 +115,42 @@ def broken_contracts(cwd):
 
 def test_contracts_between_packages():
     assert broken_contracts(ROOT) == []
+
+
+def imports_of(path, modules):
+    """Return which of these modules a file imports, at its top or inside its functions."""
+    found, types = set(), set()
+    for node in ast.walk(ast.parse(path.read_text())):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            types |= set(ast.walk(node))
+        elif isinstance(node, ast.ImportFrom) and node not in types:
+            names = {f"{node.module}.{name.name}" for name in node.names}
+            found |= (names & modules.keys()) or ({node.module} & modules.keys())
+    return found
+
+
+def circles(root):
+    """Return the modules of the packages that import themselves by way of others."""
+    modules = {
+        ".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path
+        for package in ("scenegen", "iqtt", "metrics", "baselines")
+        for path in (root / package).rglob("*.py")
+    }
+    direct = {name: imports_of(path, modules) for name, path in modules.items()}
+    reached = {name: set(others) for name, others in direct.items()}
+    for middle in modules:
+        for name in modules:
+            if middle in reached[name]:
+                reached[name] |= reached[middle]
+    return {name for name in modules if name in reached[name]}
+
+
+def test_no_module_imports_itself_by_way_of_others(tmp_path):
+    assert circles(ROOT) == set()
+    (tmp_path / "iqtt").mkdir()
+    (tmp_path / "iqtt/a.py").write_text("from iqtt import b\n")
+    (tmp_path / "iqtt/b.py").write_text("def f():\n    from iqtt.a import c\n")
+    assert circles(tmp_path) == {"iqtt.a", "iqtt.b"}
 
 
 def test_contracts_can_break(tmp_path):

@@ -12,7 +12,7 @@ from baselines.training.images import Array, channels_first, check_reducible, ro
 from iqtt import QuestionsFile, open_questions
 from iqtt.files.reader import PARTS, holds_questions
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.files.shards import OpenFile
+from scenegen.files.sets.shards import OpenFile
 from scenegen.rendering.ground_truth import decode_image
 
 LABELED, UNLABELED = PARTS

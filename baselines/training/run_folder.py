@@ -16,7 +16,7 @@ from baselines.training.checkpoint import (
     new_state,
 )
 from scenegen.common.errors import SpecError
-from scenegen.files.workspace import run_lock
+from scenegen.files.sets.workspace import run_lock
 
 
 @contextmanager

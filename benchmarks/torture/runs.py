@@ -25,7 +25,7 @@ QUESTIONS = (
 EVENTS = {
     "packing": ("scenegen.rooms.render:pack_rooms", 25),
     "writing": ("scenegen.files.table:Table.extend_packed", 25),
-    "manifest": ("scenegen.files.making:write_manifest", 10),
+    "manifest": ("scenegen.files.sets.making:write_manifest", 10),
     "replace": ("os:replace", 18),
     "unlink": ("os:unlink", 18),
 }

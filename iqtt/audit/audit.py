@@ -22,8 +22,8 @@ from iqtt.audit.proofs.shapes import Shapes
 from iqtt.audit.proofs.verdict import Proof
 from iqtt.audit.table import AuditTable, find_tables, lacking, read_table
 from scenegen.common.threads import one_thread
-from scenegen.files.cluster import Cluster
 from scenegen.files.row_file import writer_name
+from scenegen.files.sets.cluster import Cluster
 
 Array = NDArray[Any]
 FORMAT = {"format": "pix2shape-bench/iqtt-audit", "format_version": "2.0"}

@@ -15,10 +15,10 @@ from iqtt.files.layout import NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, parts
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.records import check
-from scenegen.files.cluster import Cluster
 from scenegen.files.content import ColumnDigest, column_digest, dataset_digest, joint_digest
 from scenegen.files.rows import content_problems as problems_of_file
-from scenegen.files.shards import OpenFile, set_name
+from scenegen.files.sets.cluster import Cluster
+from scenegen.files.sets.shards import OpenFile, set_name
 
 Array = NDArray[Any]
 ROLES = ("train", "val", "test", "test-answers")

@@ -39,7 +39,7 @@ def card(
     must be those that were written.
     """
     needs("iqtt card", SHARE, "share")
-    from iqtt.sharing.published import published_split
+    from iqtt.sharing.published import open_split
     from iqtt.sharing.questions import make_questions_card
     from scenegen.sharing.card import NAMES
 
@@ -47,12 +47,10 @@ def card(
     publication = publication_of(options, name, lambda: "CC-BY-4.0")
     out = out or f"{name}-card"
     refuse_command_inputs(Path(out) / file for file in NAMES)
-    count = published_split(folder, with_answers).count
-    with progress_bar(count, "question") as bar:
-        make_questions_card(
-            folder, out, publication,
-            with_answers=with_answers, overwrite=overwrite, progress=bar.update,
-        )
+    with open_split(folder, with_answers) as tables:
+        count = sum(map(len, tables))
+        with progress_bar(count, "question") as bar:
+            make_questions_card(tables, out, publication, overwrite=overwrite, progress=bar.update)
     print_line(f"{out}: {', '.join(NAMES)} of {count} questions")
 
 
@@ -96,13 +94,13 @@ def export(
         _export_for_models(file, part, folder, overwrite, how)
         return
     from iqtt.files.reader import open_questions
-    from iqtt.sharing.questions import export_questions
+    from iqtt.sharing.questions import QUESTIONS
+    from scenegen.sharing.export import write_export
 
-    with open_questions(file, part) as questions:
+    with open_questions(file, part) as questions, progress_bar(len(questions), "question") as bar:
         count = len(questions)
-    with progress_bar(count, "question") as bar:
-        written = export_questions(
-            file, form, folder, part,
+        written = write_export(
+            questions, QUESTIONS, form, folder,
             encoding=curve, rows_per_file=rows_per_file, overwrite=overwrite, progress=bar.update,
         )
     megabytes = sum(path.stat().st_size for path in written) / 1e6

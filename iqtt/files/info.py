@@ -12,7 +12,7 @@ from iqtt.questions.specs import DISTRACTOR_KINDS
 from scenegen.common.text_table import printable
 from scenegen.files.content import CONTENT_DIGEST
 from scenegen.files.info import column_lines, fact_lines, setting_lines, size_text
-from scenegen.files.shards import set_name
+from scenegen.files.sets.shards import set_name
 from scenegen.files.verify import spread_rows
 from scenegen.rendering.backend import renderer_text
 from scenegen.rendering.ground_truth import decode_image

@@ -16,12 +16,12 @@ from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
-from scenegen.files.cluster import Cluster
-from scenegen.files.making import make_set
 from scenegen.files.new_file import EXISTS, check_place
 from scenegen.files.places import as_place, check_store, is_remote
-from scenegen.files.plan import Part
-from scenegen.files.sets import merge_file
+from scenegen.files.sets.cluster import Cluster
+from scenegen.files.sets.making import make_set
+from scenegen.files.sets.plan import Part
+from scenegen.files.sets.sets import merge_file
 from scenegen.rendering.backend import select_variant, versions
 from scenegen.rendering.renderer import useful_workers
 

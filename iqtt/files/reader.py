@@ -29,7 +29,7 @@ from scenegen.description.specs import IMAGE_DTYPES
 from scenegen.files.attributes import read_digest, read_root, read_text
 from scenegen.files.input_file import checking, describing
 from scenegen.files.rows import RowDataset, RowFile, chosen_rows
-from scenegen.files.shards import OpenFile
+from scenegen.files.sets.shards import OpenFile
 from scenegen.layout import TRUTH_DIGEST
 from scenegen.rendering.ground_truth import decode_image
 

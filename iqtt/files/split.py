@@ -16,8 +16,8 @@ from iqtt.files.layout import (
 )
 from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.render import groups
-from scenegen.files.plan import Bundle, Mark, Part, Plan, Sheet
 from scenegen.files.row_file import writer_name
+from scenegen.files.sets.plan import Bundle, Mark, Part, Plan, Sheet
 from scenegen.layout import TRUTH_DIGEST
 
 ANSWERS = "iqtt-test-answers.h5"

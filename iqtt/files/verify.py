@@ -14,9 +14,9 @@ from iqtt.questions.distractors import make_pools
 from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.render import groups, render_question
 from scenegen.common.errors import FileFormatError
-from scenegen.files.manifest import Manifest, read_manifest
 from scenegen.files.rows import content_problems
-from scenegen.files.shards import shard_name
+from scenegen.files.sets.manifest import Manifest, read_manifest
+from scenegen.files.sets.shards import shard_name
 from scenegen.files.verify import (
     Check,
     listed_check,

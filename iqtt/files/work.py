@@ -13,10 +13,10 @@ from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import Rendered, groups, render_questions
 from iqtt.shapes.polycube import canonical, canonical_class, set_ids
-from scenegen.files.plan import Block
-from scenegen.files.sets import Packed
+from scenegen.files.sets.plan import Block
+from scenegen.files.sets.sets import Packed
+from scenegen.files.sets.workers import in_threads
 from scenegen.files.table import pack_rows, packing_threads
-from scenegen.files.workers import in_threads
 from scenegen.rendering.renderer import share_processors
 
 BLOCK = 128  # questions that a worker process makes in one go

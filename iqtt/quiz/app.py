@@ -12,11 +12,13 @@ GET  /image/P/K   image K of the question at position P, if it is asked now; 0 i
 import asyncio
 import re
 import sqlite3
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any
 
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from starlette.applications import Starlette
 from starlette.exceptions import HTTPException
 from starlette.middleware import Middleware
@@ -27,19 +29,37 @@ from starlette.routing import Mount, Route, Router
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
+from iqtt.questions.specs import LETTERS
 from iqtt.quiz import sessions
 from iqtt.quiz.commits import Commits
 from iqtt.quiz.guards import FixedHeaders, OwnPagesOnly, read_form
-from iqtt.quiz.pages import STATIC, Bar, page
 from iqtt.quiz.sessions import RefusedError, State
-from iqtt.quiz.study import Question, Study
+from iqtt.quiz.study import Study
 from scenegen.common.errors import SceneGenError
 from scenegen.common.web_hosts import Hosts
 
+FOLDER = Path(__file__).parent
 COOKIE_SECONDS = 30 * 24 * 3600
 POSITION = re.compile(r"[0-9]{1,4}")
 MILLISECONDS = re.compile(r"[0-9]{1,9}(\.[0-9]{1,6})?")
-Compare = Callable[[Sequence[tuple[Question, bool]]], Sequence[Bar]]
+
+_PAGES = Environment(
+    loader=FileSystemLoader(FOLDER / "templates", encoding="utf-8"),
+    autoescape=True,
+    undefined=StrictUndefined,
+    auto_reload=False,
+    trim_blocks=True,
+    lstrip_blocks=True,
+)
+_PAGES.globals["letters"] = LETTERS
+
+
+def page(template: str, **values: Any) -> str:
+    """Return a page: `templates/<template>.html`, filled with these values, which are escaped.
+
+    Pages load nothing but the files of this folder.
+    """
+    return _PAGES.get_template(f"{template}.html").render(**values)
 
 
 @dataclass(frozen=True)
@@ -49,8 +69,6 @@ class Quiz:
     Attributes:
         commits: runs operations on the file of answers.
         key: what cookies are signed with.
-        compare: returns the lines of the comparison at the end, from the questions that count and
-            whether each was answered rightly; the first line is the participant's.
         contact: who answers for the study; may be empty.
         most: how many participants there may be.
         tell: prints a line for whoever runs the server.
@@ -59,7 +77,6 @@ class Quiz:
     study: Study
     commits: Commits
     key: str
-    compare: Compare
     tell: Callable[[str], None]
     contact: str = ""
     most: int = sessions.MOST_PARTICIPANTS
@@ -74,7 +91,7 @@ def make_app(quiz: Quiz, hosts: Hosts) -> ASGIApp:
     )  # fmt: skip
     routes = [Route(path, partial(step, quiz), methods=[method]) for path, step, method in steps]
     router = Router(
-        [*routes, Mount("/static", StaticFiles(directory=STATIC))],
+        [*routes, Mount("/static", StaticFiles(directory=FOLDER / "static"))],
         redirect_slashes=False,
         middleware=[Middleware(OwnPagesOnly, hosts=hosts)],
     )
@@ -123,10 +140,8 @@ async def _quiz(quiz: Quiz, request: Request) -> Response:
     if now is None:
         return _see("/")
     if now.question is None:
-        bars = quiz.compare(now.results)
-        right = sum(is_right for _, is_right in now.results)
-        values = {"right": right, "count": len(now.results), "bars": bars, "own": bars[0]}
-        return HTMLResponse(page("result", **values))
+        count = now.count - now.calibrations
+        return HTMLResponse(page("result", right=now.right, count=count))
     values = {
         "position": now.position,
         "answers": quiz.study.settings.answers,

@@ -36,7 +36,7 @@ class State:
         count, calibrations: numbers of all questions, and of those of the calibration.
         question: at this position; None at the end.
         told: the answer that was given, where the right one is told now; else None.
-        results: at the end, each question that counts, and whether the answer was right.
+        right: at the end, how many questions that count were answered rightly.
     """
 
     number: int
@@ -45,7 +45,7 @@ class State:
     calibrations: int
     question: Question | None = None
     told: int | None = None
-    results: Sequence[tuple[Question, bool]] = ()
+    right: int = 0
 
 
 def now_ms() -> int:
@@ -100,7 +100,7 @@ def state(db: sqlite3.Connection, name: str) -> State | None:
     if done < len(rows):
         return replace(now, question=questions[done])
     pairs = zip(questions, answers, strict=True)
-    return replace(now, results=[(q, q.right == a) for q, a in pairs if not q.calibration])
+    return replace(now, right=sum(q.right == a for q, a in pairs if not q.calibration))
 
 
 def show(db: sqlite3.Connection, name: str) -> State | None:

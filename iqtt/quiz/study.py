@@ -1,25 +1,30 @@
 """What a study asks: the questions of a split with their right answers, kinds and images."""
 
 import hashlib
+import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from threading import Lock
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
 
 from iqtt.files.reader import NoAnswersError, QuestionsFile, answers_beside
 from iqtt.questions.specs import question_kind
 from iqtt.quiz.draw import Cell, cells_of, draw_rows
-from iqtt.quiz.pictures import png
+from scenegen.common.errors import SpecError
 from scenegen.common.recent import Recent
 from scenegen.common.records import check
+from scenegen.rooms.preview import srgb_bytes
 
 QUESTIONS, CALIBRATIONS = 20, 2  # of each participant; the paper asked one calibration question
 MOST_QUESTIONS = 1000
 HASHED = 100  # questions of a released file, that tell it from others with its answers
 UNTOLD = "not told"  # the kind of questions whose file does not tell it
+LARGEST = 512  # pixels of a side; larger images are made smaller by a whole factor
 KEPT_BYTES = 256 * 2**20  # of encoded images
 
 
@@ -71,7 +76,7 @@ class Question:
 
 
 class Pool:
-    """An open table of questions whose right answers are known.
+    """An open table of questions whose right answers are known; a context manager.
 
     Attributes:
         file: the table; with the file of answers beside it, if it has none of its own.
@@ -118,6 +123,18 @@ class Pool:
                 content.update(np.ascontiguousarray(file.read("questions", row)).tobytes())
             self.fingerprint = content.hexdigest()
 
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.file.close()
+
+    def require_asked(self, path: Path, settings: Settings) -> None:
+        """Raise SpecError unless the answers at a path are to these questions."""
+        if self.fingerprint != settings.fingerprint:
+            found = f"answers to the split of fingerprint {settings.fingerprint:.12}"
+            raise SpecError(path, found, f"{self.fingerprint:.12}, that of {self.file.path}")
+
     def question(self, row: int, calibration: bool) -> Question:
         """Return what is known of a row."""
         kind, angle, shape = self.kinds[row], self.angles[row], self.shapes[row]
@@ -143,6 +160,15 @@ class Pool:
             images = [png(image) for image in record.radiance]
             self._pictures.put(row, images, sum(map(len, images)))
         return images
+
+
+def png(radiance: NDArray[Any]) -> bytes:
+    """Return linear radiance, (H, W, 3), as a PNG file in sRGB; what is not finite is black."""
+    picture = Image.fromarray(srgb_bytes(np.nan_to_num(radiance)))
+    factor = -(-max(picture.size) // LARGEST)
+    out = io.BytesIO()
+    (picture if factor == 1 else picture.reduce(factor)).save(out, "PNG", compress_level=6)
+    return out.getvalue()
 
 
 class Study:

@@ -1,70 +1,25 @@
 """Which files of a split are handed out, and which tables of questions they hold."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from iqtt.files.layout import FORMAT
-from iqtt.files.reader import QuestionsFile, parts
+from iqtt.files.reader import QuestionsFile, table_names
 from iqtt.files.split import ANSWERS, FILES, MANIFEST
 from iqtt.questions.specs import SPLITS
 from iqtt.sharing.withheld import check_withheld
 from scenegen.common.errors import FileFormatError
-from scenegen.files.shards import OpenFile
+from scenegen.files.sets.shards import OpenFile
+from scenegen.sharing.card import with_shards
 
 
-@dataclass(frozen=True)
-class PublishedTable:
-    """A table of questions in a file that is handed out.
+@contextmanager
+def open_split(folder: str | Path, with_answers: bool = False) -> Iterator[list[QuestionsFile]]:
+    """Open what is handed out of a folder that `iqtt make-split` wrote: training tables first.
 
-    Attributes:
-        path: the file, or the file that shows shards as one.
-        split: "train", "val" or "test".
-        part: "labeled" or "unlabeled" of a training file, else "".
-        answers: the file of the answers, if that is handed out with the questions.
-        count: number of questions.
-    """
-
-    path: Path
-    split: str
-    part: str
-    answers: Path | None
-    count: int
-
-    @property
-    def name(self) -> str:
-        """The file's name and the part."""
-        return f"{self.path.name} {self.part}".rstrip()
-
-    def open(self) -> QuestionsFile:
-        """Open the table. Raises as `QuestionsFile`."""
-        return QuestionsFile(self.path, self.part or None, self.answers)
-
-
-@dataclass(frozen=True)
-class PublishedSplit:
-    """What is handed out of a split.
-
-    Attributes:
-        tables: of questions, those of training first.
-        files: each file, and what it holds, in words of ours.
-        answers: the file of the test answers, if it is handed out too.
-    """
-
-    tables: tuple[PublishedTable, ...]
-    files: tuple[tuple[Path, str], ...]
-    answers: Path | None
-
-    @property
-    def count(self) -> int:
-        """Number of questions."""
-        return sum(table.count for table in self.tables)
-
-
-def published_split(folder: str | Path, with_answers: bool = False) -> PublishedSplit:
-    """Return what is handed out of a folder that `iqtt make-split` wrote.
-
-    Without `with_answers` the file of the test answers is not looked at, and nothing that could
-    tell them is handed out; nor is the manifest, which lists that file.
+    Without `with_answers` the file of the test answers is not looked at, and no file is opened that
+    could tell them. With it, it is `beside` the table of the test questions.
 
     Raises:
         OSError: no such folder, or no question files in it; or no answers, where they are wanted.
@@ -78,35 +33,42 @@ def published_split(folder: str | Path, with_answers: bool = False) -> Published
     answers = folder / ANSWERS if with_answers else None
     if answers is not None and not ("test" in paths and answers.is_file()):
         raise FileNotFoundError(2, "no test questions with their answers", str(answers))
-    tables: list[PublishedTable] = []
+    tables: list[QuestionsFile] = []
+    with ExitStack() as stack:
+        for split, path in paths.items():
+            opened = stack.enter_context(OpenFile(path, FORMAT.kind))
+            if answers is None:
+                _check_withheld(opened, split == "test")
+            for part in table_names(opened, QuestionsFile.CONTENT):
+                table = QuestionsFile(opened, part, answers if split == "test" else None)
+                tables.append(stack.enter_context(table))
+                if table.spec is None:
+                    raise FileFormatError(path, "a released file", "one that iqtt make-split wrote")
+                if table.split != split:
+                    raise FileFormatError(path, f"questions for {table.split}", split)
+        yield tables
+
+
+def _check_withheld(opened: OpenFile, is_test: bool) -> None:
+    """Check a file, and each of its shards."""
+    check_withheld(opened, is_test)
+    for shard in opened.shards:
+        with OpenFile(opened.folder / shard.file, FORMAT.kind) as part:
+            check_withheld(part, is_test)
+
+
+def handed_out(tables: Sequence[QuestionsFile]) -> list[tuple[Path, str]]:
+    """Return the files of the tables of a split, and what each of them holds.
+
+    The manifest lists the file of the test answers, and is handed out with that alone.
+    """
+    answers = [table.beside.opened for table in tables if table.beside is not None]
+    holds = {table.opened: f"questions: {table.split}" for table in tables}
+    holds |= dict.fromkeys(answers, "answers to the test questions")
     files: list[tuple[Path, str]] = []
-    for split, path in paths.items():
-        pieces = _with_shards(path, f"questions: {split}")
-        for piece, _ in pieces if answers is None else ():
-            check_withheld(piece, split == "test")
-        tables += _tables(path, split, answers if split == "test" else None)
-        files += pieces
-    if answers is not None:
-        files += _with_shards(answers, "answers to the test questions")
-        files += [(folder / MANIFEST, "manifest")] if (folder / MANIFEST).is_file() else []
-    return PublishedSplit(tuple(tables), tuple(files), answers)
-
-
-def _with_shards(path: Path, meaning: str) -> list[tuple[Path, str]]:
-    """Return a file and, if it shows shards as one, these, and what each of them holds."""
-    with OpenFile(path, FORMAT.kind) as opened:
-        names = [shard.file for shard in opened.shards]
-    shards = [(path.with_name(name), f"shard of {path.name}") for name in names]
-    return [(path, f"{meaning}; shows its shards as one file" if names else meaning), *shards]
-
-
-def _tables(path: Path, split: str, answers: Path | None) -> list[PublishedTable]:
-    tables = []
-    for part in parts(path):
-        with QuestionsFile(path, part, answers) as table:
-            if table.spec is None:
-                raise FileFormatError(path, "a released file", "one that iqtt make-split wrote")
-            if table.split != split:
-                raise FileFormatError(path, f"questions for {table.split}", split)
-            tables.append(PublishedTable(path, split, part, answers, len(table)))
-    return tables
+    for opened, meaning in holds.items():
+        files += with_shards(opened, meaning, f"{meaning}; shows its shards as one file")
+    manifest = tables[0].path.with_name(MANIFEST)
+    if answers and manifest.is_file():
+        files.append((manifest, "manifest"))
+    return files

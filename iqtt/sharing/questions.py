@@ -1,4 +1,4 @@
-"""Files of questions, handed on: exported rows, and the data card of a split."""
+"""Files of questions, handed on: what exports and data cards tell of them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -6,57 +6,117 @@ from pathlib import Path
 from typing import Any
 
 from iqtt.files.layout import answer_column, question_columns, truth_columns
-from iqtt.files.reader import AnswersFile, QuestionsFile
-from iqtt.files.split import MANIFEST
-from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
-from iqtt.sharing.published import PublishedSplit, published_split
-from iqtt.sharing.texts import (
-    GIVEN,
-    HELD,
-    KEYWORDS,
-    READING,
-    RESPONSIBLE,
-    SPLITS_TEXT,
-    SUMMARY,
-)
+from iqtt.files.reader import QuestionsFile
+from iqtt.questions.specs import DISTRACTOR_KINDS
+from iqtt.sharing.published import handed_out
 from scenegen.common.text_table import piped
 from scenegen.files.schema import Column
-from scenegen.sharing.card import (
-    HDF5,
-    JSON,
-    DataDescription,
-    Publication,
-    shared_file,
-    tool,
-    write_card,
+from scenegen.sharing.card import write_card
+from scenegen.sharing.publication import Publication
+from scenegen.sharing.task import Line, Tally, Task
+
+KEYWORDS = (
+    "synthetic", "3d", "mental-rotation", "visual-reasoning", "multiple-choice",
+    "single-image-3d", "3d-iqtt", "pix2shape-bench",
+)  # fmt: skip
+SUMMARY = (
+    "Mental-rotation questions (3D-IQTT), rendered by a program: a reference image of a shape made"
+    " of cubes, and two or three answers, of which one shows the same shape from another side."
+    " Every cube of a shape shows in every picture."
 )
-from scenegen.sharing.export import ExportedTable, write_export
-from scenegen.sharing.index import IndexKind, Line, Tally, counts_table, write_index
+READING = """The HDF5 files are read by any HDF5 library. In Python:
+
+    import h5py
+
+    with h5py.File(name) as f:
+        reference, *answers = f["questions"][row]  # (H, W, 3) each
+        radiance = reference * f["questions"].attrs["scale"]  # linear RGB, 0 to 1
+
+In the training file the data sets lie in the groups `labeled` and `unlabeled`, and the truth in
+`truth/labeled` and `truth/unlabeled`. A file of test questions has `questions` alone.
+`datasets.load_dataset(folder, "index")` reads the index, and so does `mlcroissant` by
+`croissant.json`. Lengths are in cube edges. World and camera: right-handed, y up; the camera lies
+on +z and looks along -z. Images are linear: no gamma is applied."""
+SPLITS_TEXT = """The shapes are what the splits are cut by: the program gives each class of shapes,
+mirror images included, to one of training, validation and test, for ever and whatever the seed.
+`iqtt audit` of pix2shape-bench proves it of files that tell their shapes. Questions of `unlabeled`
+have no answers beside them, but `truth/unlabeled` tells them: a learner must not look there."""
+HELD = """**The answers to the test questions are not part of this data.** Those who made it hold
+them and score predictions. Neither the files nor the index tell shapes, views, kinds or angles of
+test questions. Whoever knows the seed can make the answers again, so no file tells it."""
+GIVEN = """**The answers to the test questions are part of this data**, in `iqtt-test-answers.h5`
+and in the index. Nothing keeps a method from having been chosen by them."""
+RESPONSIBLE: dict[str, str | list[str]] = {
+    "data_collection": "Nothing was collected. Shapes are drawn by a program from settings and a"
+    " seed, turned and lit at random, and rendered by ray casting. The page README.md has all"
+    " settings.",
+    "data_collection_missing_data": "Questions of `unlabeled` and of the test have no answers"
+    " beside them. Where depth is stored it is NaN on the background. Nothing is filled in.",
+    "data_preprocessing_protocol": [
+        "None: values are stored as they were rendered. Images of 8 bits are linear radiance from"
+        " 0 to 1, rounded to 255 steps."
+    ],
+    "data_annotation_protocol": [
+        "No person labelled anything. The right answer shows the reference's own shape, and the"
+        " wrong ones shapes that no rotation takes to it. `iqtt audit` recomputes both from the"
+        " stored cubes, with code that shares nothing with the program that made them."
+    ],
+    "data_use_cases": [
+        "Training and testing methods that tell whether two pictures show the same shape, with few"
+        " labels or none.",
+        "Comparing such methods under one protocol, with bench score of pix2shape-bench.",
+        "Not for measuring mental rotation in people, and not for deciding how well a method does"
+        " on photographs.",
+    ],
+    "data_limitations": [
+        "One kind of shape, unit cubes face to face, before an empty background: no texture, no"
+        " shadows, no noise of a sensor, no clutter.",
+        "Views that hide a cube are refused, so that most views of a shape never occur.",
+        "Three answers at most: a guess is right in a third or half of the questions.",
+    ],
+    "data_biases": [
+        "Questions of the kind `other`, and some of `near`, can be answered from outlines alone."
+        " Report `matched` and `mirror-pair`, where outlines tell little or nothing.",
+        "In `mirror-pair` with three answers the right one is the odd one out, and can be found"
+        " without the reference, by the same mental rotation between answers.",
+        "Each number of cubes is asked for equally often, though there are far more shapes of many"
+        " cubes; shapes of few cubes recur, seen from other sides.",
+    ],
+    "personal_sensitive_information": [
+        "None: no people, no places, no text in the images. The recorded command, where the page"
+        " has it, holds names of files of those who made the data."
+    ],
+}
 
 
-def export_questions(
-    path: str | Path, form: str, folder: str | Path, part: str | None = None, **how: Any
+def make_questions_card(
+    tables: Sequence[QuestionsFile], card: str | Path, publication: Publication, **how: Any
 ) -> list[Path]:
-    """Write a table of questions, ours or a released one, as `write_export`; return its files.
+    """Write the data card of a split, whole or in shards, as `write_card`.
 
-    Files are called `iqtt-train-labeled-00000-of-00003.parquet` after `iqtt-train.h5` and its part
-    "labeled". Only what the file itself tells is written: a file of test questions has no answers.
+    The answers of the test questions are handed out too where they were opened with these.
 
     Args:
-        how: `encoding`, `rows_per_file`, `overwrite` and `progress` of `write_export`.
+        tables: as from `published.open_split`.
+        card: folder to make.
+        how: `overwrite` and `progress` of `write_card`.
 
-    Raises as `write_export` and `QuestionsFile`.
+    Raises as `write_card`.
     """
-    with QuestionsFile(path, part) as questions:
-        which = f", {questions.part}" if questions.part else ""
-        table = ExportedTable(
-            stem="-".join(filter(None, (Path(path).stem, questions.part))),
-            what=f"rows of {questions.path.name}{which}, a file of 3D-IQTT questions",
-            file=questions,
-            columns=exported_columns(questions),
-            values=_exported_values,
-        )
-        return write_export(table, form, folder, **how)
+    count = sum(map(len, tables))
+    answers = [table.beside for table in tables if table.beside is not None]
+
+    def notes(tallies: Sequence[Tally]) -> dict[str, str]:
+        again = count - len(set().union(*(tally.digests for tally in tallies)))
+        twice = f"**{again} questions have the images of another one.**"
+        once = "No two questions have the same images."
+        told = {"Splits": f"{twice if again else once} {SPLITS_TEXT}"}
+        if any(table.split == "test" for table in tables):
+            told["Test answers"] = GIVEN if answers else HELD
+        return told
+
+    files = handed_out(tables)
+    return write_card(card, publication, QUESTIONS, tables, files, notes, answers=answers, **how)
 
 
 def exported_columns(questions: QuestionsFile) -> list[Column]:
@@ -87,37 +147,6 @@ def _exported_values(stored: Mapping[str, Any]) -> dict[str, Any]:
     return {**values, "answer": stored["answers"]} if "answers" in stored else values
 
 
-def make_questions_card(
-    folder: str | Path,
-    card: str | Path,
-    publication: Publication,
-    *,
-    with_answers: bool = False,
-    overwrite: bool = False,
-    progress: Callable[[int], Any] = lambda done: None,
-) -> list[Path]:
-    """Write the data card of a split, whole or in shards, to a folder; return its files.
-
-    The same split and the same publication give the same bytes, as of `make_rooms_card`.
-
-    Args:
-        folder: of the split, as `iqtt make-split` writes it.
-        card: folder to make; with `overwrite`, an older card is replaced.
-        publication: what only the person who publishes the data knows.
-        with_answers: whether the answers of the test questions are handed out too.
-        progress: is told the number of questions that were read since the last call.
-
-    Raises as `write_card` and `published_split`; FileFormatError where a file is damaged.
-    """
-    split = published_split(folder, with_answers)
-
-    def describe(index: Path) -> DataDescription:
-        tables = [table.open for table in split.tables]
-        return _description(split, write_index(index, QUESTIONS, tables, progress))
-
-    return write_card(card, publication, describe, overwrite)
-
-
 def _line(questions: QuestionsFile, stored: Mapping[str, Any]) -> Line:
     """Return what the file tells of a question beside its images; None where it does not."""
     line: Line = dict.fromkeys(column.name for column in QUESTIONS.columns)
@@ -140,8 +169,41 @@ def _told(name: str) -> Callable[[Line], Sequence[Any]]:
     return lambda line: [] if line[name] is None else [line[name]]
 
 
+def _layout(tables: Sequence[QuestionsFile]) -> str:
+    """Return a Markdown table of the data sets; those of the truth lie in the group `truth`."""
+    spec = tables[-1].spec
+    assert spec is not None  # `open_split` refuses released files
+    rows = [("dataset", "row", "type", "unit", "meaning")]
+    truth = [replace(column, name=f"truth/{column.name}") for column in truth_columns(spec)]
+    for column in (*question_columns(spec), answer_column(), *truth):
+        shape = "(" + ", ".join(map(str, column.shape)) + ")"
+        rows.append((f"`{column.name}`", shape, column.dtype, column.unit, column.meaning))
+    return "\n".join(piped(rows))
+
+
+def _facts(table: QuestionsFile, tally: Tally) -> dict[str, str]:
+    return {
+        "file": table.path.name,
+        "part": table.part,
+        "split": str(table.split),
+        "questions": str(tally.rows),
+        "answers told": str(tally.counters["right answers by place"].total()),
+        "image": f"{table.height}x{table.width}, {table.image_dtype}",
+        "fingerprint": table.fingerprint or "",
+    }
+
+
 # fmt: off
-QUESTIONS = IndexKind(
+QUESTIONS = Task(
+    unit="questions",
+    what="a file of 3D-IQTT questions",
+    verify="iqtt verify",
+    summary=SUMMARY,
+    keywords=KEYWORDS,
+    responsible=RESPONSIBLE,
+    reading=READING,
+    exported=exported_columns,
+    values=_exported_values,
     columns=(
         Column("split", (), "text", meaning="what the questions are for: train, val or test"),
         Column("part", (), "text", meaning="table of the file: labeled or unlabeled; empty where it"
@@ -157,8 +219,10 @@ QUESTIONS = IndexKind(
         Column("distractor_kinds", (-1,), "text",
                meaning="kinds of the wrong answers, in their order"),
     ),
-    digested=("questions",),
+    key=("file", "part", "row"),
     line=_line,
+    digested=("questions",),
+    same="questions",
     counts={
         "right answers by place": _told("answer"),
         "questions by number of cubes": _told("cube_count"),
@@ -167,68 +231,7 @@ QUESTIONS = IndexKind(
             int(angle // 30) * 30 for angle in _told("angle_degrees")(line)
         ],
     },
-    same="questions_sha256",
-    verify="iqtt verify",
+    facts=_facts,
+    layout=_layout,
 )
 # fmt: on
-
-
-def _description(split: PublishedSplit, tallies: Sequence[Tally]) -> DataDescription:
-    """Return what is to be told of a split, given the tallies of its tables.
-
-    Every byte of the files that are handed out is read, for their SHA-256.
-    """
-    facts = [("file", "part", "split", "questions", "answers told", "image", "fingerprint")]
-    requests, commands, tools = {}, {}, set()
-    for table, tally in zip(split.tables, tallies, strict=True):
-        with table.open() as file:
-            assert file.spec is not None  # `published_split` refuses released files
-            spec, name = file.spec.public(), table.path.name
-            size = f"{file.height}x{file.width}, {file.image_dtype}"
-            counts = str(tally.rows), str(tally.counters["right answers by place"].total())
-            facts.append((name, table.part, table.split, *counts, size, file.fingerprint or ""))
-            requests[name] = file.attributes["spec"]
-            tools.add(tool(file.attributes))
-    if split.answers is not None:
-        with AnswersFile(split.answers) as answers:
-            requests[split.answers.name] = answers.attributes["spec"]
-            commands[split.answers.name] = answers.attributes.get("creation_command", "unknown")
-    notes = {"Reading": READING, "Splits": _splits(split.count, tallies)}
-    if any(table.split == "test" for table in split.tables):
-        notes["Test answers"] = HELD if split.answers is None else GIVEN
-    names = [table.name for table in split.tables]
-    return DataDescription(
-        summary=SUMMARY,
-        keywords=KEYWORDS,
-        files=[
-            shared_file(path, JSON if path.name == MANIFEST else HDF5, meaning)
-            for path, meaning in split.files
-        ],
-        columns=QUESTIONS.all_columns,
-        key=("file", "part", "row"),
-        rows=split.count,
-        facts={"Files": facts, "What they hold": counts_table("questions", names, tallies)},
-        commands=commands,
-        requests=requests,
-        layout=_layout(spec),
-        responsible={**RESPONSIBLE, "machine_annotation_tools": sorted(tools)},
-        notes=notes,
-    )
-
-
-def _splits(count: int, tallies: Sequence[Tally]) -> str:
-    """Return how the splits are cut, and whether a question is there twice."""
-    again = count - len(set().union(*(tally.digests for tally in tallies)))
-    if again:
-        return f"**{again} questions have the images of another one.** {SPLITS_TEXT}"
-    return f"No two questions have the same images. {SPLITS_TEXT}"
-
-
-def _layout(spec: SplitSpec) -> str:
-    """Return a Markdown table of the data sets; those of the truth lie in the group `truth`."""
-    rows = [("dataset", "row", "type", "unit", "meaning")]
-    truth = [replace(column, name=f"truth/{column.name}") for column in truth_columns(spec)]
-    for column in (*question_columns(spec), answer_column(), *truth):
-        shape = "(" + ", ".join(map(str, column.shape)) + ")"
-        rows.append((f"`{column.name}`", shape, column.dtype, column.unit, column.meaning))
-    return "\n".join(piped(rows))

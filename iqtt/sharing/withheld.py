@@ -3,8 +3,6 @@
 A list says what such a file may hold, so that nothing slips through which nobody thought of.
 """
 
-from pathlib import Path
-
 import h5py
 
 from iqtt.files.layout import FORMAT, ROOT_TEXTS, named
@@ -15,7 +13,7 @@ from scenegen.files.content import SHA256
 from scenegen.files.input_file import checking, describing
 from scenegen.files.rows import and_more
 from scenegen.files.schema import other_attributes
-from scenegen.files.shards import ROW_DIGESTS, SHARDS, OpenFile
+from scenegen.files.sets.shards import ROW_DIGESTS, SHARDS, OpenFile
 
 COMMAND = "creation_command"  # which may name the seed
 DATA = {"questions", SHARDS, ROW_DIGESTS}  # of a file of test questions
@@ -23,16 +21,16 @@ TOLD = {"unit", "shape", "frame", "meaning", "scale", "names", SHA256}  # of eac
 ATTRIBUTES = {*ROOT_TEXTS, named("fingerprint", "")} - {COMMAND}
 
 
-def check_withheld(path: Path, is_test: bool) -> None:
+def check_withheld(opened: OpenFile, is_test: bool) -> None:
     """Refuse a file from which the answers of test questions could be learned.
 
     No file may tell the seed, nor the command that made it, as all answers can be made again with
     them. A file of test questions may hold nothing but images and what names them.
 
-    Raises SpecError; OSError and FileFormatError as `QuestionsFile`.
+    Raises SpecError, and FileFormatError as `QuestionsFile`.
     """
-    with OpenFile(path, FORMAT.kind) as opened, checking(opened.file):
-        file = opened.file
+    path, file = opened.path, opened.file
+    with checking(file):
         with describing(f"{path}: attribute 'spec'"):
             spec = SplitSpec.from_json(read_root(file, path, FORMAT)["spec"])
         leaks = ["the seed"] if spec.seed is not None else []

@@ -23,7 +23,7 @@ from typing import Any, TextIO
 from iqtt.vlm.reading import ENDINGS, Outcome, is_thought_alone, read_reply
 from iqtt.vlm.rows import Asked, Row, vlm_rows
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
-from scenegen.files.workspace import run_lock
+from scenegen.files.sets.workspace import run_lock
 
 FORMAT = "pix2shape-bench/asked"
 NEEDED = frozenset({"id", "question_index", "rotation", "answer", "letter", "outcome", "text"})

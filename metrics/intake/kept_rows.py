@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.files.places import is_remote
-from scenegen.files.workspace import run_lock
+from scenegen.files.sets.workspace import run_lock
 
 SETTINGS = "settings.json"
 

@@ -18,7 +18,7 @@ from metrics.submissions.writer import RoomPredictionWriter, as_array, write_ans
 from scenegen.camera import intrinsics
 from scenegen.common.errors import SpecError
 from scenegen.files.new_file import check_writable
-from scenegen.files.shards import OpenFile
+from scenegen.files.sets.shards import OpenFile
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import RoomsFile

@@ -24,9 +24,9 @@ from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import Identity, RoomPredictions, on_any_machine, open_predictions
 from metrics.submissions.truths import read_true_view
 from scenegen.common.threads import one_thread
-from scenegen.files.cluster import Cluster
 from scenegen.files.pool import LostWorkerError
-from scenegen.files.workers import in_processes, processors
+from scenegen.files.sets.cluster import Cluster
+from scenegen.files.sets.workers import in_processes, processors
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]

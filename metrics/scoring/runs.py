@@ -18,8 +18,8 @@ from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.reader import Predictions
 from metrics.submissions.truths import match_problems
 from scenegen.common.errors import SceneGenError
-from scenegen.files.cluster import Cluster
 from scenegen.files.row_file import writer_name
+from scenegen.files.sets.cluster import Cluster
 from scenegen.rooms.reader import RoomsFile
 
 if TYPE_CHECKING:

@@ -177,17 +177,6 @@ def _in_words(point: Point) -> str:
     return value if interval == "-" else f"{value} {interval}"
 
 
-def bars(counts: Sequence[int], title: str, unit: str, counted: str) -> Chart:
-    """Return a chart of how many have the value 0, 1, 2, ...; `counted` says how many of what."""
-    with _drawing() as (figure, axes):
-        shown = axes.bar(range(len(counts)), counts, color="#5b8fbf")
-        axes.bar_label(shown, [str(n) if n else "" for n in counts], fontsize=6)
-        axes.set(xlabel=unit, ylabel=counted)
-        axes.locator_params(integer=True)
-        picture = _svg(figure)
-    return Chart(title, picture)
-
-
 def strip(
     point: Point, marks: Sequence[tuple[str, float]], others: Sequence[float | None] = (),
     limits: tuple[float, float] = (-math.inf, math.inf),

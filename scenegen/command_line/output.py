@@ -11,7 +11,7 @@ from scenegen.command_line.streams import for_progress_bars
 from scenegen.common.text_table import printable
 
 if TYPE_CHECKING:
-    from scenegen.files.cluster import Cluster, Versions
+    from scenegen.files.sets.cluster import Cluster, Versions
     from scenegen.files.verify import Check
 
 
@@ -62,8 +62,8 @@ def on_scheduler(
     if scheduler is None:
         yield None
         return
-    from scenegen.files.cluster import connected
-    from scenegen.files.workers import processors
+    from scenegen.files.sets.cluster import connected
+    from scenegen.files.sets.workers import processors
 
     with connected(
         scheduler, workers or processors(), versions, lambda text: print_line(text, err=True)

@@ -230,7 +230,7 @@ def _print_exposure(out: str) -> None:
 def _set_bytes(out: str) -> int:
     """Return the size of a file of rooms and of its shards, if it has any."""
     from scenegen.files.places import as_place, listing
-    from scenegen.files.shards import set_name
+    from scenegen.files.sets.shards import set_name
 
     place = as_place(out)
     files = [one for one in listing(place.parent) if set_name(one.name) == place.name]
@@ -241,7 +241,7 @@ def _set_bytes(out: str) -> int:
 def _told_how_to_go_on(out: str) -> Iterator[None]:
     """Say which shards are complete, and what to do, where the block is ended from outside."""
     from scenegen.common.errors import FileFormatError
-    from scenegen.files.manifest import manifest_path, read_manifest
+    from scenegen.files.sets.manifest import manifest_path, read_manifest
 
     try:
         yield

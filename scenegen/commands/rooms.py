@@ -85,7 +85,7 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
     """
-    from scenegen.files.manifest import Manifest, manifests_in
+    from scenegen.files.sets.manifest import Manifest, manifests_in
     from scenegen.files.verify import Check
     from scenegen.layout import FORMAT_NAME
     from scenegen.objects.sources import file_objects
@@ -205,21 +205,23 @@ def _export_many(
     if form == "parquet":
         needs("scenegen export --format parquet", ("datasets", "pyarrow"), "share")
     from scenegen.rooms.reader import RoomsFile
-    from scenegen.sharing.rooms import export_rows
+    from scenegen.sharing.export import write_export
+    from scenegen.sharing.rooms import ROOMS
 
     with RoomsFile(file) as rooms:
         count = len(rooms if items is None else items)
-    with progress_bar(count, "image") as bar:
-        written = export_rows(
-            file,
-            form,
-            out,
-            items,
-            encoding=curve,
-            rows_per_file=rows_per_file,
-            overwrite=overwrite,
-            progress=bar.update,
-        )
+        with progress_bar(count, "image") as bar:
+            written = write_export(
+                rooms,
+                ROOMS,
+                form,
+                out,
+                items,
+                encoding=curve,
+                rows_per_file=rows_per_file,
+                overwrite=overwrite,
+                progress=bar.update,
+            )
     megabytes = sum(path.stat().st_size for path in written) / 1e6
     print_line(f"{out}: {count} images in {len(written) - 1} files, {megabytes:.1f} MB")
 

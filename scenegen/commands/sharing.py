@@ -3,6 +3,7 @@
 import datetime
 import os
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +16,7 @@ from scenegen.command_line.paths import InputPath, OutputFolder, refuse_command_
 from scenegen.common.errors import SpecError
 
 if TYPE_CHECKING:
-    from scenegen.sharing.card import Publication
+    from scenegen.sharing.publication import Publication
 
 SHARE = ("datasets", "mlcroissant", "pyarrow")  # libraries that a card needs
 
@@ -40,7 +41,7 @@ def publication_of(
     options: dict[str, Any], title: str, licence: Callable[[], str]
 ) -> "Publication":
     """Return what the publication options say, with these defaults. Raises SpecError."""
-    from scenegen.sharing.card import Publication
+    from scenegen.sharing.publication import Publication
 
     defaults = {"title": lambda: title, "date": source_date, "license": licence}
     for name, default in defaults.items():
@@ -79,14 +80,13 @@ def card(files: tuple[str, ...], out: str, overwrite: bool, **options: Any) -> N
     from scenegen.sharing.rooms import default_license, make_rooms_card
 
     title = Path(files[0]).stem
-    publication = publication_of(options, title, lambda: default_license(files))
-    refuse_command_inputs(Path(out) / name for name in NAMES)
-    count = 0
-    for file in files:
-        with RoomsFile(file) as rooms:
-            count += len(rooms)
-    with progress_bar(count, "image") as bar:
-        make_rooms_card(files, out, publication, overwrite=overwrite, progress=bar.update)
+    with ExitStack() as stack:
+        rooms = [stack.enter_context(RoomsFile(file)) for file in files]
+        publication = publication_of(options, title, lambda: default_license(rooms))
+        refuse_command_inputs(Path(out) / name for name in NAMES)
+        count = sum(map(len, rooms))
+        with progress_bar(count, "image") as bar:
+            make_rooms_card(rooms, out, publication, overwrite=overwrite, progress=bar.update)
     print_line(f"{out}: {', '.join(NAMES)} of {count} images")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from scenegen.common.signals import held_back
 from scenegen.files.places import as_place, is_remote, upload
-from scenegen.files.workspace import remove_leftovers, workspace
+from scenegen.files.sets.workspace import remove_leftovers, workspace
 
 EXISTS = "exists already; say --overwrite to replace it"
 

@@ -27,7 +27,7 @@ from scenegen.files.content import (
 )
 from scenegen.files.input_file import StoredArray, checking, reading
 from scenegen.files.schema import Column, attribute_problems, column_problems
-from scenegen.files.shards import JoinedArray, OpenFile
+from scenegen.files.sets.shards import JoinedArray, OpenFile
 
 Array = NDArray[Any]
 

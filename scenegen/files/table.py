@@ -25,7 +25,7 @@ from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
 from scenegen.files.content import SHA256, ColumnDigest, row_digest
 from scenegen.files.schema import Column, name_axes
-from scenegen.files.workers import processors
+from scenegen.files.sets.workers import processors
 
 Array = NDArray[Any]
 COMPRESSIONS = ("gzip", "lzf", "none")

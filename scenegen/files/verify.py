@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from scenegen.files.content import ColumnDigest
-from scenegen.files.manifest import Manifest, wrong_files
 from scenegen.files.rows import RowBlock, RowFile, content_problems
-from scenegen.files.shards import OpenFile
+from scenegen.files.sets.manifest import Manifest, wrong_files
+from scenegen.files.sets.shards import OpenFile
 
 SHOWN = 5  # problems that a check names; of more it gives the number
 

@@ -13,8 +13,9 @@ from functools import cache
 import numpy as np
 
 from scenegen.common.names import check_choice
+from scenegen.description.scenes import SHAPE_NAMES
 from scenegen.objects import teapot
-from scenegen.objects.basic_hulls import kept
+from scenegen.objects.basic_hulls import FILE, all_kept, kept
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
 from scenegen.objects.exact_surfaces import FAR, Capsule, Torus, Turned, cone_of
 from scenegen.objects.solids import (
@@ -36,6 +37,17 @@ def unit_shape(name: str) -> UnitShape:
     """Return the unit shape of that name. Raises SpecError for an unknown one."""
     check_choice("shape", name, _BUILDERS)
     return _BUILDERS[name]()
+
+
+def write_hulls() -> None:
+    """Compute what `basic_hulls` keeps, and write it, in a process that has made no shape yet.
+
+    python -c "from scenegen.objects import basic_shapes; basic_shapes.write_hulls()"
+    """
+    all_kept().clear()
+    for name in SHAPE_NAMES:
+        unit_shape(name)
+    np.savez_compressed(FILE, allow_pickle=False, **all_kept())
 
 
 def _box() -> UnitShape:

@@ -3,8 +3,8 @@
 - `packing` gathers scenes into arrays, a `SceneBatch`; `renderer` renders one on the best backend;
   `ground_truth` says what the pixels mean: radiance, depth, normal, object id.
 - `drjit_renderer` is the fast path: one kernel computes all pixels of a batch. `rays` finds what
-  one ray hits and its colour; `cubes` does so faster for polycubes; `unit_scene` and
-  `model_scene` hold the geometry in Mitsuba.
+  one ray hits and its colour; `cubes` does so faster for polycubes. `meshes` rasterises triangles,
+  and holds them in Mitsuba; `surfaces` has the shapes that need none.
 - `shading` is the shading equation, with the fall-off of light, in numpy; `path_tracing`
   is the path-traced variant of the colour.
 - `numpy_renderer` renders the same images slowly, as fallback and as reference for tests.

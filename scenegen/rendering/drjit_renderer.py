@@ -19,16 +19,17 @@ from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.exact_surfaces import Surface
 from scenegen.objects.solids import Mesh
 from scenegen.rendering.cubes import Cubes, closest_cube, upload_cubes
-from scenegen.rendering.model_scene import GRID, model_scene
-from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.pixel_samples import SAMPLE_STEPS
-from scenegen.rendering.rasteriser import (
+from scenegen.rendering.meshes.model_scene import GRID, model_scene
+from scenegen.rendering.meshes.rasteriser import (
     Triangles,
     color_of_nearest,
     nearest_triangle,
     rasterise,
     upload_triangles,
 )
+from scenegen.rendering.meshes.unit_scene import UnitScene, unit_scene
+from scenegen.rendering.packing import SceneBatch
+from scenegen.rendering.pixel_samples import SAMPLE_STEPS
 from scenegen.rendering.rays import (
     BEFORE_LIGHTS,
     OBJECT,
@@ -42,7 +43,6 @@ from scenegen.rendering.rays import (
 )
 from scenegen.rendering.surfaces.in_kernel import upload_surfaces
 from scenegen.rendering.tables import gather_row, upload_rows, upload_table
-from scenegen.rendering.unit_scene import UnitScene, unit_scene
 
 Array = NDArray[Any]
 LANES = 32  # an image's rays are padded to a multiple of this, so no SIMD packet spans two images

@@ -14,7 +14,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
-from scenegen.rendering.rasteriser import edge_plane
+from scenegen.rendering.meshes.rasteriser import edge_plane
 from scenegen.rendering.shading import SHADOW_OFFSET
 from scenegen.rendering.surfaces.in_kernel import (
     MESH,

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import BackendError
-from scenegen.files.workers import processors
+from scenegen.files.sets.workers import processors
 from scenegen.objects.catalogue import face_count
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering.backend import HOW_TO_GET_LLVM, select_variant
@@ -103,7 +103,7 @@ def _with_traced_image(
 ) -> Callable[[], dict[str, Array]]:
     if variant == "scalar_rgb":
         raise BackendError("shading path", "no LLVM", hint=HOW_TO_GET_LLVM)
-    from scenegen.rendering.model_scene import MODELS  # imports drjit, as above
+    from scenegen.rendering.meshes.model_scene import MODELS  # imports drjit, as above
     from scenegen.rendering.path_tracing.path_tracer import trace_images
 
     fetch = launch_fields(batch, [name for name in names if name != "image"], device)
@@ -141,7 +141,7 @@ def parts(batch: SceneBatch) -> list[SceneBatch]:
 def _scalar_scene(shape: UnitShape) -> Any:
     import mitsuba as mi
 
-    from scenegen.rendering.unit_scene import mitsuba_shape
+    from scenegen.rendering.meshes.unit_scene import mitsuba_shape
 
     mi.set_variant("scalar_rgb")
     return mi.load_dict({"type": "scene", "shape": mitsuba_shape(shape, np.zeros(3))})

@@ -6,14 +6,14 @@ from typing import Any
 
 from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
-from scenegen.files.cluster import Cluster
-from scenegen.files.making import make_set
-from scenegen.files.manifest import manifest_path
 from scenegen.files.new_file import check_writable
 from scenegen.files.places import as_place
-from scenegen.files.plan import Bundle, Mark, Part, Plan, Sheet
 from scenegen.files.row_file import writer_name
-from scenegen.files.sets import merge_file
+from scenegen.files.sets.cluster import Cluster
+from scenegen.files.sets.making import make_set
+from scenegen.files.sets.manifest import manifest_path
+from scenegen.files.sets.plan import Bundle, Mark, Part, Plan, Sheet
+from scenegen.files.sets.sets import merge_file
 from scenegen.layout import (
     CONVENTIONS,
     FORMAT_NAME,

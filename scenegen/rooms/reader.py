@@ -19,7 +19,7 @@ from scenegen.files.attributes import read_root
 from scenegen.files.content import SHA256, joint_digest
 from scenegen.files.input_file import describing
 from scenegen.files.rows import RowDataset, RowFile, chosen_rows
-from scenegen.files.shards import OpenFile
+from scenegen.files.sets.shards import OpenFile
 from scenegen.layout import FORMAT, FURTHER, SCORED, TRUTH_DIGEST, WITHHELD, columns
 from scenegen.rendering.ground_truth import decode_image
 

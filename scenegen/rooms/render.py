@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
-from scenegen.files.plan import Block
-from scenegen.files.sets import Packed
+from scenegen.files.sets.plan import Block
+from scenegen.files.sets.sets import Packed
+from scenegen.files.sets.workers import in_threads
 from scenegen.files.table import packing_threads
-from scenegen.files.workers import in_threads
 from scenegen.layout import columns
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE

@@ -17,8 +17,8 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.content import fingerprint
-from scenegen.files.manifest import Manifest
 from scenegen.files.rows import RowBlock
+from scenegen.files.sets.manifest import Manifest
 from scenegen.files.verify import (
     SHOWN,
     Check,

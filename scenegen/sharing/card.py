@@ -1,28 +1,26 @@
-"""A data card: a page in Markdown for people, Croissant for programs, and the index, in one folder.
+"""Write a data card: a page in Markdown for people, Croissant for programs, and the index.
 
 Texts from files and from the command line stay what they are on the page: in tables every sign that
 means something to Markdown or HTML is escaped, and what is to be copied is a block of lines with
 four spaces before them, in which nothing means anything.
 """
 
-import datetime
-import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from scenegen.common.records import check
 from scenegen.common.text_table import markdown, piped, printable
-from scenegen.files.manifest import file_sha256
 from scenegen.files.new_file import folder_written_beside
+from scenegen.files.rows import RowFile
 from scenegen.files.schema import Column
+from scenegen.files.sets.shards import OpenFile
 from scenegen.rendering.backend import VERSION_ATTRIBUTES
+from scenegen.sharing.index import INDEX, counts_table, index_columns, write_index
+from scenegen.sharing.publication import Publication, shared_file
+from scenegen.sharing.task import ALL_DATA, Tally, Task
 
-CARD, CROISSANT, INDEX = "README.md", "croissant.json", "index.parquet"
+CARD, CROISSANT = "README.md", "croissant.json"
 NAMES = (CARD, CROISSANT, INDEX)
-HDF5, PARQUET, JSON = "application/x-hdf5", "application/x-parquet", "application/json"
-ADDRESS = r"https?://[^\s<>\"'`]+"
-SPDX = r"[A-Za-z0-9.+-]{1,60}"
 PAPER = """@article{rajeswar2020pix2shape,
   title = {Pix2Shape: Towards Unsupervised Learning of 3D Scenes from Images Using a View-Based Representation},
   author = {Rajeswar, Sai and Mannan, Fahim and Golemo, Florian and Parent-L{\\'e}vesque, J{\\'e}r{\\^o}me and Vazquez, David and Nowrouzezahrai, Derek and Courville, Aaron},
@@ -46,111 +44,79 @@ RESPONSIBLE = {  # titles of sections, by the fields of mlcroissant's RAI vocabu
     "data_social_impact": "Impact on society",
     "data_release_maintenance_plan": "Maintenance",
 }
-# Paragraphs on all data that this program makes, by the same names.
-ALL_DATA: dict[str, str | list[str]] = {
-    "data_collection_type": ["Software Collection"],
-    "data_social_impact": "None is expected: the images show no people, and nothing that exists.",
-    "data_release_maintenance_plan": "A file is not changed after it is published; a correction"
-    " gets a new version and new SHA-256s.",
-}
 
 
-@dataclass(frozen=True)
-class Publication:
-    """What only the person who publishes the data knows.
+def write_card(
+    folder: str | Path,
+    publication: Publication,
+    task: Task,
+    tables: Sequence[RowFile],
+    files: Sequence[tuple[Path, str]],
+    notes: Callable[[Sequence[Tally]], Mapping[str, str]],
+    *,
+    answers: Sequence[RowFile] = (),
+    overwrite: bool = False,
+    progress: Callable[[int], Any] = lambda done: None,
+) -> list[Path]:
+    """Write the data card of open tables to a folder that appears complete; return its files.
 
-    Attributes:
-        title: a name for people.
-        creators: names of those who made the data.
-        date: of publication, YYYY-MM-DD.
-        license: an SPDX identifier such as CC-BY-4.0, or an address that begins with https://.
-        version: of the data, as 1.0.0.
-        url: of the page where the data will be; empty if it is not known yet.
+    The same files and the same publication give the same bytes with the same versions of pyarrow,
+    `datasets` and mlcroissant. All values are read once, for the digests in the index, and all
+    bytes of the files, for their SHA-256.
+
+    Args:
+        folder: to make; with `overwrite`, an older card is replaced.
+        publication: what only the person who publishes the data knows.
+        files: those that are handed on, and what each holds in words of ours.
+        notes: returns sections of the page, by their titles, from what the tables hold.
+        answers: files of which requests and commands are told too.
+        progress: is told the number of rows that were read since the last call.
+
+    Raises OSError as `folder_written_beside`, and FileFormatError where a file is damaged.
     """
+    from scenegen.sharing.croissant import croissant_json
 
-    title: str
-    creators: tuple[str, ...]
-    date: str
-    license: str
-    version: str = "1.0.0"
-    url: str = ""
-
-    def __post_init__(self) -> None:
-        check(self.title.strip() != "", "title", "an empty text", "a name")
-        names = [name.strip() for name in self.creators]
-        check(len(names) > 0 and all(names), "creator", names or "none", "a name")
-        check(_is_day(self.date), "date", repr(self.date), "a day as YYYY-MM-DD")
-        expected = "an SPDX identifier such as CC-BY-4.0, or an address"
-        good = re.fullmatch(f"{SPDX}|{ADDRESS}", self.license) is not None
-        check(good, "license", repr(self.license), expected)
-        good = re.fullmatch(r"\d+\.\d+\.\d+", self.version) is not None
-        check(good, "data-version", repr(self.version), "three numbers, as 1.0.0")
-        good = re.fullmatch(f"({ADDRESS})?", self.url) is not None
-        check(good, "url", repr(self.url), "an address that begins with https://")
-
-    @property
-    def license_address(self) -> str:
-        """Where the licence can be read."""
-        if self.license.startswith("http"):
-            return self.license
-        return f"https://spdx.org/licenses/{self.license}.html"
-
-    @property
-    def identifier(self) -> str:
-        """The title in letters, digits and hyphens, for names and citation keys."""
-        return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-") or "data"
-
-    @property
-    def citation(self) -> str:
-        """BibTeX of the data itself, without characters that mean something to TeX."""
-        lines = {
-            "title": _plain(self.title),
-            "author": " and ".join(f"{{{_plain(name)}}}" for name in self.creators),
-            "year": self.date[:4],
-            "version": self.version,
-            "howpublished": _plain(self.url),
-            "note": "Made with pix2shape-bench",
+    with folder_written_beside(folder, NAMES, overwrite) as made:
+        tallies = write_index(made / INDEX, task, tables, progress)
+        shared = [shared_file(path, meaning) for path, meaning in files]
+        shared.append(shared_file(made / INDEX, "a line for each row, without pixels"))
+        facts = [task.facts(file, tally) for file, tally in zip(tables, tallies, strict=True)]
+        names = [f"{file.path.name} {file.part}".rstrip() for file in tables]
+        told = {file.path.name: file.attributes for file in (*tables, *answers)}
+        commands = {n: t["creation_command"] for n, t in told.items() if "creation_command" in t}
+        checksums = [("file", "bytes", "SHA-256", "holds")]
+        checksums += [(file.name, str(file.bytes), file.sha256, file.meaning) for file in shared]
+        sections = {
+            "Files": _table([tuple(facts[0]), *(tuple(row.values()) for row in facts)]),
+            "What they hold": _table(counts_table(task, names, tallies)),
+            "Commands": _blocks(commands),
+            "Requests": _blocks({name: texts["spec"] for name, texts in told.items()}),
+            "Data sets of the files": (task.layout(tables),),
+            "Columns of the index": _index_lines(index_columns(task)),
+            "Reading": (task.reading,),
+            **{title: (text,) for title, text in notes(tallies).items()},
+            **_responsible(task),
+            **_terms(publication),
+            "Checksums": _table(checksums),
         }
-        inner = ",\n".join(f"  {name} = {{{text}}}" for name, text in lines.items() if text)
-        return f"@misc{{{self.identifier},\n{inner}\n}}"
+        page = card_page(publication, task, sum(tally.rows for tally in tallies), sections)
+        (made / CARD).write_text(page, encoding="utf-8")
+        tools = sorted({_tool(file.attributes) for file in tables})
+        metadata = croissant_json(publication, task, shared, tools)
+        (made / CROISSANT).write_text(metadata, encoding="utf-8")
+    return [Path(folder) / name for name in NAMES]
 
 
-def _is_day(text: str) -> bool:
-    try:
-        return datetime.date.fromisoformat(text).isoformat() == text
-    except ValueError:
-        return False
+def with_shards(opened: OpenFile, meaning: str, of_set: str) -> list[tuple[Path, str]]:
+    """Return a file and, if it shows shards as one, these, and what each of them holds."""
+    path = opened.path
+    if not opened.shards:
+        return [(path, meaning)]
+    shards = [(opened.folder / shard.file, f"shard of {path.name}") for shard in opened.shards]
+    return [(path, of_set), *shards]
 
 
-def _plain(text: str) -> str:
-    return "".join(c for c in printable(text) if c not in "{}\\%#$&~^")
-
-
-@dataclass(frozen=True)
-class SharedFile:
-    """A file that is handed on.
-
-    Attributes:
-        name: without a folder; all files lie beside the card.
-        kind: media type, one of HDF5, PARQUET and JSON.
-        meaning: what it holds, in a sentence of ours.
-        bytes: its size.
-        sha256: of the whole file, 64 hex digits.
-    """
-
-    name: str
-    kind: str
-    meaning: str
-    bytes: int
-    sha256: str
-
-
-def shared_file(path: Path, kind: str, meaning: str) -> SharedFile:
-    """Return what a card tells of a file, whose bytes are read once. Raises OSError."""
-    return SharedFile(path.name, kind, meaning, path.stat().st_size, file_sha256(path))
-
-
-def tool(texts: Mapping[str, str]) -> str:
+def _tool(texts: Mapping[str, str]) -> str:
     """Return which program rendered a file, with the versions that its root names."""
     versions = ", ".join(
         f"{name.removesuffix('_version')} {texts[name]}" for name in VERSION_ATTRIBUTES
@@ -158,99 +124,42 @@ def tool(texts: Mapping[str, str]) -> str:
     return printable(f"{texts['writer']}, {versions}, {texts['variant']}")
 
 
-@dataclass(frozen=True)
-class DataDescription:
-    """What a card tells of the data, besides the publication and the index.
-
-    Attributes:
-        summary: what the data is, in one paragraph of ours.
-        keywords: words to find it by.
-        files: those of the data.
-        columns: of the index.
-        key: names of those columns that together name a row.
-        rows: number of rows, in all files.
-        facts: tables under a title each, the first row of each being its head; of texts from
-            anywhere.
-        commands: of each file, by its name, the command that made it; texts from anywhere.
-        requests: of each file, by its name, the request as JSON.
-        layout: a Markdown table of ours: data sets of the HDF5 files, with units and frames.
-        responsible: paragraphs of ours, by mlcroissant's names of the fields of RAI, besides
-            ALL_DATA.
-        notes: more sections of ours, by their titles.
-    """
-
-    summary: str
-    keywords: Sequence[str]
-    files: Sequence[SharedFile]
-    columns: Sequence[Column]
-    key: Sequence[str]
-    rows: int
-    facts: Mapping[str, Sequence[tuple[str, ...]]]
-    commands: Mapping[str, str]
-    requests: Mapping[str, str]
-    layout: str
-    responsible: Mapping[str, str | list[str]]
-    notes: Mapping[str, str]
-
-
-def write_card(
-    folder: str | Path,
-    publication: Publication,
-    describe: Callable[[Path], DataDescription],
-    overwrite: bool = False,
-) -> list[Path]:
-    """Write a data card to a folder that appears complete; return its files.
-
-    Args:
-        describe: writes the index to a path and returns what is to be told of the data.
-
-    Raises OSError as `folder_written_beside`, and whatever `describe` raises.
-    """
-    from scenegen.sharing.croissant import croissant_json
-
-    with folder_written_beside(folder, NAMES, overwrite) as made:
-        data = describe(made / INDEX)
-        index = shared_file(made / INDEX, PARQUET, "a line for each row, without pixels")
-        files = [*data.files, index]
-        page, metadata = (write(publication, data, files) for write in (card_page, croissant_json))
-        (made / CARD).write_text(page, encoding="utf-8")
-        (made / CROISSANT).write_text(metadata, encoding="utf-8")
-    return [Path(folder) / name for name in NAMES]
-
-
-def card_page(publication: Publication, data: DataDescription, files: Sequence[SharedFile]) -> str:
-    """Return the page of a data set, with the header that Hugging Face reads."""
-    address = publication.license_address
-    license_line = (
-        f"The data: {markdown(publication.license)}, <{address}>. The program that made it:"
-        " Apache-2.0, which says nothing about the data."
-    )
-    responsible = {**data.responsible, **ALL_DATA}
-    checksums = [("file", "bytes", "SHA-256", "holds")]
-    checksums += [(file.name, str(file.bytes), file.sha256, file.meaning) for file in files]
-    citation = "The data, and the paper whose setting it follows:"
-    sections: dict[str, Sequence[str]] = {
-        **{title: _table(rows) for title, rows in data.facts.items()},
-        "Commands": _blocks(data.commands),
-        "Requests": _blocks(data.requests),
-        "Data sets of the files": (data.layout,),
-        "Columns of the index": _index_lines(data.columns),
-        **{title: (text,) for title, text in data.notes.items()},
-        **{RESPONSIBLE[name]: _paragraphs(text) for name, text in responsible.items()
-           if name in RESPONSIBLE},
-        "Licence": (license_line,),
-        "Citation": (citation, *_block(publication.citation), *_block(PAPER)),
-        "Checksums": _table(checksums),
-    }  # fmt: skip
-    title = markdown(printable(publication.title))
-    lines = [_header(publication, data), f"# {title}", "", data.summary, ""]
+def card_page(
+    publication: Publication, task: Task, rows: int, sections: Mapping[str, Sequence[str]]
+) -> str:
+    """Return the page of a data set: a header that Hugging Face reads, and sections by title."""
+    lines = [_header(publication, task, rows), f"# {markdown(printable(publication.title))}", ""]
+    lines += [task.summary, ""]
     for title, text in sections.items():
         if text:
             lines += [f"## {title}", "", *text, ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _header(publication: Publication, data: DataDescription) -> str:
+def _responsible(task: Task) -> dict[str, Sequence[str]]:
+    """Return the sections on use and limits."""
+    texts = {**task.responsible, **ALL_DATA}
+    return {
+        RESPONSIBLE[name]: [text] if isinstance(text, str) else [f"- {part}" for part in text]
+        for name, text in texts.items()
+        if name in RESPONSIBLE
+    }
+
+
+def _terms(publication: Publication) -> dict[str, Sequence[str]]:
+    """Return the sections on licence and citation."""
+    license_line = (
+        f"The data: {markdown(publication.license)}, <{publication.license_address}>. The program"
+        " that made it: Apache-2.0, which says nothing about the data."
+    )
+    citation = "The data, and the paper whose setting it follows:"
+    return {
+        "Licence": [license_line],
+        "Citation": [citation, *_block(publication.citation), *_block(PAPER)],
+    }
+
+
+def _header(publication: Publication, task: Task, rows: int) -> str:
     """Return the YAML that Hugging Face reads."""
     from huggingface_hub import DatasetCardData
 
@@ -261,8 +170,8 @@ def _header(publication: Publication, data: DataDescription) -> str:
         license=short if listed else "other",
         license_name=None if listed else publication.license,
         license_link=None if listed else publication.license_address,
-        size_categories=[next((name for n, name in SIZES if data.rows < n), "n>1M")],
-        tags=list(data.keywords),
+        size_categories=[next((name for n, name in SIZES if rows < n), "n>1M")],
+        tags=list(task.keywords),
         configs=[{"config_name": "index", "data_files": INDEX}],
     )
     return f"---\n{header.to_yaml()}\n---\n"
@@ -283,10 +192,6 @@ def _blocks(texts: Mapping[str, str]) -> list[str]:
     for name, text in texts.items():
         lines += [f"{markdown(printable(name))}:", *_block(text.replace("\n", "\\n"))]
     return lines
-
-
-def _paragraphs(text: str | list[str]) -> list[str]:
-    return [text] if isinstance(text, str) else [f"- {part}" for part in text]
 
 
 def _index_lines(columns: Sequence[Column]) -> list[str]:

@@ -13,30 +13,32 @@ import mlcroissant
 
 from scenegen.common.text_table import printable
 from scenegen.files.schema import Column
-from scenegen.sharing.card import ALL_DATA, INDEX, DataDescription, Publication, SharedFile
+from scenegen.sharing.index import INDEX, index_columns
+from scenegen.sharing.publication import Publication, SharedFile
+from scenegen.sharing.task import ALL_DATA, Task
 
 CONFORMS = ["http://mlcommons.org/croissant/1.1", "http://mlcommons.org/croissant/RAI/1.0"]
 RECORDS = "rows"  # id of the record set
 
 
 def croissant_json(
-    publication: Publication, data: DataDescription, files: Sequence[SharedFile]
+    publication: Publication, task: Task, files: Sequence[SharedFile], tools: Sequence[str]
 ) -> str:
-    """Return the Croissant file of a data set."""
+    """Return the Croissant file of a data set, whose files these programs rendered."""
     context = mlcroissant.Context(conforms_to=CONFORMS[0])
     records = mlcroissant.RecordSet(
         ctx=context,
         id=RECORDS,
         name=RECORDS,
         description="One record for each row of the files, without its pixels.",
-        key=[f"{RECORDS}/{name}" for name in data.key],
-        fields=[_field(context, column) for column in data.columns],
+        key=[f"{RECORDS}/{name}" for name in task.key],
+        fields=[_field(context, column) for column in index_columns(task)],
     )
     metadata = mlcroissant.Metadata(
         ctx=context,
         name=publication.identifier,
-        description=data.summary,
-        keywords=list(data.keywords),
+        description=task.summary,
+        keywords=list(task.keywords),
         license=[publication.license_address],
         creators=[
             mlcroissant.Person(ctx=context, name=printable(name)) for name in publication.creators
@@ -47,8 +49,9 @@ def croissant_json(
         url=publication.url or None,
         distribution=[_file_object(context, file) for file in files],
         record_sets=[records],
-        **data.responsible,
+        **task.responsible,
         **ALL_DATA,
+        machine_annotation_tools=list(tools),
     )
     record = {**metadata.to_json(), "conformsTo": CONFORMS, "isLiveDataset": False}
     return json.dumps(record, indent=2) + "\n"

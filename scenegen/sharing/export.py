@@ -6,8 +6,8 @@ and networks, unless the caller asks for linear ones.
 
 import json
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,39 +18,26 @@ from scenegen.common.records import check
 from scenegen.files.new_file import folder_written_beside
 from scenegen.files.rows import RowFile
 from scenegen.files.schema import Column
-from scenegen.files.shards import cut, shard_name
+from scenegen.files.sets.shards import cut, shard_name
 from scenegen.rooms.preview import srgb_bytes
-from scenegen.sharing.stored import as_text, is_picture, stored_blocks
+from scenegen.sharing.formats import write_parquet, write_tar
+from scenegen.sharing.task import Task, is_picture, stored_blocks
 
-FORMATS = {"parquet": ".parquet", "webdataset": ".tar"}  # and how the names of their files end
+FORMATS: dict[str, tuple[str, Callable[..., None]]] = {  # ending of file names, and writer
+    "parquet": (".parquet", write_parquet),
+    "webdataset": (".tar", write_tar),
+}
 ENCODINGS = ("srgb", "linear")  # of pictures
 ROWS_PER_FILE = 1000
 MOST_FILES = 100_000  # as many as their numbers of five digits can tell apart
 ABOUT = "config.json"  # a name that `datasets` never takes for data
 ROW = Column("row", (), "int64", meaning="row of the file that the rows come from")
-
-
-@dataclass(frozen=True)
-class ExportedTable:
-    """Rows to write.
-
-    Attributes:
-        stem: how the names of the files begin.
-        what: what the rows are, in words of ours.
-        file: where they are stored.
-        columns: of each row, besides `ROW`.
-        values: returns the values of these columns from those that are stored, of one row.
-    """
-
-    stem: str
-    what: str
-    file: RowFile
-    columns: Sequence[Column]
-    values: Callable[[Mapping[str, Any]], Mapping[str, Any]]
+DECODING = "value times `scale`, decoded by the sRGB curve (IEC 61966-2-1), is linear radiance"
 
 
 def write_export(
-    table: ExportedTable,
+    file: RowFile,
+    task: Task,
     form: str,
     folder: str | Path,
     rows: Sequence[int] | None = None,
@@ -60,11 +47,13 @@ def write_export(
     overwrite: bool = False,
     progress: Callable[[int], Any] = lambda done: None,
 ) -> list[Path]:
-    """Write rows of a table to a folder, which appears when it is complete; return its files.
+    """Write rows of an open file to a folder, which appears when it is complete; return its files.
 
-    Files are called `rooms-00000-of-00003.parquet` after the stem; ABOUT has the root attributes
-    of the file that the rows come from, and what each column means. The same rows give the same
-    bytes with the same versions of Pillow and, for Parquet, pyarrow and `datasets`.
+    Files are called `rooms-00000-of-00003.parquet` after `rooms.h5`, and
+    `iqtt-train-labeled-00000-of-00003.parquet` after a part of `iqtt-train.h5`; ABOUT has the root
+    attributes of the file that the rows come from, and what each column means. Only what the open
+    file tells is written. The same rows give the same bytes with the same versions of Pillow and,
+    for Parquet, pyarrow and `datasets`.
 
     Args:
         form: one of FORMATS.
@@ -79,48 +68,49 @@ def write_export(
         SpecError: no rows, rows out of range or twice; too many files.
         FileFormatError: a row is damaged.
     """
-    count = len(table.file)
+    part = f", {file.part}" if file.part else ""
+    what, count = f"rows of {file.path.name}{part}, {task.what}", len(file)
     check_choice("format", form, FORMATS)
     check_choice("encoding", encoding, ENCODINGS)
     check(rows_per_file >= 1, "rows per file", rows_per_file, "1 or more")
-    check(count > 0, table.what, "no rows", "at least one")
+    check(count > 0, what, "no rows", "at least one")
     chosen = list(range(count) if rows is None else rows)
     good = len(chosen) > 0 and min(chosen) >= 0 and max(chosen) < count
     check(good, "items", f"{len(chosen)} rows", f"some from 0 to {count - 1}")
     check(len(set(chosen)) == len(chosen), "items", "a row twice", "each row once")
     parts = cut(len(chosen), rows_per_file)
     check(len(parts) <= MOST_FILES, "rows per file", rows_per_file, "fewer files than 100,000")
-    ending = FORMATS[form]
-    names = [shard_name(f"{table.stem}{ending}", i, len(parts)) for i in range(len(parts))]
-    ours = {*names, ABOUT, *_older_files(folder, table.stem, ending)}
-    write = _writer(form)
-    if encoding == "srgb":
-        table = _for_eyes(table)
+    ending, write = FORMATS[form]
+    stem = "-".join(filter(None, (file.path.stem, file.part)))
+    names = [shard_name(f"{stem}{ending}", i, len(parts)) for i in range(len(parts))]
+    columns = [ROW, *task.exported(file)]
+    pictures = {c.name for c in columns if is_picture(c)} if encoding == "srgb" else set()
+    columns = [_as_srgb(column) if column.name in pictures else column for column in columns]
+    about = {
+        "what": f"{what}, as {form}",
+        "files": names,
+        "columns": {column.name: _told(column) for column in columns},
+        "attributes": dict(sorted(file.attributes.items())),
+    }
+    text = json.dumps(about, indent=1, default=lambda value: np.asarray(value).tolist())
+    ours = {*names, ABOUT, *_older_files(folder, stem, ending)}
     with folder_written_beside(folder, ours, overwrite) as made:
-        for name, part in zip(names, parts, strict=True):
-            blocks = _blocks(table, [chosen[i] for i in part], progress)
-            write(made / name, (ROW, *table.columns), blocks)
-        (made / ABOUT).write_text(_about(table, form, names), encoding="utf-8")
+        for name, some in zip(names, parts, strict=True):
+            blocks = _blocks(file, task, columns, pictures, [chosen[i] for i in some], progress)
+            write(made / name, columns, blocks)
+        (made / ABOUT).write_text(text + "\n", encoding="utf-8")
     return [Path(folder) / name for name in (*names, ABOUT)]
 
 
-def _for_eyes(table: ExportedTable) -> ExportedTable:
-    """Return a table whose pictures are encoded as sRGB, and whose columns say so."""
-    codes = srgb_bytes(np.arange(256) / 255)
-    pictures = [column.name for column in table.columns if is_picture(column)]
-    how = "value times `scale`, decoded by the sRGB curve (IEC 61966-2-1), is linear radiance"
+def _as_srgb(column: Column) -> Column:
+    more = {**column.more, "encoding": "srgb"}
+    return replace(column, unit="sRGB", meaning=f"RGB; {DECODING}", more=more)
 
-    def described(column: Column) -> Column:
-        if column.name not in pictures:
-            return column
-        more = {**column.more, "encoding": "srgb"}
-        return replace(column, unit="sRGB", meaning=f"RGB; {how}", more=more)
 
-    def values(stored: Mapping[str, Any]) -> Mapping[str, Any]:
-        exported = table.values(stored)
-        return {**exported, **{name: codes[exported[name]] for name in pictures}}
-
-    return replace(table, columns=[described(column) for column in table.columns], values=values)
+def _told(column: Column) -> dict[str, Any]:
+    """Return what the files themselves do not tell of a column."""
+    attributes = {key: value for key, value in column.attributes.items() if key != "shape"}
+    return {"type": column.dtype, "row_shape": list(column.shape), **attributes}
 
 
 def _older_files(folder: str | Path, stem: str, ending: str) -> list[str]:
@@ -131,47 +121,19 @@ def _older_files(folder: str | Path, stem: str, ending: str) -> list[str]:
     return [path.name for path in Path(folder).iterdir() if pattern.fullmatch(path.name)]
 
 
-def _writer(form: str) -> Callable[..., None]:
-    """Return the writer of a format; only Parquet needs libraries of its own."""
-    if form == "parquet":
-        from scenegen.sharing.parquet import write_parquet
-
-        return write_parquet
-    from scenegen.sharing.webdataset import write_tar
-
-    return write_tar
-
-
 def _blocks(
-    table: ExportedTable, rows: Sequence[int], progress: Callable[[int], Any]
+    file: RowFile,
+    task: Task,
+    columns: Sequence[Column],
+    pictures: set[str],
+    rows: Sequence[int],
+    progress: Callable[[int], Any],
 ) -> Iterator[dict[str, list[Any]]]:
-    """Yield the values of rows as lists, by name of the column."""
-    file = table.file
-    for numbers, stored in stored_blocks(file, rows):
-        block: dict[str, list[Any]] = {ROW.name: numbers}
-        for row, values in zip(numbers, stored, strict=True):
-            texts = {name: as_text(value, file.place(name, row)) for name, value in values.items()}
-            exported = table.values(texts)
-            for column in table.columns:
-                block.setdefault(column.name, []).append(exported[column.name])
-        yield block
-        progress(len(numbers))
-
-
-def _about(table: ExportedTable, form: str, names: Sequence[str]) -> str:
-    """Return what the files do not tell themselves, as JSON."""
-    columns = {
-        c.name: {
-            "type": c.dtype,
-            "row_shape": list(c.shape),
-            **{key: value for key, value in c.attributes.items() if key != "shape"},
-        }
-        for c in (ROW, *table.columns)
-    }
-    about = {
-        "what": f"{table.what}, as {form}",
-        "files": list(names),
-        "columns": columns,
-        "attributes": dict(sorted(table.file.attributes.items())),
-    }
-    return json.dumps(about, indent=1, default=lambda value: np.asarray(value).tolist()) + "\n"
+    """Yield the values of rows as lists, by name of the column; `pictures` become sRGB."""
+    codes = srgb_bytes(np.arange(256) / 255)
+    for block in stored_blocks(file, rows):
+        exported = [{ROW.name: row, **task.values(stored)} for row, stored in block]
+        for values in exported:
+            values.update({name: codes[values[name]] for name in pictures})
+        yield {c.name: [values[c.name] for values in exported] for c in columns}
+        progress(len(block))

@@ -1,106 +1,152 @@
-"""Files of rooms, handed on: exported rows, and a data card."""
+"""Files of rooms, handed on: what exports and data cards tell of them."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 from scenegen.common.records import check
 from scenegen.description.specs import BUILT_IN
-from scenegen.files.manifest import manifest_path
 from scenegen.files.schema import Column
+from scenegen.files.sets.manifest import manifest_path
 from scenegen.layout import columns, fields, markdown_table
 from scenegen.rooms.reader import RoomsFile
-from scenegen.sharing.card import (
-    HDF5,
-    JSON,
-    NAMES,
-    DataDescription,
-    Publication,
-    SharedFile,
-    shared_file,
-    tool,
-    write_card,
+from scenegen.sharing.card import NAMES, with_shards, write_card
+from scenegen.sharing.publication import Publication
+from scenegen.sharing.task import Line, Tally, Task
+
+KEYWORDS = (
+    "synthetic", "3d", "depth-estimation", "surface-normals", "single-image-3d",
+    "inverse-graphics", "ground-truth", "pix2shape-bench",
+)  # fmt: skip
+SUMMARY = (
+    "Synthetic images of a room's corner that holds a few objects, rendered by a program, with the"
+    " exact ground truth of each pixel (depth, surface normal, object id) and of each scene"
+    " (camera, lights, materials, objects and their poses)."
 )
-from scenegen.sharing.export import ExportedTable, write_export
-from scenegen.sharing.index import IndexKind, Line, Tally, counts_table, write_index
-from scenegen.sharing.rooms_texts import KEYWORDS, READING, RESPONSIBLE, SUMMARY
+READING = """The HDF5 files are read by any HDF5 library. In Python:
 
+    import h5py
 
-def export_rows(
-    path: str | Path, form: str, folder: str | Path, rows: Sequence[int] | None = None, **how: Any
-) -> list[Path]:
-    """Write rows of a file of rooms, or of a set of shards, as `write_export`; return its files.
+    with h5py.File(name) as f:
+        depth = f["depth"][row]  # (H, W) float32, planar, scene units
+        radiance = f["image"][row] * f["image"].attrs["scale"]  # (H, W, 3) linear RGB
 
-    Files are called `rooms-00000-of-00003.parquet` after `rooms.h5`. Data sets become columns:
-    `camera/fov_y_degrees` is `camera_fov_y_degrees`.
-
-    Args:
-        how: `encoding`, `rows_per_file`, `overwrite` and `progress` of `write_export`.
-
-    Raises as `write_export`; and OSError where there is no such file, FileFormatError where it is
-    not one of rooms.
-    """
-    with RoomsFile(path) as rooms:
-        table = ExportedTable(
-            stem=Path(path).stem,
-            what=f"rows of {rooms.path.name}, a file of rooms of pix2shape-bench",
-            file=rooms,
-            columns=[replace(c, name=c.name.replace("/", "_")) for c in columns(rooms.spec)],
-            values=lambda stored: {name.replace("/", "_"): v for name, v in stored.items()},
-        )
-        return write_export(table, form, folder, rows, **how)
+`datasets.load_dataset(folder, "index")` reads the index, and so does `mlcroissant` by
+`croissant.json`. Lengths are in scene units: the room's edge is 1. World frame: right-handed, y up,
+the floor at y = 0, walls at x = 0 and z = 0. Camera frame: x right, y up, looks along -z. Images
+are linear: no gamma is applied."""
+RESPONSIBLE: dict[str, str | list[str]] = {
+    "data_collection": "Nothing was collected. Scenes are drawn by a program from a specification"
+    " and a seed, and rendered by ray casting; the ground truth is what the rays hit. The page"
+    " README.md has the commands and all settings.",
+    "data_collection_missing_data": "Depth is NaN, the normal zero and the object id -1 where a"
+    " pixel's ray meets nothing. Nothing else is missing and nothing is filled in.",
+    "data_preprocessing_protocol": [
+        "None: values are stored as they were rendered. Images of 8 bits are linear radiance from"
+        " 0 to 1, clipped and rounded to 255 steps."
+    ],
+    "data_annotation_protocol": [
+        "No person labelled anything. Depth, normals and object ids are computed for the one ray"
+        " through each pixel's centre, from the same scene that gives the image."
+    ],
+    "data_use_cases": [
+        "Training and testing methods that estimate depth, normals, objects or new views from a"
+        " single image, where exact ground truth is needed.",
+        "Comparing such methods under one protocol, with bench score of pix2shape-bench.",
+        "Not for deciding how well a method does on photographs, and not for uses that concern"
+        " people: no data of this kind is in the files.",
+    ],
+    "data_limitations": [
+        "Rooms are a floor and two walls, without texture, windows or clutter, and hold a few"
+        " objects. The camera looks at a fixed point from a fixed distance.",
+        "With the paper's shading equation there are no shadows and no indirect light, unless the"
+        " settings say so; there is no noise of a sensor, no blur and no distortion of a lens.",
+        "Depth belongs to the ray through a pixel's centre; at silhouettes it is not the mean over"
+        " the pixel.",
+    ],
+    "data_biases": [
+        "All images are synthetic, and of one kind of room. Shapes or classes are drawn with equal"
+        " probability, not as often as they occur in homes.",
+        "Objects that would show too few pixels, or that the border would cut, are drawn again"
+        " unless the settings say otherwise; so large and central objects are favoured.",
+        "The built-in everyday objects are of nine classes, in proportions that a program draws.",
+    ],
+    "personal_sensitive_information": [
+        "None: no people, no places, no text. The recorded commands hold names of files of those"
+        " who made the data."
+    ],
+}
 
 
 def make_rooms_card(
-    files: Sequence[str | Path],
-    folder: str | Path,
-    publication: Publication,
-    *,
-    overwrite: bool = False,
-    progress: Callable[[int], Any] = lambda done: None,
+    rooms: Sequence[RoomsFile], folder: str | Path, publication: Publication, **how: Any
 ) -> list[Path]:
-    """Write the data card of some files of rooms, or sets of shards, to a folder; return its files.
-
-    The same files and the same publication give the same bytes with the same versions of pyarrow,
-    `datasets` and mlcroissant. All values of the files are read once, for the digests in the index.
+    """Write the data card of open files of rooms, or sets of shards, as `write_card`.
 
     Args:
-        files: each one a file of rooms, or the file of a set of shards.
-        folder: to make; with `overwrite`, an older card is replaced.
-        publication: what only the person who publishes the data knows.
-        progress: is told the number of rows that were read since the last call.
+        how: `overwrite` and `progress` of `write_card`.
 
-    Raises:
-        OSError: as `write_card`, or there is no such file of rooms.
-        FileFormatError: a file is not one of rooms, or is damaged.
-        SpecError: two files have one name.
+    Raises as `write_card`, and SpecError where two files have one name.
     """
-    names = [*(Path(file).name for file in files), *NAMES]
+    names = [*(file.path.name for file in rooms), *NAMES]
     for name in names:
         expected = "different names, as all lie beside the card"
         check(names.count(name) == 1, "files", f"{name} twice", expected)
+    files: list[tuple[Path, str]] = []
+    for file in rooms:
+        files += with_shards(file.opened, "rooms with ground truth", "shows its shards as one file")
+        manifest = manifest_path(file.path)
+        if file.opened.shards and manifest.is_file():
+            files.append((manifest, f"manifest of {file.path.name}"))
+    return write_card(folder, publication, ROOMS, rooms, files, _notes, **how)
 
-    def describe(index: Path) -> DataDescription:
-        tables = [partial(RoomsFile, file) for file in files]
-        return _description(files, write_index(index, ROOMS, tables, progress))
 
-    return write_card(folder, publication, describe, overwrite)
-
-
-def default_license(files: Sequence[str | Path]) -> str:
+def default_license(rooms: Sequence[RoomsFile]) -> str:
     """Return the licence of data in which nobody else has rights: CC-BY-4.0.
 
-    Raises OSError and FileFormatError as `RoomsFile`, and SpecError where rooms show meshes that
-    somebody made: on what terms their pictures may be handed on, only the publisher can know.
+    Raises SpecError where rooms show meshes that somebody made: on what terms their pictures may be
+    handed on, only the publisher can know.
     """
-    for file in files:
-        with RoomsFile(file) as rooms:
-            what, source = "none, and meshes that somebody made", rooms.spec.source
-            expected = f"the licence under which pictures of {source} may be handed on"
-            check(source in BUILT_IN, "license", what, expected)
+    for file in rooms:
+        what, source = "none, and meshes that somebody made", file.spec.source
+        expected = f"the licence under which pictures of {source} may be handed on"
+        check(source in BUILT_IN, "license", what, expected)
     return "CC-BY-4.0"
+
+
+def _notes(tallies: Sequence[Tally]) -> dict[str, str]:
+    """Return how the files may be used as splits, and whether they share scenes."""
+    every: set[str] = set().union(*(tally.digests for tally in tallies))
+    shared = sum(len(tally.digests) for tally in tallies) - len(every)
+    apart = "Views of one scene are in one file, next to each other: split by scene, never by row."
+    text = f"Each file is a split of its own: no scene is in two of them. {apart}"
+    if shared:
+        text = f"**{shared} scenes are in more than one file**: these are no splits. {apart}"
+    return {"Splits": f"The file is one split. {apart}" if len(tallies) == 1 else text}
+
+
+def _flat(name: str) -> str:
+    """Return the name of a data set as that of a column: `camera_fov_y_degrees`."""
+    return name.replace("/", "_")
+
+
+def _facts(rooms: RoomsFile, tally: Tally) -> dict[str, str]:
+    spec = rooms.spec
+    return {
+        "file": rooms.path.name,
+        "images": str(tally.rows),
+        "scenes": str(len(tally.digests)),
+        "image": f"{spec.height}x{spec.width}, {spec.image_dtype}",
+        "seed": str(spec.seed),
+        "objects from": f"{spec.source}, {spec.object_split}",
+        "fingerprint": rooms.fingerprint,
+    }
+
+
+def _layout(rooms: Sequence[RoomsFile]) -> str:
+    """Return the table of the columns of all files, each once."""
+    return markdown_table({f.name: f for file in rooms for f in fields(file.spec)}.values())
 
 
 def _line(rooms: RoomsFile, stored: Mapping[str, Any]) -> Line:
@@ -129,7 +175,16 @@ def _of_scene(keys: Callable[[Line], Sequence[Any]]) -> Callable[[Line], Sequenc
 
 
 # fmt: off
-ROOMS = IndexKind(
+ROOMS = Task(
+    unit="images",
+    what="a file of rooms of pix2shape-bench",
+    verify="scenegen verify",
+    summary=SUMMARY,
+    keywords=KEYWORDS,
+    responsible=RESPONSIBLE,
+    reading=READING,
+    exported=lambda rooms: [replace(c, name=_flat(c.name)) for c in columns(rooms.spec)],
+    values=lambda stored: {_flat(name): value for name, value in stored.items()},
     columns=(
         Column("scene_index", (), "int64",
                meaning="which scene of its file the image shows, from 0"),
@@ -151,8 +206,10 @@ ROOMS = IndexKind(
                meaning="of each light, world frame, scene units"),
         Column("light_color", (-1, 3), "float64", meaning="of each light, linear RGB radiance"),
     ),
-    digested=("image", "depth", "normal", "object_id", "scene"),
+    key=("file", "row"),
     line=_line,
+    digested=("image", "depth", "normal", "object_id", "scene"),
+    same="scene",
     counts={
         "scenes by number of objects": _of_scene(lambda line: [line["object_count"]]),
         "scenes by number of lights": _of_scene(lambda line: [line["light_count"]]),
@@ -161,73 +218,7 @@ ROOMS = IndexKind(
         ),
         "images by angle of the view, degrees": lambda line: [line["view_angle_degrees"]],
     },
-    same="scene_sha256",
-    verify="scenegen verify",
+    facts=_facts,
+    layout=_layout,
 )
 # fmt: on
-
-
-def _description(files: Sequence[str | Path], tallies: Sequence[Tally]) -> DataDescription:
-    """Return what is to be told of files, of which every byte is read, for their SHA-256."""
-    shared: list[SharedFile] = []
-    head = ("file", "images", "scenes", "image", "seed", "objects from", "fingerprint")
-    facts, names, commands, requests, tools = [head], [], {}, {}, set()
-    for file, tally in zip(files, tallies, strict=True):
-        with RoomsFile(file) as rooms:
-            spec, texts, name = rooms.spec, rooms.attributes, rooms.path.name
-            names.append(name)
-            counts = str(tally.rows), str(len(tally.digests))
-            size = f"{spec.height}x{spec.width}, {spec.image_dtype}"
-            source = f"{spec.source}, {spec.object_split}"
-            facts.append((name, *counts, size, str(spec.seed), source, rooms.fingerprint))
-            commands[name], requests[name] = texts["creation_command"], spec.to_json()
-            tools.add(tool(texts))
-            shared += _files_of(rooms)
-    return DataDescription(
-        summary=SUMMARY,
-        keywords=KEYWORDS,
-        files=shared,
-        columns=ROOMS.all_columns,
-        key=("file", "row"),
-        rows=sum(tally.rows for tally in tallies),
-        facts={"Files": facts, "What they hold": counts_table("images", names, tallies)},
-        commands=commands,
-        requests=requests,
-        layout=markdown_table(_all_fields(files)),
-        responsible={**RESPONSIBLE, "machine_annotation_tools": sorted(tools)},
-        notes={"Reading": READING, "Splits": _splits(tallies)},
-    )
-
-
-def _all_fields(files: Sequence[str | Path]) -> list[Column]:
-    """Return the columns of all files, each once."""
-    every: dict[str, Column] = {}
-    for file in files:
-        with RoomsFile(file) as rooms:
-            every |= {field.name: field for field in fields(rooms.spec)}
-    return list(every.values())
-
-
-def _files_of(rooms: RoomsFile) -> list[SharedFile]:
-    """Return the file, and for a set its shards and its manifest."""
-    parts = [path for path, _ in rooms.parts]
-    if parts == [rooms.path]:
-        return [shared_file(rooms.path, HDF5, "rooms with ground truth")]
-    files = [shared_file(rooms.path, HDF5, "shows its shards as one file")]
-    files += [shared_file(path, HDF5, f"shard of {rooms.path.name}") for path in parts]
-    manifest = manifest_path(rooms.path)
-    if manifest.is_file():
-        files.append(shared_file(manifest, JSON, f"manifest of {rooms.path.name}"))
-    return files
-
-
-def _splits(tallies: Sequence[Tally]) -> str:
-    """Return how the files may be used as splits, and whether they share scenes."""
-    every: set[str] = set().union(*(tally.digests for tally in tallies))
-    shared = sum(len(tally.digests) for tally in tallies) - len(every)
-    apart = "Views of one scene are in one file, next to each other: split by scene, never by row."
-    if len(tallies) == 1:
-        return f"The file is one split. {apart}"
-    if shared:
-        return f"**{shared} scenes are in more than one file**: these are no splits. {apart}"
-    return f"Each file is a split of its own: no scene is in two of them. {apart}"

@@ -20,6 +20,17 @@ def loader(cache):
     )
 
 
+def of_archive(row, name):
+    """Return the value of a column from a row of a WebDataset archive."""
+    for ending in ("png", "npy"):
+        if f"{name}.{ending}" in row:
+            return row[f"{name}.{ending}"]
+    return row["json"][name]
+
+
+VALUES = {"parquet": dict.__getitem__, "webdataset": of_archive}  # of a row, by format
+
+
 def check_srgb(codes, radiance):
     """The radiance is within half a step of the 8-bit sRGB codes, decoded as IEC 61966-2-1 says."""
     half = np.stack([codes - 0.5, codes + 0.5]).clip(0, 255) / 255

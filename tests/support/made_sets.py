@@ -14,7 +14,7 @@ from iqtt.files.split import ALL_FILES, MANIFEST
 from iqtt.files.verify import verify_split
 from iqtt.questions.specs import SplitSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.files.manifest import Manifest, read_manifest
+from scenegen.files.sets.manifest import Manifest, read_manifest
 from scenegen.files.verify import Check
 from scenegen.rooms.make import make_dataset, merge_rooms
 from scenegen.rooms.reader import RoomsFile

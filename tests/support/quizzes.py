@@ -17,7 +17,6 @@ from iqtt.quiz.commits import Commits
 from iqtt.quiz.schema import open_answers, secret_of
 from iqtt.quiz.serve import server_of
 from iqtt.quiz.study import Question, Settings
-from metrics.views.people.references import compare
 from scenegen.common.web_hosts import Hosts, hosts_of, listen
 
 FORM = {"Content-Type": "application/x-www-form-urlencoded"}
@@ -89,8 +88,7 @@ def served(study, path, most=100, public=False, names=()):
     told = []
     hosts = hosts_of(None, public, names)
     with listen(Hosts(), 0) as listening, Commits(db) as commits:
-        shown = partial(compare, study.settings.answers, {})
-        quiz = Quiz(study, commits, secret_of(db), shown, told.append, "A <b>lab</b>", most)
+        quiz = Quiz(study, commits, secret_of(db), told.append, "A <b>lab</b>", most)
         server = server_of(make_app(quiz, hosts))
         thread = threading.Thread(target=server.run, kwargs={"sockets": [listening]})
         thread.start()

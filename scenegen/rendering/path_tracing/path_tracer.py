@@ -21,11 +21,11 @@ from scenegen.camera import pixel_size
 from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.objects.scene_mesh import room_mesh
 from scenegen.rendering.ground_truth import encode_image
+from scenegen.rendering.meshes.unit_scene import triangle_mesh
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.path_tracing.phong_material import phong_bsdf
 from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.tables import unit
-from scenegen.rendering.unit_scene import triangle_mesh
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough

@@ -33,7 +33,6 @@ def test_the_honest_way(site, study):
         assert site.answer(cookie, choice, ms="250.5") == 303
     end = site.page(cookie)
     assert "You answered 3 of 5" in end
-    assert ">73%<" in end, "the paper's people are beside it"
     assert "1 of 1" in pages[0]
     assert "Question 5 of 5" in pages[5]
     found = read_answers(site.db)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from iqtt.files.make import make_split
-from scenegen.sharing.card import Publication
+from scenegen.sharing.publication import Publication
 from tests.support.loaders import loader
 from tests.support.made_splits import TINY
 

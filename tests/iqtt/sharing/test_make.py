@@ -10,12 +10,19 @@ import pyarrow.parquet as pq
 import pytest
 
 from iqtt import open_questions
+from iqtt.sharing.published import open_split
 from iqtt.sharing.questions import QUESTIONS, make_questions_card
 from scenegen.files.content import row_digest
 from scenegen.sharing.card import NAMES
+from scenegen.sharing.index import index_columns
 from tests.support.loaders import faultless_croissant
 
 TRUTH = ("answer", "cube_count", "camera_distance", "angle_degrees", "distractor_kinds")
+
+
+def make_card(folder, card, publication, with_answers=False):
+    with open_split(folder, with_answers) as tables:
+        make_questions_card(tables, card, publication)
 
 
 @pytest.fixture(scope="module")
@@ -25,9 +32,7 @@ def cards(splits, publication, tmp_path_factory):
     for name in splits:
         for answers in (False, True):
             made[name, answers] = home / f"{name}-{answers}"
-            make_questions_card(
-                splits[name], made[name, answers], publication, with_answers=answers
-            )
+            make_card(splits[name], made[name, answers], publication, answers)
     return made
 
 
@@ -41,7 +46,7 @@ def test_nothing_is_told_of_the_test_answers(kind, cards, splits, publication, t
     private = [*splits[kind].glob("iqtt-test-answers*"), splits[kind] / "iqtt.manifest.json"]
     public = tmp_path / "public"
     shutil.copytree(splits[kind], public, ignore=lambda *_: [path.name for path in private])
-    make_questions_card(public, tmp_path / "card", publication)
+    make_card(public, tmp_path / "card", publication)
     with h5py.File(splits[kind] / "iqtt-test-answers.h5") as file:
         seed, command = json.loads(file.attrs["spec"])["seed"], file.attrs["creation_command"]
     digests = [hashlib.sha256(p.read_bytes()).hexdigest() for p in private if p.exists()]
@@ -71,7 +76,7 @@ def test_records_are_the_questions(kind, answers, cards, splits):
     keys = set()
     for record in found.records("rows"):
         line = {key.removeprefix("rows/"): texts(value) for key, value in record.items()}
-        assert set(line) == {c.name for c in QUESTIONS.all_columns}
+        assert set(line) == {c.name for c in index_columns(QUESTIONS)}
         keys.add((line["file"], line["part"], line["row"]))
         beside = splits[kind] / "iqtt-test-answers.h5"
         with_key = answers and line["split"] == "test"
@@ -123,6 +128,6 @@ def test_questions_that_are_there_twice_are_told(splits, publication, tmp_path):
         file["questions"][3] = file["questions"][1]
         rows = [row_digest(row) for row in file["questions"]]
         file["questions"].attrs["sha256"] = hashlib.sha256(b"".join(rows)).hexdigest()
-    make_questions_card(tmp_path / "split", tmp_path / "card", publication)
+    make_card(tmp_path / "split", tmp_path / "card", publication)
     page = (tmp_path / "card" / "README.md").read_text()
     assert "**1 questions have the images of another one.**" in page

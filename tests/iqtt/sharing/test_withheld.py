@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from iqtt.files.layout import truth_columns
+from iqtt.files.layout import FORMAT, truth_columns
 from iqtt.questions.specs import SplitSpec
-from iqtt.sharing.published import published_split
+from iqtt.sharing.published import open_split
 from iqtt.sharing.withheld import check_withheld
 from scenegen.common.errors import SpecError
-from scenegen.files.shards import ROW_DIGESTS
+from scenegen.files.sets.shards import ROW_DIGESTS, OpenFile
 
 
 def seeded(file):
@@ -52,11 +52,12 @@ WHOLE, SHARD = "iqtt-test.h5", "iqtt-test-00001-of-00002.h5"
 def test_a_file_that_tells_more_is_refused(name, leak, splits, tmp_path):
     folder = tmp_path / "split"
     shutil.copytree(splits["whole" if name == WHOLE else "shards"], folder)
-    check_withheld(folder / name, is_test=True)
+    with OpenFile(folder / name, FORMAT.kind) as opened:
+        check_withheld(opened, is_test=True)
     with h5py.File(folder / name, "r+") as file:
         LEAKS[leak](file)
-    with refused(SpecError, str(folder / name), leak):
-        published_split(folder)
+    with refused(SpecError, str(folder / name), leak), open_split(folder):
+        pass
 
 
 @pytest.mark.parametrize("leak", OF_ANY)
@@ -66,8 +67,8 @@ def test_no_file_may_tell_how_to_make_the_answers_again(leak, name, splits, tmp_
     shutil.copytree(splits["shards"], folder)
     with h5py.File(folder / name, "r+") as file:
         LEAKS[leak](file)
-    with refused(SpecError, found=leak):
-        published_split(folder)
+    with refused(SpecError, found=leak), open_split(folder):
+        pass
 
 
 def test_a_file_of_answers_is_none_of_questions(splits):
@@ -76,5 +77,5 @@ def test_a_file_of_answers_is_none_of_questions(splits):
         told = {column.name for column in truth_columns(SplitSpec.from_json(file.attrs["spec"]))}
         assert told == set(file["truth"])
         assert json.loads(file.attrs["spec"])["seed"] == 5
-    with pytest.raises(SpecError):
-        check_withheld(path, is_test=True)
+    with pytest.raises(SpecError), OpenFile(path, FORMAT.kind) as opened:
+        check_withheld(opened, is_test=True)

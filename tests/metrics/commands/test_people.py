@@ -19,7 +19,6 @@ from quizzes import Site, made_answers, served
 import cli
 from iqtt.quiz.answers import read_answers
 from iqtt.quiz.study import Study
-from metrics.score_file import read_scores
 
 # Whoever starts the tests in the background has Ctrl-C ignored.
 HEAR = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
@@ -134,9 +133,9 @@ def test_a_participant_in_a_browser(visit, quiz_split, tmp_path, iqtt):
     assert [one.answer for one in found] == given
     assert [one.times_shown for one in found] == [1] * 5 + [2, 1]
     assert all(0 <= one.response_seconds <= one.server_seconds + 1 for one in found)
-    result = iqtt("quiz-report", db, "--json", "r.json", "--html", "r.html")
+    result = iqtt("quiz-report", db, "--json", "r.json")
     assert result.exit_code == 0, result.output
-    assert json.loads((tmp_path / "r.json").read_text())["accuracy"]["value"] == 3 / 5
+    assert json.loads((tmp_path / "r.json").read_text())["groups"][0]["accuracy"] == 3 / 5
 
 
 def test_without_scripts_the_quiz_works(visit, quiz_split, tmp_path):
@@ -188,26 +187,19 @@ def test_public_means_all_addresses_of_this_machine_and_signals_end_it_well(quiz
     assert not (tmp_path / "answers.db-wal").exists()
 
 
-def test_export_and_submission(quiz_split, tmp_path, iqtt, refused):
+def test_export_while_the_server_runs(quiz_split, tmp_path, iqtt, refused):
     with running(quiz_split, tmp_path / "a.db", 24) as site:
         cookie = site.begin()
         assert {site.answer(cookie) for _ in range(24)} == {303}
-        # While the server runs.
         assert iqtt("quiz", "--db", "a.db", "--export", "a.csv").exit_code == 0
     assert len((tmp_path / "a.csv").read_text().splitlines()) == 25
-    split, truth = quiz_split / "iqtt-test.h5", quiz_split / "iqtt-test-answers.h5"
-    result = iqtt("quiz", split, "--db", "a.db", "--submission", "people.h5")
-    assert "answers to 24 of 24 questions\n" in result.stdout
-    bench = ["score", "people.h5", "--truth", str(truth), "--json", "people.json"]
-    assert CliRunner().invoke(cli.bench, bench).exit_code == 0
-    accuracy = read_scores(tmp_path / "people.json").metrics["iqtt_accuracy"]
-    assert accuracy.value == sum(one.correct for one in read_answers("a.db").answers) / 24
+    split = quiz_split / "iqtt-test.h5"
+    assert iqtt("quiz-report", "a.db", "--questions", split).exit_code == 0
     refused("quiz", "--db", "a.db", "--export", "a.csv", words=("a.csv", "overwrite"))
-    refused("quiz", "--db", "a.db", "--submission", "b.h5", words=("SPLIT",))
     other = made_answers(tmp_path / "other.db", 2)
-    for option in ("--export", "--submission"):
-        refused("quiz", split, "--db", other, option, "c.h5", words=("aaaaaaaaaaaa", str(split)))
-    assert not (tmp_path / "c.h5").exists()
+    refused("quiz", split, "--db", other, "--export", "c.csv", words=("aaaaaaaaaaaa", str(split)))
+    refused("quiz-report", other, "--questions", split, words=("aaaaaaaaaaaa", str(split)))
+    assert not (tmp_path / "c.csv").exists()
 
 
 def test_what_is_refused_before_anything_is_served(quiz_split, tmp_path, refused):
@@ -235,8 +227,7 @@ def test_what_is_refused_before_anything_is_served(quiz_split, tmp_path, refused
 
 def test_the_report_refuses_to_write_over_its_input(tmp_path, refused):
     path = made_answers(tmp_path / "answers.db", 2)
-    refused("quiz-report", path, "--html", path, "--overwrite", words=("input",))
-    refused("quiz-report", path, "--json", "x.html", "--html", "x.html", words=("one path",))
+    refused("quiz-report", path, "--json", path, "--overwrite", words=("input",))
 
 
 def test_without_the_extra(quiz_split, refused, monkeypatch):

@@ -11,8 +11,8 @@ import pytest
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import SceneGenError, SpecError
-from scenegen.files.manifest import manifest_path, read_manifest
 from scenegen.files.places import as_place, is_remote
+from scenegen.files.sets.manifest import manifest_path, read_manifest
 
 pytest.importorskip("upath")
 SPLIT = SplitSpec(

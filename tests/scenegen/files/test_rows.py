@@ -18,7 +18,7 @@ from iqtt.questions.specs import SplitSpec
 from scenegen import RoomsDataset, RoomsFile
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.content import dataset_digest, joint_digest
-from scenegen.files.shards import SHARDS, OpenFile
+from scenegen.files.sets.shards import SHARDS, OpenFile
 
 TASKS = ("rooms", "questions")
 IMAGES = {"rooms": "image", "questions": "questions"}

@@ -177,7 +177,7 @@ def test_the_parts_of_a_scene_are_the_room_and_every_object_in_its_place():
 
 @pytest.mark.parametrize("name", SHAPE_NAMES)
 def test_hulls_that_are_kept_are_those_of_qhull(name, monkeypatch):
-    monkeypatch.setattr(basic_hulls, "_kept", dict)
+    monkeypatch.setattr(basic_hulls, "all_kept", dict)
     expected, shape = unit_shape.__wrapped__(name), unit_shape(name)
     for field in ("hull_points", "hull_discs", "resting_directions"):
         np.testing.assert_allclose(getattr(shape, field), getattr(expected, field), atol=1e-9)

@@ -11,14 +11,19 @@ import pytest
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.layout import FIELDS
-from scenegen.sharing.export import ABOUT, FORMATS
-from scenegen.sharing.rooms import export_rows
-from tests.support.loaders import check_srgb
+from scenegen.sharing.export import ABOUT, FORMATS, write_export
+from scenegen.sharing.rooms import ROOMS
+from tests.support.loaders import VALUES, check_srgb
 
 
 @pytest.fixture(params=["8 bits", "floats"])
 def path(request, holey_set, float_path):
     return holey_set if request.param == "8 bits" else float_path
+
+
+def export_rows(path, form, folder, rows=None, **how):
+    with open_rooms(path) as rooms:
+        return write_export(rooms, ROOMS, form, folder, rows, **how)
 
 
 def as_stored(value, stored):
@@ -44,26 +49,20 @@ def check_rows(found, path, rows, column):
             assert np.isnan(rooms.read("depth", 0)).any(), "or NaN is not tested"
 
 
-@pytest.mark.parametrize("how", ["files", "folder"])
-def test_parquet_in_datasets(how, path, load, tmp_path):
-    made = export_rows(path, "parquet", tmp_path / "out", encoding="linear", rows_per_file=4)
-    if how == "files":
-        loaded = load("parquet", data_files=[str(p) for p in made if p.name != ABOUT])
-    else:
-        loaded = load(str(tmp_path / "out"))
-    rows = range(len(loaded))
-    check_rows(loaded, path, rows, lambda row, name: row[name])
-    assert loaded["row"] == list(rows)
+@pytest.mark.parametrize("form", FORMATS)
+def test_every_value_in_datasets(form, path, load, tmp_path):
+    """From a list of files, and from their folder."""
+    made = export_rows(path, form, tmp_path / "out", encoding="linear", rows_per_file=4)
+    loaded = load(form, data_files=[str(p) for p in made if p.name != ABOUT])
+    check_rows(loaded, path, range(len(loaded)), VALUES[form])
+    assert load(str(tmp_path / "out")).num_rows == len(loaded)
+    if form == "webdataset":
+        assert loaded["__key__"] == [f"{row:09d}" for row in range(len(loaded))]
+        return
+    assert loaded["row"] == list(range(len(loaded)))
     assert loaded.features["depth"].shape == loaded.with_format("numpy")[0]["depth"].shape
     picture = type(loaded.features["image"]).__name__
     assert picture == ("Image" if path.name == "set.h5" else "Array3D")
-
-
-def test_webdataset_in_datasets(path, load, tmp_path):
-    made = export_rows(path, "webdataset", tmp_path / "out", encoding="linear", rows_per_file=4)
-    loaded = load("webdataset", data_files=[str(p) for p in made if p.name != ABOUT])
-    check_rows(loaded, path, range(len(loaded)), of_archive)
-    assert loaded["__key__"] == [f"{row:09d}" for row in range(len(loaded))]
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -72,10 +71,9 @@ def test_pictures_are_srgb_and_decode_to_the_stored_radiance(form, holey_set, lo
     about = json.loads((tmp_path / "out" / ABOUT).read_text())["columns"]["image"]
     assert (about["encoding"], about["unit"], about["scale"]) == ("srgb", "sRGB", 1 / 255)
     loaded = load(form, data_files=[str(made[0])])
-    value = of_archive if form == "webdataset" else dict.__getitem__
     with open_rooms(holey_set) as rooms:
         for room, row in zip(rooms, loaded, strict=True):
-            codes = np.asarray(value(row, "image")).astype(float)
+            codes = np.asarray(VALUES[form](row, "image")).astype(float)
             check_srgb(codes, room.radiance)
             assert np.abs(codes - room.image).max() > 40, "a curve that does nothing"
 
@@ -88,13 +86,6 @@ def test_floating_point_images_stay_radiance(float_path, tmp_path):
         image = np.load(io.BytesIO(archive.extractfile("000000001.image.npy").read()))
     with open_rooms(float_path) as rooms:
         np.testing.assert_array_equal(image, rooms[1].image)
-
-
-def of_archive(row, name):
-    for ending in ("png", "npy"):
-        if f"{name}.{ending}" in row:
-            return row[f"{name}.{ending}"]
-    return row["json"][name]
 
 
 def test_archives_tell_nothing_of_their_maker(path, tmp_path):
@@ -142,15 +133,21 @@ def test_what_files_do_not_tell_is_beside_them(holey_set, tmp_path):
     assert about["columns"]["depth"]["row_shape"] == [32, 32]
 
 
-@pytest.mark.parametrize("form", FORMATS)
-def test_a_damaged_row_leaves_nothing(form, damaged, tmp_path):
-    def shorten(file):
-        file["depth"].id.write_direct_chunk((5, 0, 0), b"no deflate stream", 0)
+def shortened(file):
+    file["depth"].id.write_direct_chunk((5, 0, 0), b"no deflate stream", 0)
 
-    path = damaged(shorten)
+
+def no_text(file):
+    file["object/model"][5, 0] = b"\xff"
+
+
+@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize(("name", "damage"), [("depth", shortened), ("object/model", no_text)])
+def test_a_damaged_row_leaves_nothing(name, damage, form, damaged, tmp_path):
+    path = damaged(damage)
     with pytest.raises(FileFormatError) as error:
         export_rows(path, form, tmp_path / "out", rows_per_file=2)
-    assert "depth, row 5" in error.value.where
+    assert f"{name}, row 5" in error.value.where
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
     export_rows(path, form, tmp_path / "out", rows=[0, 7])
 
@@ -175,7 +172,7 @@ def test_refused(how, where, rooms_path, tmp_path):
 def test_no_more_rows_are_in_memory_than_fit(rooms_path, tmp_path, monkeypatch):
     with open_rooms(rooms_path) as rooms:
         size = sum(np.asarray(rooms.read(name, 0)).nbytes for name in rooms.fields)
-    monkeypatch.setattr("scenegen.sharing.stored.BLOCK_BYTES", 3 * size)
+    monkeypatch.setattr("scenegen.sharing.task.BLOCK_BYTES", 3 * size)
     steps = []
     made = export_rows(rooms_path, "parquet", tmp_path / "out", progress=steps.append)
     import pyarrow.parquet as pq
@@ -184,15 +181,3 @@ def test_no_more_rows_are_in_memory_than_fit(rooms_path, tmp_path, monkeypatch):
     groups = [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)]
     assert groups == steps == [3, 3, 2]
     assert re.fullmatch(r"rooms-00000-of-00001\.parquet", made[0].name)
-
-
-@pytest.mark.parametrize("form", FORMATS)
-def test_texts_that_are_none(form, damaged, tmp_path):
-    def spoil(file):
-        models = file["object/model"][:]
-        models[4, 0] = b"\xff"
-        file["object/model"][:] = models
-
-    with pytest.raises(FileFormatError) as error:
-        export_rows(damaged(spoil), form, tmp_path / "out")
-    assert "object/model, row 4" in error.value.where

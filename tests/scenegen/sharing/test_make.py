@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from contextlib import ExitStack
 
 import h5py
 import numpy as np
@@ -12,7 +13,10 @@ from markdown_it import MarkdownIt
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.content import row_digest
-from scenegen.sharing.card import NAMES, Publication
+from scenegen.sharing.card import NAMES
+from scenegen.sharing.export import write_export
+from scenegen.sharing.index import index_columns
+from scenegen.sharing.publication import Publication
 from scenegen.sharing.rooms import ROOMS, make_rooms_card
 from tests.support.loaders import faultless_croissant, validate
 
@@ -20,11 +24,17 @@ TOLD = Publication("Two rooms", ("A. Person", "B. Person"), "2026-01-31", "CC-BY
 WICKED = "</code><script>alert(1)</script> `x` | [a](javascript:1)\n# Title\n\n---\n![i](http://x)"
 
 
+def make_card(paths, folder, publication=TOLD):
+    with ExitStack() as stack:
+        rooms = [stack.enter_context(open_rooms(path)) for path in paths]
+        make_rooms_card(rooms, folder, publication)
+
+
 @pytest.fixture(scope="module")
 def made(holey_set, float_path, tmp_path_factory):
     """Return the folder of a card of a set and of a file."""
     folder = tmp_path_factory.mktemp("card") / "card"
-    make_rooms_card([holey_set, float_path], folder, TOLD)
+    make_card([holey_set, float_path], folder)
     return folder
 
 
@@ -78,7 +88,7 @@ def test_records_are_the_rows(croissant, holey_set, float_path):
         {key.removeprefix("rows/"): value for key, value in record.items()}
         for record in croissant.records("rows")
     ]
-    assert [set(record) for record in records] == [{c.name for c in ROOMS.all_columns}] * 19
+    assert [set(record) for record in records] == [{c.name for c in index_columns(ROOMS)}] * 19
     for path, some in ((holey_set, records[:14]), (float_path, records[14:])):
         with open_rooms(path) as rooms:
             assert len(some) == len(rooms)
@@ -100,14 +110,13 @@ def test_records_are_the_rows(croissant, holey_set, float_path):
 
 def test_index_and_images_in_datasets(made, holey_set, load, tmp_path):
     """The index names the rows of an export: joined, they give the pixels of the file."""
-    from scenegen.sharing.rooms import export_rows
-
     index = load(str(made), "index").filter(lambda line: line["file"] == "set.h5")
     assert len(index) == 14
     for form, image in (("parquet", "image"), ("webdataset", "image.png")):
-        export_rows(holey_set, form, tmp_path / form, encoding="linear", rows_per_file=5)
-        images = load(str(tmp_path / form))
         with open_rooms(holey_set) as rooms:
+            how = {"encoding": "linear", "rows_per_file": 5}
+            write_export(rooms, ROOMS, form, tmp_path / form, **how)
+            images = load(str(tmp_path / form))
             for line, row in zip(index, images, strict=True):
                 pixels = np.asarray(row[image])
                 assert row_digest(pixels).hex() == line["image_sha256"]
@@ -115,29 +124,33 @@ def test_index_and_images_in_datasets(made, holey_set, load, tmp_path):
 
 
 def test_the_same_bytes_again(made, holey_set, float_path, tmp_path):
-    make_rooms_card([holey_set, float_path], tmp_path / "card", TOLD)
+    make_card([holey_set, float_path], tmp_path / "card")
     for name in NAMES:
         assert (tmp_path / "card" / name).read_bytes() == (made / name).read_bytes()
 
 
 def test_texts_from_files_and_people_stay_texts(damaged, tmp_path):
     line = WICKED.replace("\n", " ")
-    path = damaged(lambda file: file.attrs.update(creation_command=WICKED, writer=line))
+    changed = damaged(lambda file: file.attrs.update(creation_command=WICKED, writer=line))
+    path = changed.rename(changed.with_name("a b.h5"))
     wicked = Publication(WICKED, (WICKED,), "2026-01-31", "LicenseRef-mine")
-    make_rooms_card([path], tmp_path / "card", wicked)
+    make_card([path], tmp_path / "card", wicked)
     _, head, page = (tmp_path / "card" / "README.md").read_text().split("---\n", 2)
     assert yaml.safe_load(head)["license_name"] == "LicenseRef-mine"
     html = MarkdownIt("commonmark", {"html": True}).enable("table").render(page)
     assert not [tag for tag in ("<script", "<img", "href=\"javascript", "<h1>Title", "<hr")
                 if tag in html]  # fmt: skip
     assert html.count("<h1>") == 1
-    json.loads((tmp_path / "card" / "croissant.json").read_text())
+    assert f"    {WICKED}".replace("\n", "\\n") in page.splitlines(), "a block, to be copied"
+    told = json.loads((tmp_path / "card" / "croissant.json").read_text())
+    assert told["distribution"][0]["contentUrl"] == "a%20b.h5"
+    assert yaml.safe_load(head)["size_categories"] == ["n<1K"]
 
 
 def test_scenes_that_are_in_two_files_are_told(rooms_path, made, tmp_path):
     assert "no scene is in two" in (made / "README.md").read_text()
     (tmp_path / "other.h5").write_bytes(rooms_path.read_bytes())
-    make_rooms_card([rooms_path, tmp_path / "other.h5"], tmp_path / "card", TOLD)
+    make_card([rooms_path, tmp_path / "other.h5"], tmp_path / "card")
     page = (tmp_path / "card" / "README.md").read_text()
     assert "**8 scenes are in more than one file**" in page
 
@@ -148,7 +161,7 @@ def test_no_card_of_a_changed_file(damaged, tmp_path):
 
     path = damaged(change)
     with pytest.raises(FileFormatError) as error:
-        make_rooms_card([path], tmp_path / "card", TOLD)
+        make_card([path], tmp_path / "card")
     assert "depth" in error.value.found
     assert [p.name for p in tmp_path.iterdir()] == [path.name]
 
@@ -156,5 +169,5 @@ def test_no_card_of_a_changed_file(damaged, tmp_path):
 def test_one_name_twice(rooms_path, tmp_path):
     (tmp_path / "rooms.h5").write_bytes(rooms_path.read_bytes())
     with pytest.raises(SpecError) as error:
-        make_rooms_card([rooms_path, tmp_path / "rooms.h5"], tmp_path / "card", TOLD)
+        make_card([rooms_path, tmp_path / "rooms.h5"], tmp_path / "card")
     assert error.value.where == "files"

@@ -57,7 +57,7 @@ def test_only_the_colour_is_traced(settings, scenes_of):
 def test_models_kept_from_other_batches_are_let_go(scenes_of):
     """Dr.Jit traces paths through every mesh that is alive: with hundreds, for minutes."""
     spec = replace(PATH, source="families", shapes=FAMILY_NAMES, spp=1)
-    kept = importlib.import_module("scenegen.rendering.model_scene").MODELS.kept
+    kept = importlib.import_module("scenegen.rendering.meshes.model_scene").MODELS.kept
     scenes = scenes_of(spec, 4)
     render(pack(replace(spec, shading="paper", shadows=True), scenes))
     assert len(kept) > 3

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from scenegen.objects.cast_meshes import overlapping
 from scenegen.objects.solids import Mesh, UnitShape
-from scenegen.rendering.unit_scene import triangle_mesh
+from scenegen.rendering.meshes.unit_scene import triangle_mesh
 
 Array = NDArray[Any]
 ShapeOf = Callable[[str], UnitShape]

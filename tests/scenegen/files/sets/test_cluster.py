@@ -19,9 +19,9 @@ from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.scoring.runs import scorer_versions
 from scenegen.common.errors import SceneGenError
-from scenegen.files.cluster import LOCAL, connected
-from scenegen.files.making import check_shared
-from scenegen.files.manifest import FORMAT, Manifest, write_manifest
+from scenegen.files.sets.cluster import LOCAL, connected
+from scenegen.files.sets.making import check_shared
+from scenegen.files.sets.manifest import FORMAT, Manifest, write_manifest
 from scenegen.rendering.sameness import renderer_identity
 
 pytest.importorskip("distributed")
@@ -136,7 +136,7 @@ def test_a_scheduler_that_goes_away_is_one_line(tmp_path):
 @pytest.mark.parametrize("address", ["tcp://127.0.0.1:9", "tls://127.0.0.1:9", "ucx://a:1", "no"])
 def test_no_scheduler_is_one_line(monkeypatch, address):
     """Of tls:// Dask wants certificates, and of ucx:// a package."""
-    monkeypatch.setattr("scenegen.files.cluster.PATIENCE", 1)
+    monkeypatch.setattr("scenegen.files.sets.cluster.PATIENCE", 1)
     words = ["render", "--n", "1", "--scheduler", address, "--out", "rooms.h5"]
     result = CliRunner().invoke(cli.scenegen, words)
     assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
@@ -145,7 +145,7 @@ def test_no_scheduler_is_one_line(monkeypatch, address):
 
 PLAIN = """
 print("once")
-from scenegen.files.cluster import LOCAL, connected
+from scenegen.files.sets.cluster import LOCAL, connected
 with connected(LOCAL, 2, dict) as cluster:
     print(list(cluster.in_order(abs, [-1, 2, -3])))
 """
@@ -153,7 +153,7 @@ with connected(LOCAL, 2, dict) as cluster:
 
 def test_a_plain_script_needs_no_guard(tmp_path):
     (tmp_path / "plain.py").write_text(PLAIN)
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[4])}
     done = subprocess.run(
         [sys.executable, "plain.py"], cwd=tmp_path, env=environment, timeout=120,
         capture_output=True, text=True, check=False,

@@ -16,8 +16,8 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check, from_json
 from scenegen.files.new_file import written_beside
 from scenegen.files.places import as_place
-from scenegen.files.shards import set_name
-from scenegen.files.workers import in_threads, processors
+from scenegen.files.sets.shards import set_name
+from scenegen.files.sets.workers import in_threads, processors
 
 ENDING = ".manifest.json"
 FORMAT = "pix2shape-bench manifest 1"

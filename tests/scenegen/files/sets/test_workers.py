@@ -14,9 +14,10 @@ from unittest.mock import Mock
 import pytest
 
 from scenegen.common.errors import SceneGenError
-from scenegen.files import pool, workers
+from scenegen.files import pool
 from scenegen.files.pool import LostWorkerError
-from scenegen.files.workers import in_order, in_processes, in_threads
+from scenegen.files.sets import workers
+from scenegen.files.sets.workers import in_order, in_processes, in_threads
 
 BUSY = """
 import sys, time
@@ -190,7 +191,7 @@ import sys
 print("once")
 import pathlib
 pathlib.Path("ran").open("a").write("x")
-from scenegen.files.workers import in_processes
+from scenegen.files.sets.workers import in_processes
 print(list(in_processes(abs, [-1, 2, -3], 2)))
 """
 
@@ -207,7 +208,7 @@ def test_a_script_without_a_guard_runs_once(how, tmp_path):
     (tmp_path / "outer.py").write_text("import runpy\nrunpy.run_path('plain.py')\n")
     (tmp_path / "scenegen").mkdir()  # of the user's own, without what is needed
     words = {"stdin": ["-"], "module": ["-m", "plain"], "inside": ["outer.py"]}
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[4])}
     done = subprocess.run(
         [sys.executable, *words.get(how, ["plain.py"])], input=text, cwd=tmp_path, timeout=120,
         capture_output=True, text=True, check=False, env=environment,

@@ -12,18 +12,19 @@ import numpy as np
 
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import CONTENT_DIGEST, SHA256, dataset_digest, seal
-from scenegen.files.manifest import FileRecord, file_sha256
 from scenegen.files.new_file import written_beside
-from scenegen.files.plan import Bundle, Part, Piece, Sheet
 from scenegen.files.row_file import new_file, new_hdf5
 from scenegen.files.schema import Column, name_axes
-from scenegen.files.shards import (
+from scenegen.files.sets.manifest import FileRecord, file_sha256
+from scenegen.files.sets.plan import Bundle, Part, Piece, Sheet
+from scenegen.files.sets.shards import (
     ROW_DIGESTS,
     SHARDS,
     OpenFile,
     Shard,
     opened,
 )
+from scenegen.files.sets.workers import in_threads
 from scenegen.files.table import (
     PackedRows,
     Table,
@@ -31,7 +32,6 @@ from scenegen.files.table import (
     pack_rows,
     packing_threads,
 )
-from scenegen.files.workers import in_threads
 
 Packed = Sequence[PackedRows]  # as many rows for each table of a part
 Progress = Callable[[int], Any]

@@ -10,9 +10,9 @@ from typing import Any
 
 from scenegen.common.records import check
 from scenegen.files.content import fingerprint, joint_digest
-from scenegen.files.manifest import FORMAT, Manifest
 from scenegen.files.schema import Column
-from scenegen.files.shards import MOST_SHARDS, shard_name
+from scenegen.files.sets.manifest import FORMAT, Manifest
+from scenegen.files.sets.shards import MOST_SHARDS, shard_name
 
 
 @dataclass(frozen=True)

@@ -20,13 +20,13 @@ MODELS = ("mug/0001", "chair/0002", "bottle/0003", "bag/0004", "table/0005")
 @pytest.fixture(scope="module")
 def unit(variant):
     """Return the module of unit scenes, whose import needs the variant to be chosen."""
-    return importlib.import_module("scenegen.rendering.unit_scene")
+    return importlib.import_module("scenegen.rendering.meshes.unit_scene")
 
 
 @pytest.fixture(scope="module")
 def models(variant):
     """Return the module of models' scenes, whose import needs it, too."""
-    return importlib.import_module("scenegen.rendering.model_scene")
+    return importlib.import_module("scenegen.rendering.meshes.model_scene")
 
 
 def slips(unit, i, shape, seed=0):

@@ -15,9 +15,9 @@ import pytest
 from made_sets import SEED, contents, everything, questions, rooms, same_values
 
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
-from scenegen.files.manifest import read_manifest, write_manifest
-from scenegen.files.shards import ROW_DIGESTS
-from scenegen.files.workspace import run_lock
+from scenegen.files.sets.manifest import read_manifest, write_manifest
+from scenegen.files.sets.shards import ROW_DIGESTS
+from scenegen.files.sets.workspace import run_lock
 
 TASKS = {
     "rooms": rooms(),
@@ -340,7 +340,7 @@ def test_what_is_held_to_the_end_does_not_crash_hdf5(copied, shards):
     files = sorted(folder.glob("*-of-*.h5"))
     if shards == 1:
         files[-1].unlink()
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[3])}
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[4])}
     command = [sys.executable, "-c", HELD, str(folder / task.files[0])]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")
@@ -350,7 +350,7 @@ def test_what_is_held_to_the_end_does_not_crash_hdf5(copied, shards):
 RENDER = "render --n 60 --size 32 --min-visible-pixels 3 --shard-size 5 --seed 3 --out rooms.h5"
 SLOWLY = """
 import time, cli
-from scenegen.files import making
+from scenegen.files.sets import making
 write = making.write_piece
 def slowly(*arguments):
     time.sleep(0.2)  # so that signals come before the end

@@ -15,21 +15,21 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
-from scenegen.files.cluster import Cluster, threads_of_worker
-from scenegen.files.manifest import (
+from scenegen.files.new_file import check_writable
+from scenegen.files.places import check_store, is_remote, listing
+from scenegen.files.sets.cluster import Cluster, threads_of_worker
+from scenegen.files.sets.manifest import (
     FileRecord,
     Manifest,
     read_manifest,
     write_manifest,
     wrong_files,
 )
-from scenegen.files.new_file import check_writable
-from scenegen.files.places import check_store, is_remote, listing
-from scenegen.files.plan import Block, Piece, Plan
-from scenegen.files.sets import Packed, Progress, write_piece, write_views
-from scenegen.files.shards import set_name
-from scenegen.files.workers import in_order, processors
-from scenegen.files.workspace import remove_leftovers, run_lock
+from scenegen.files.sets.plan import Block, Piece, Plan
+from scenegen.files.sets.sets import Packed, Progress, write_piece, write_views
+from scenegen.files.sets.shards import set_name
+from scenegen.files.sets.workers import in_order, processors
+from scenegen.files.sets.workspace import remove_leftovers, run_lock
 
 SHARE = 0.05  # of the time that writing manifests may take; that of 10,000 shards has 3 MB
 Note = Callable[[Any], Any]

@@ -13,9 +13,9 @@ from signals_at_lines import interrupted_at_each_line
 
 from scenegen.common import signals
 from scenegen.files import new_file
-from scenegen.files import workspace as module
 from scenegen.files.new_file import write_text, written_beside
-from scenegen.files.workspace import NAME, remove_leftovers
+from scenegen.files.sets import workspace as module
+from scenegen.files.sets.workspace import NAME, remove_leftovers
 
 LINUX = pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such locks")
 KILLED = """

@@ -9,13 +9,13 @@ import sys
 import pytest
 
 from scenegen.common.errors import SceneGenError
-from scenegen.files import workspace as module
-from scenegen.files.workspace import run_lock
+from scenegen.files.sets import workspace as module
+from scenegen.files.sets.workspace import run_lock
 
 HOLD = """
 import os, sys, time
 from pathlib import Path
-from scenegen.files.workspace import run_lock
+from scenegen.files.sets.workspace import run_lock
 with run_lock(Path(sys.argv[1]), Path("set")):
     if os.fork() == 0:  # a reader of data, say, that outlives the run
         print("held", flush=True)
