@@ -185,11 +185,11 @@ def view(
     needs("bench view", ("viser",), "view")
     from metrics.submissions.reader import open_predictions
     from metrics.submissions.truths import find_truth
-    from metrics.viewing.order import MOST_SCORED, require_rooms, shown_scores
-    from metrics.viewing.page import PredictionPage
+    from metrics.viewing import MOST_SCORED, predicted_rooms, require_rooms, shown_scores
     from scenegen.common.web_hosts import hosts_of
     from scenegen.rooms.reader import RoomsFile
     from scenegen.viewing.geometry import shapes_of
+    from scenegen.viewing.page import RoomsPage
     from scenegen.viewing.server import serve, started
 
     hosts = hosts_of(host, public, names)
@@ -203,8 +203,9 @@ def view(
             count = len(items) if items else min(len(predictions), MOST_SCORED)
             with progress_bar(count, "image") as bar:
                 scores = shown_scores(predictions, rooms, items, scores_path, bar.update)
+            shown = predicted_rooms(predictions, rooms, scores)
             with started(f"{predictions.method}: {submission}", hosts, port) as server:
-                PredictionPage(server, rooms, predictions, scores, shape_of)
+                RoomsPage(server, rooms, shape_of, *shown)
                 serve(server, hosts, print_line, open_browser)
 
 

@@ -12,8 +12,8 @@ from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import Predictions
 from metrics.views.by_angle import view_curves
 from metrics.views.examples import examples_of
-from metrics.views.headline import answer, headline_section, kinds_sections
-from metrics.views.page import Link, Section, html_page
+from metrics.views.headline import headline_lead, headline_section, kinds_sections
+from metrics.views.page import Section, html_page
 from metrics.views.plots import Chart, histogram
 from metrics.views.score_tables import (
     all_scores,
@@ -43,7 +43,6 @@ def html_report(
     truth_path: Path,
     submissions: Sequence[Path],
     beside: Sequence[ScoreFile] = (),
-    home: str = "",
 ) -> str:
     """Return the page as text; pictures come from the truth and the first run.
 
@@ -51,7 +50,6 @@ def html_report(
         truth_path: of the truth that was scored against.
         submissions: the files that were scored; without any there are no pictures.
         beside: scores of other methods on the same truth, to be shown beside these.
-        home: address of the page that this one belongs to, such as "index.html".
 
     Raises BesideError where a file of `beside` is of another truth, OSError and FileFormatError
     where a picture's row cannot be read.
@@ -77,9 +75,8 @@ def html_report(
     return html_page(
         scores.method,
         [*sections, *_all_numbers(scores)],
-        leads=[answer(scores)],
+        leads=[headline_lead(scores)],
         warnings=scores.warnings,
-        links=[Link(home, "Leaderboard")] if home else [],
     )
 
 

@@ -245,7 +245,7 @@ def title_of(scores: ScoreFile) -> str:
 def notes_of(scores: ScoreFile) -> Iterator[str]:
     """Yield what has to be known to read the tables, and where the scores come from."""
     meta = scores.meta
-    yield from is_floor_of(scores)
+    yield from floor_sentences(scores)
     for warning in (*scores.warnings, *few_clusters(scores)):
         yield f"warning: {warning}"
     if scores.skills:
@@ -284,7 +284,7 @@ def unread_notes(files: Sequence[ScoreFile]) -> list[str]:
     ]
 
 
-def is_floor_of(scores: ScoreFile) -> list[str]:
+def floor_sentences(scores: ScoreFile) -> list[str]:
     """Return a sentence where a method scores what its floor does; else none."""
     headline = [name for name in scores.headline if name in scores.skills]
     names = [name for name in headline if scores.skills[name].is_floor]
@@ -296,10 +296,10 @@ def few_clusters(scores: ScoreFile) -> list[str]:
     """Return a warning where bootstrapped intervals rest on too few scenes or shapes; else none."""
     labels = scores.clusters if scores.task == "rooms" else scores.items.get("shape", scores.ids)
     units = "scenes" if scores.task == "rooms" else "shapes"
-    return too_few(len(np.unique(labels)), units) if scores.meta.resamples else []
+    return too_few_warning(len(np.unique(labels)), units) if scores.meta.resamples else []
 
 
-def too_few(count: int, units: str) -> list[str]:
+def too_few_warning(count: int, units: str) -> list[str]:
     """Return a warning where so many scenes or shapes do not suffice for intervals; else none."""
     if not 1 < count < FEW_CLUSTERS:
         return []

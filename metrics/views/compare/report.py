@@ -36,7 +36,7 @@ from metrics.views.score_tables import (
     floor_text,
     labels_of,
     score_cell,
-    too_few,
+    too_few_warning,
     unread_notes,
     what_the_floor_is,
 )
@@ -187,7 +187,10 @@ def _legend(comparison: Comparison) -> list[str]:
         f"better/worse/same: {items}. p: {test}, two-sided; Holm: corrected for {comparisons}.",
         f"least shown: what this test set would show in {POWER:.0%} of cases after the correction,"
         " as the differences spread here; none: no difference, or none can be told.",
-        *(f"warning: {text}" for text in (too_few(comparison.clusters, "scenes") if rooms else ())),
+        *(
+            f"warning: {text}"
+            for text in (too_few_warning(comparison.clusters, "scenes") if rooms else ())
+        ),
     ]
 
 

@@ -44,8 +44,6 @@ def test_a_baseline_goes_all_the_way(truths, folder):
     pages = ("--html", "c.html", "--predictions", "oracle.h5", "--truth", truths.rooms)
     assert bench("compare", "empty-room.json", "oracle.json", *pages).exit_code == 0
     assert (folder / "c.html").read_text().count("data:image/webp") == 6 * 6
-    assert bench("leaderboard", "oracle.json", "--html", "site").exit_code == 0
-    assert (folder / "site" / "index.html").is_file()
     assert read_scores(folder / "oracle.json").metrics["chamfer"].value == 0
     compared = bench("compare", "empty-room.json", "oracle.json", "--json", "c.json")
     assert compared.exit_code == 0, compared.output
@@ -83,15 +81,6 @@ def test_a_page_that_cannot_be_made_loses_no_score(truths, folder):
     assert not (folder / "b2.html").exists()
 
 
-def test_an_output_that_is_there_is_refused_before_a_site_is_written(truths, folder):
-    bench("baseline", "oracle", "--data", truths.rooms, "--out", "oracle.h5")
-    bench("score", "oracle.h5", "--json", "oracle.json")
-    (folder / "board.md").write_text("mine")
-    given = ("--html", "site", "--out", "board.md")
-    assert bench("leaderboard", "oracle.json", *given).exit_code == 2
-    assert not (folder / "site").exists()
-
-
 def test_pictures_of_another_split_are_left_out(truths, folder):
     bench("baseline", "chance", "--data", truths.iqtt, "--out", "chance.h5")
     shutil.copy(truths.iqtt.with_name("iqtt-test-answers.h5"), folder / "q-test-answers.h5")
@@ -111,7 +100,7 @@ def test_pictures_of_another_split_are_left_out(truths, folder):
         ("compare a.json", ("a.json",)),
         ("compare broken.json broken.json", ("broken.json",)),
         ("leaderboard broken.json", ("broken.json",)),
-        ("leaderboard --metric beauty", ("beauty",)),
+        ("leaderboard", ("SCORES.json",)),
         ("baseline best --data x.h5", ("best",)),
         ("baseline oracle", ("--data",)),
         ("baseline oracle --data nothing.h5", ("nothing.h5",)),
@@ -158,7 +147,7 @@ def test_scores_never_replace_the_truth_that_a_submission_names(
 
 
 def test_what_cannot_be_viewed(truths, folder, check_refusal):
-    """What can is in `tests/metrics/viewing`; here no page is ever served."""
+    """What can is in `tests/metrics/test_viewing.py`; here no page is ever served."""
     pytest.importorskip("viser")
     from submissions import good_answers, good_rooms
 

@@ -11,8 +11,7 @@ from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.scoring.evaluate import score
 from metrics.views.compare.compare import compare
 from metrics.views.compare.report import html_report as html_comparison
-from metrics.views.leaderboard.ranking import leaderboard
-from metrics.views.leaderboard.site import to_html, write_site
+from metrics.views.leaderboard.ranking import leaderboard, to_html
 from metrics.views.page import Lead, Section, html_page
 from metrics.views.report import html_report
 from scenegen.rooms.reader import RoomsFile
@@ -57,17 +56,15 @@ def pages(make_rooms, truths, tmp_path_factory):
     for name, text in made.items():
         assert len(text) < LARGEST
         (folder / f"{name}.html").write_text(text)
-    write_site([*files, questions], folder / "site")
-    paths = {name: folder / f"{name}.html" for name in made}
-    return paths | {f"site-{n}": folder / "site" / f"{n}.html" for n in ("index", "gallery")}
+    return {name: folder / f"{name}.html" for name in made}
 
 
 @pytest.mark.parametrize(
     ("width", "scheme", "names"),
     [
-        (360, "dark", ("rooms", "questions", "compared", "site-index")),
+        (360, "dark", ("rooms", "questions", "compared", "ranked")),
         (1280, "light", ("rooms",)),
-        pytest.param(360, "dark", ("little", "ranked", "site-gallery"), marks=pytest.mark.slow),
+        pytest.param(360, "dark", ("little",), marks=pytest.mark.slow),
     ],
 )
 def test_pages_fit_read_well_and_stay_silent(visit, pages, width, scheme, names):
@@ -102,18 +99,9 @@ def test_tables_of_a_leaderboard_are_sorted_at_a_click_and_pictures_enlarged(vis
         assert abs(picture.locator("img").bounding_box()["width"] - wide) < 20
 
 
-def test_links_of_a_site_lead_to_reports_and_back(visit, pages):
-    seen = visit(pages["site-index"].as_uri())
-    links = seen.page.locator("a").evaluate_all("all => all.map(a => a.getAttribute('href'))")
-    folder = pages["site-index"].parent
-    assert set(links) == {path.name for path in folder.iterdir()}
-    for path in folder.glob("report-*.html"):
-        assert "index.html" in Page(path.read_text()).addresses
-
-
 def test_sections_hold_texts_of_others_as_texts():
-    leads = [Lead(HOSTILE, HOSTILE, "a.html"), Lead(HOSTILE, HOSTILE)]
-    section = Section(HOSTILE, leads=leads, remarks=[HOSTILE], notes=[HOSTILE])
-    page = Page(html_page(HOSTILE, [section], warnings=[HOSTILE]))
+    leads = [Lead(HOSTILE, HOSTILE)]
+    section = Section(HOSTILE, remarks=[HOSTILE], notes=[HOSTILE])
+    page = Page(html_page(HOSTILE, [section], leads=leads, warnings=[HOSTILE]))
     assert "img" not in page.tags
-    assert page.text.count(HOSTILE.replace("\u202e", "\\u202e")) == 10
+    assert page.text.count(HOSTILE.replace("\u202e", "\\u202e")) == 8
