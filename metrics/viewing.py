@@ -14,7 +14,7 @@ from metrics.scoring.metric_names import HEADLINE, OF_TRUTH, OTHER_SCENE, in_ord
 from metrics.scoring.records import ID_COLUMNS, OPTIONAL_COLUMNS, ScoreFile
 from metrics.scoring.rows import score_rows
 from metrics.scoring.runs import Progress, ScoringError, Settings, matched_rows
-from metrics.scoring.truth_digests import stored_digest
+from metrics.scoring.truth_digests import require_truth, stated_truth
 from metrics.submissions.reader import Predictions, RoomPredictions
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import Room, RoomsFile
@@ -68,7 +68,7 @@ def shown_scores(
         ScoringError: predictions of another truth, or scores of others.
         SpecError: a row that is not predicted or has no score.
     """
-    there, path = matched_rows([predictions], truth, partial=True), predictions.path
+    there, path = matched_rows([predictions], truth, partial=True), str(predictions.path)
     stored = None if scores_path is None else _scores_of(scores_path, predictions, truth)
     if stored is not None:
         there, path = np.intersect1d(there, stored.ids), stored.place
@@ -91,11 +91,8 @@ def shown_scores(
 
 def _scores_of(path: str | Path, predictions: RoomPredictions, truth: RoomsFile) -> ScoreFile:
     """Read a score file of a submission. Raises ScoringError for scores of others."""
-    scores, digest = read_scores(path), stored_digest(truth)
-    if scores.truth != ("rooms", digest):
-        expected = f"those of {truth.path}, truth of digest {digest or 'none':.12}"
-        found = f"scores of {scores.task}, truth of digest {scores.meta.truth_digest:.12}"
-        raise ScoringError(path, found, expected)
+    scores = read_scores(path)
+    require_truth(scores, stated_truth(truth), truth.path)
     if predictions.sha256 not in {run.sha256 for run in scores.meta.submissions}:
         found = f"scores of {', '.join(run.path for run in scores.meta.submissions)}"
         expected = f"those of {predictions.path} as it is now"

@@ -43,12 +43,12 @@ Array = NDArray[Any]
 Scenes = Sequence[tuple[int, ...]]  # of each scene the rows of its views
 ALL_VIEWS, ERROR = "All views", "Error of depth"
 TRUTH, PREDICTION = "/truth", "/prediction"  # of the page's tree
-LAYERS = {  # controls that show a part of the scene: name, and whether it is shown first
-    "truth": ("True surfels", True),
-    "prediction": ("Predicted surfels", True),
-    "beside": ("Prediction beside the truth", True),
-    "meshes": ("Object meshes", True),
-    "cameras": ("Cameras", True),
+LAYERS = {  # controls that show a part of the scene
+    "truth": "True surfels",
+    "prediction": "Predicted surfels",
+    "beside": "Prediction beside the truth",
+    "meshes": "Object meshes",
+    "cameras": "Cameras",
 }
 OF_PREDICTIONS = ("prediction", "beside")
 MOST_REASONS = 3  # why meshes are missing
@@ -135,11 +135,11 @@ class RoomsPage:
                 self._add("full", full)
             self._legend = gui.add_html("", visible=False)
             self._add("size", gui.add_slider("Size of surfels", 0.1, 4.0, 0.1, 2.0))
-            for name, (label, shown) in LAYERS.items():
+            # Cameras would hide predictions, which are looked at from behind them.
+            later = () if predicted is None else ("cameras",)
+            for name, label in LAYERS.items():
                 if predicted is not None or name not in OF_PREDICTIONS:
-                    self._add(name, gui.add_checkbox(label, shown))
-        if predicted is not None:  # cameras would hide what is looked at from behind them
-            self.controls["cameras"].value = False
+                    self._add(name, gui.add_checkbox(label, name not in later))
         gui.add_button("Look from this view").on_click(lambda _: self._look())
         server.scene.on_click()(self._click)
         self.show()

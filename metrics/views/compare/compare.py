@@ -126,7 +126,8 @@ def compare(
         allow_incomparable: compare files that say that they are not comparable, over the rows that
             all of them hold.
 
-    Raises ComparisonError where the files do not belong together, and UnknownMetricError.
+    Raises OtherTruthError and ComparisonError where the files do not belong together, and
+    UnknownMetricError.
     """
     names = require_same_test(files, metrics, allow_incomparable)
     orders = common_rows(files)

@@ -67,18 +67,23 @@ def test_scores_of_another_truth_do_not_stand_beside(truths, folder, check_refus
     assert not (folder / "x.html").exists()
 
 
-def test_a_page_that_cannot_be_made_loses_no_score(truths, folder):
+def test_a_page_that_cannot_be_made_loses_no_score(truths, folder, monkeypatch):
+    def fails(*_):
+        raise OSError(5, "cannot be read", "rooms.h5")
+
     bench("baseline", "oracle", "--data", truths.rooms, "--out", "b.h5")
-    bench("score", "b.h5", "--json", "b.json")
+    monkeypatch.setattr("metrics.views.report.html_report", fails)
+    told = bench("score", "b.h5", "--json", "b.json", "--html", "b.html")
+    assert told.exit_code == 2
+    assert (folder / "b.json").exists()
+    assert "chamfer" in told.stdout
+    assert not (folder / "b.html").exists()
     other = (folder / "b.json").read_text()
     digest = json.loads(other)["meta"]["truth_digest"]
     (folder / "other.json").write_text(other.replace(digest, "0" * 64))
-    outs = ("--json", "b2.json", "--html", "b2.html")
-    told = bench("score", "b.h5", *outs, "--beside", "other.json")
-    assert told.exit_code == 2
-    assert (folder / "b2.json").exists()
-    assert "chamfer" in told.stdout
-    assert not (folder / "b2.html").exists()
+    beside = ("--html", "c.html", "--json", "c.json", "--beside", "other.json")
+    assert bench("score", "b.h5", *beside).exit_code == 2
+    assert not (folder / "c.json").exists(), "refused before anything is scored"
 
 
 def test_pictures_of_another_split_are_left_out(truths, folder):

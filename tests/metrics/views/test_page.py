@@ -8,7 +8,7 @@ from made_scores import iqtt_scores, simple_rooms
 from pages import Page
 
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
-from metrics.scoring.evaluate import score
+from metrics.scoring.evaluate import open_runs, score
 from metrics.views.compare.compare import compare
 from metrics.views.compare.report import html_report as html_comparison
 from metrics.views.leaderboard.ranking import leaderboard, to_html
@@ -46,10 +46,16 @@ def pages(make_rooms, truths, tmp_path_factory):
     answers = truths.iqtt.with_name("iqtt-test-answers.h5")
     write_answers(folder / "q.h5", truths.iqtt, method="m", answer=np.arange(6) % 3)
     questions = replace(score([folder / "q.h5"], answers), method=HOSTILE)
-    made = {
-        "rooms": html_report(files[1], rooms, [folder / "1.h5"], files[:1]),
-        "questions": html_report(questions, answers, [folder / "q.h5"], [questions]),
-        "little": html_report(iqtt_scores("one", [1.0]), folder, []),
+    with (
+        open_runs([folder / "1.h5"], rooms) as runs,
+        open_runs([folder / "q.h5"], answers) as asked,
+    ):
+        made = {
+            "rooms": html_report(files[1], runs, files[:1]),
+            "questions": html_report(questions, asked, [questions]),
+        }
+    made |= {
+        "little": html_report(iqtt_scores("one", [1.0])),
         "compared": html_comparison(compare(files), files),
         "ranked": to_html(leaderboard([*files, questions, simple_rooms("other")])),
     }
