@@ -15,6 +15,7 @@ from metrics.scoring.estimates import CONFIDENCE, question_skill
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
     HEADLINE,
+    OTHER_SCENE,
     WHOSE,
     in_order,
     metric,
@@ -250,6 +251,7 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
         yield f"warning: {warning}"
     if scores.skills:
         yield f"{SKILL} {what_the_floor_is(scores)}"
+    yield from partner_sentences(scores)
     bootstrap = f"{meta.resamples} resamples, seed {meta.seed}"
     if scores.task == "rooms":
         claim = f"alignment: {scores.alignment}"
@@ -290,6 +292,19 @@ def floor_sentences(scores: ScoreFile) -> list[str]:
     names = [name for name in headline if scores.skills[name].is_floor]
     floors = dict.fromkeys(" ".join(floor_text(scores, name).split()) for name in names)
     return [f"this method is the floor ({', '.join(floors)}) of {', '.join(names)}"] * bool(names)
+
+
+def partner_sentences(scores: ScoreFile) -> list[str]:
+    """Return a sentence where skills of relief leave out images for want of another scene."""
+    name = "relief_iou"
+    if name not in scores.skills:
+        return []
+    has_score, has_floor = (
+        int(np.isfinite(scores.items[column]).sum()) for column in (name, OTHER_SCENE + name)
+    )
+    why = "no other scene has the view of the others"
+    text = f"skills of relief are over {has_floor} of {has_score} images: {why}"
+    return [text] * (has_floor < has_score)
 
 
 def few_clusters(scores: ScoreFile) -> list[str]:

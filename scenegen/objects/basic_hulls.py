@@ -19,14 +19,14 @@ FILE = Path(__file__).with_suffix(".npz")
 
 def kept(key: str, compute: Callable[[], Array]) -> Array:
     """Return the array that the data hold under a key; compute it if there is none."""
-    table = _kept()
+    table = _stored_arrays()
     if key not in table:
         table[key] = compute()
     return table[key]
 
 
 @cache
-def _kept() -> dict[str, Array]:
+def _stored_arrays() -> dict[str, Array]:
     """Return all that is kept, by key."""
     if not FILE.exists():
         return {}
@@ -39,7 +39,7 @@ def write() -> None:
     from scenegen.description.scenes import SHAPE_NAMES
     from scenegen.objects.basic_shapes import unit_shape
 
-    _kept().clear()
+    _stored_arrays().clear()
     for name in SHAPE_NAMES:
         unit_shape(name)
-    np.savez_compressed(FILE, allow_pickle=False, **_kept())
+    np.savez_compressed(FILE, allow_pickle=False, **_stored_arrays())
