@@ -22,7 +22,7 @@ from baselines.pix2shape.commands import (
     named_once,
     needs_torch,
     predict_to,
-    score_it,
+    score_hint,
     shown_rows,
     shown_training,
 )
@@ -177,7 +177,7 @@ def baseline(
                 from baselines.trivial import write_room_baseline
 
                 write_room_baseline(name, data, out, train=train, **how)
-    print_line(f"{out}: {method} on {data}; {score_it(out, data)}")
+    print_line(f"{out}: {method} on {data}; {score_hint(out, data)}")
 
 
 def _check_options(

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from metrics.intake.outputs import Frame, Geometry, OutputError, fitted_to, image_of, read_output
 from metrics.measures.alignment import Alignment
 from metrics.scoring.image_scores import NonFinite, reference_of, score_prediction
+from metrics.scoring.metric_names import OTHER_SCENE
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import score_rooms
 from metrics.scoring.runs import Settings
@@ -80,7 +81,8 @@ def evaluate_room(
     )
     reference = reference_of(view)
     scores = score_prediction(predicted, view, reference, non_finite=non_finite).scores
-    return scores | reference.floors
+    own = {name: value for name, value in scores.items() if not name.startswith(OTHER_SCENE)}
+    return own | reference.floors
 
 
 def evaluate(

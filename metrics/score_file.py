@@ -125,7 +125,8 @@ def read_scores(path: str | Path) -> ScoreFile:
     """
     path = Path(path)
     with _naming(path):
-        return replace(_parsed(read_bytes(path, MOST_BYTES)), path=path)
+        document = parse_json(read_bytes(path, MOST_BYTES), MOST_KEYS)
+        return replace(_checked(document), path=path)
 
 
 def write_scores(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> None:
@@ -136,20 +137,27 @@ def write_scores(scores: ScoreFile, path: str | Path, overwrite: bool = False) -
         JsonError: the reader would refuse it.
     """
     with written_beside(path, overwrite) as temporary, _naming(path):
-        data = to_json(scores).encode("ascii")
+        document = _document(scores)
+        _checked(document)
+        data = _text(document).encode("ascii")
         if len(data) > MOST_BYTES:
             raise JsonError("", f"{len(data)} bytes", f"at most {MOST_BYTES}", WITHOUT_JSON)
-        _parsed(data)
         temporary.write_bytes(data)
 
 
 def to_json(scores: ScoreFile) -> str:
     """Return the text of a score file: keys in a fixed order, a line for each column of items."""
+    return _text(_document(scores))
+
+
+def _document(scores: ScoreFile) -> dict[str, Any]:
+    """Return what a score file holds, as parsed JSON."""
     groups = {
         grouping: {key: asdict(groups[key]) for key in by_number(groups)}
         for grouping, groups in scores.answer_groups.items()
     }
-    head = {
+    objects = _table(scores.object_columns, (*OBJECT_COLUMNS, SHAPE_COLUMN))
+    return {
         "format": FORMAT_NAME,
         "format_version": FORMAT_VERSION,
         "task": scores.task,
@@ -164,22 +172,27 @@ def to_json(scores: ScoreFile) -> str:
         },
         "meta": asdict(scores.meta),
         **({"answer_groups": groups} if groups else {}),
+        "items": _table(scores.columns, (*ID_COLUMNS[scores.task], *OPTIONAL_COLUMNS[scores.task])),
+        **({"objects": objects} if objects else {}),
     }
-    # Only ASCII, as one wide character makes the whole text take 4 bytes a character when read.
-    text = json.dumps(head, indent=2, allow_nan=False)
-    first = (*ID_COLUMNS[scores.task], *OPTIONAL_COLUMNS[scores.task])
-    tables = _table("items", scores.columns, first)
-    if scores.object_columns:
-        first = (*OBJECT_COLUMNS, SHAPE_COLUMN)
-        tables += ",\n" + _table("objects", scores.object_columns, first)
-    return f"{text[:-2]},\n{tables}\n}}\n"
 
 
-def _table(key: str, columns: Mapping[str, Array], first: Sequence[str]) -> str:
+def _table(columns: Mapping[str, Array], first: Sequence[str]) -> dict[str, list[Any]]:
     names = [name for name in first if name in columns]
     names += in_order(name for name in columns if name not in first)
-    lines = [f"    {json.dumps(name)}: {json.dumps(_listed(columns[name]))}" for name in names]
-    return f'  "{key}": {{\n' + ",\n".join(lines) + "\n  }"
+    return {name: _listed(columns[name]) for name in names}
+
+
+def _text(document: Mapping[str, Any]) -> str:
+    """Return a document as text, of which each column is one line."""
+    tables = {key: document[key] for key in ("items", "objects") if key in document}
+    head = {key: value for key, value in document.items() if key not in tables}
+    # Only ASCII, as one wide character makes the whole text take 4 bytes a character when read.
+    text = json.dumps(head, indent=2, allow_nan=False)
+    for key, columns in tables.items():
+        lines = (f"    {json.dumps(name)}: {json.dumps(c)}" for name, c in columns.items())
+        text = text[:-2] + f',\n  "{key}": {{\n' + ",\n".join(lines) + "\n  }\n}"
+    return f"{text}\n"
 
 
 def _listed(column: Array) -> list[Any]:
@@ -201,10 +214,10 @@ def _naming(path: str | Path) -> Iterator[None]:
         raise error.inside(path) from error
 
 
-def _parsed(data: bytes) -> ScoreFile:
-    """Return the scores in the bytes of a file. Raises JsonError at the first wrong thing."""
+def _checked(document: Any) -> ScoreFile:
+    """Return the scores of a file's document. Raises JsonError at the first wrong thing."""
     try:
-        stored = validated(_Stored, _without_noise(parse_json(data, MOST_KEYS)))
+        stored = validated(_Stored, _without_noise(document))
     except JsonError as error:
         hint = SCORE_AGAIN if error.where == "format_version" else ""
         raise JsonError(error.where, error.found, error.expected, hint) from error

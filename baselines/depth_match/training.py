@@ -91,11 +91,11 @@ def read_pictures(questions: QuestionsFile, size: int) -> Pictures:
     for row in range(count):
         image[row] = np.sqrt(question_images(questions, row, size).clip(min=0))
         distance = float(questions.read("camera_distance", row))
-        height[row] = 1 - nearer(questions.read("depth", row), size) / distance
+        height[row] = 1 - block_medians(questions.read("depth", row), size) / distance
     return Pictures(*(torch.from_numpy(one).flatten(0, 1) for one in (image, height)))
 
 
-def nearer(depth: Array, size: int) -> Array:
+def block_medians(depth: Array, size: int) -> Array:
     """Return the lower medians of square blocks: (N, H, W) -> (N, S, S), NaN where most are."""
     count, block = len(depth), depth.shape[1] // size
     blocks = depth.reshape(count, size, block, size, block).swapaxes(2, 3)

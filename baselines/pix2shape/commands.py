@@ -248,7 +248,7 @@ def predict(
     Every view of a room is predicted from one image, the room's view 0, and the cameras.
     """
     weights = predict_to(out, weights, data, run=run, device=device, overwrite=overwrite)
-    print_line(f"{out}: {weights} on {data}; {score_it(out, data)}")
+    print_line(f"{out}: {weights} on {data}; {score_hint(out, data)}")
 
 
 def predict_to(
@@ -282,7 +282,7 @@ def shown_rows() -> Iterator[Callable[[int, int], None]]:
         yield show
 
 
-def score_it(out: str, data: str) -> str:
+def score_hint(out: str, data: str) -> str:
     """Return what is said after a submission was written."""
     return f"score it with `{shlex.join(['bench', 'score', out, '--truth', data])}`"
 

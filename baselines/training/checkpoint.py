@@ -126,7 +126,7 @@ def save_weights(
         dtype: type of the stored numbers; tensors beyond its range keep their own.
     """
     kept = {}
-    for name, value in _kept(method, network.state_dict()).items():
+    for name, value in _stored_tensors(method, network.state_dict()).items():
         short = value.to(dtype) if value.is_floating_point() else value
         kept[name] = short if torch.isfinite(short).all() else value
     save_tensors(path, kept, {CONTENTS[0]: to_json(card)})
@@ -139,7 +139,7 @@ def load_weights(path: str | Path, method: Method[CardT, NetworkT]) -> tuple[Net
     """
     tensors, card = _load(path, method, CONTENTS[0])
     with torch.device("meta"):  # so that a hostile card costs no memory
-        expected = _kept(method, method.network(card).state_dict())
+        expected = _stored_tensors(method, method.network(card).state_dict())
     check_tensors(path, tensors, expected)
     network = method.network(card)
     network.load_state_dict(tensors, strict=False)
@@ -236,7 +236,9 @@ def check_tensors(
             raise FileFormatError(place, "NaN, infinity, or below 0 where that cannot be")
 
 
-def _kept(method: Method[CardT, NetworkT], tensors: Mapping[str, Tensor]) -> dict[str, Tensor]:
+def _stored_tensors(
+    method: Method[CardT, NetworkT], tensors: Mapping[str, Tensor]
+) -> dict[str, Tensor]:
     return {name: value for name, value in tensors.items() if name.startswith(method.kept)}
 
 

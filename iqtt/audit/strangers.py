@@ -188,7 +188,7 @@ def _faults(place: str, question: Mapping[str, Any], distance: float) -> dict[st
     pictures = []
     for (cubes, rotation), name in zip(views, names, strict=True):
         try:
-            depth, pixels = _cast(cubes, rotation, distance)
+            depth, pixels = _depth_and_pixels(cubes, rotation, distance)
         except ValueError as error:
             raise FileFormatError(f"{place}: {name}", str(error), "a camera outside") from error
         hidden = np.flatnonzero(pixels == 0)
@@ -232,7 +232,7 @@ def _in_one_piece(cubes: Array) -> bool:
     return not left
 
 
-def _cast(cubes: Array, rotation: Array, distance: float) -> tuple[Array, Array]:
+def _depth_and_pixels(cubes: Array, rotation: Array, distance: float) -> tuple[Array, Array]:
     """Cast rays at a turned shape; return depth (SIDE, SIDE), NaN beside it, and pixels a cube.
 
     Depth counts from the middle of the shape towards the viewer. Rays meet the unit cubes in the

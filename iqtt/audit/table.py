@@ -18,7 +18,7 @@ from scenegen.common.records import check
 from scenegen.files.content import ColumnDigest, column_digest, dataset_digest, joint_digest
 from scenegen.files.rows import content_problems as problems_of_file
 from scenegen.files.sets.cluster import Cluster
-from scenegen.files.sets.shards import OpenFile, set_name
+from scenegen.files.sets.shards import OpenFile, name_of_set
 
 Array = NDArray[Any]
 ROLES = ("train", "val", "test", "test-answers")
@@ -191,7 +191,7 @@ def _files(folder: Path) -> list[Path]:
     """Return a folder's question files by name, without shards; none if it is no folder."""
     files = sorted(folder.glob("iqtt-*.h5")) or sorted(folder.glob("*.h5"))
     names = {file.name for file in files}
-    return [file for file in files if set_name(file.name) not in names]
+    return [file for file in files if name_of_set(file.name) not in names]
 
 
 def read_table(

@@ -12,7 +12,7 @@ from iqtt.questions.specs import DISTRACTOR_KINDS
 from scenegen.common.text_table import printable
 from scenegen.files.content import CONTENT_DIGEST
 from scenegen.files.info import column_lines, fact_lines, setting_lines, size_text
-from scenegen.files.sets.shards import set_name
+from scenegen.files.sets.shards import name_of_set
 from scenegen.files.verify import spread_rows
 from scenegen.rendering.backend import renderer_text
 from scenegen.rendering.ground_truth import decode_image
@@ -59,7 +59,7 @@ def _facts_of_file(path: Path, tables: Sequence[QuestionsFile]) -> dict[str, str
 
 def _size(path: Path) -> int:
     """Return the size of a file and of its shards, if it has any."""
-    shards = [file for file in path.parent.iterdir() if set_name(file.name) == path.name]
+    shards = [file for file in path.parent.iterdir() if name_of_set(file.name) == path.name]
     return sum(file.stat().st_size for file in (path, *shards))
 
 

@@ -48,7 +48,7 @@ class QuestionsWork:
         """Questions that a worker process makes in one go."""
         return BLOCK
 
-    def rows(self, block: Block, workers: int) -> Generator[Packed, None, Tally]:
+    def packed_rows(self, block: Block, workers: int) -> Generator[Packed, None, Tally]:
         """Render questions in order, and meanwhile pack them in threads; return their tally."""
         share_processors(workers, self.device)
         split, part, tally = block.part.bundle, block.part.name, Tally()

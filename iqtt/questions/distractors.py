@@ -110,7 +110,7 @@ def make_pools(spec: SplitSpec) -> Pools:
         matched = {n: tuple(map(matched_rows, parts)) for n, parts in classes.items()}
     pools = Pools(classes, matched, {})
     for kind in spec.kinds:
-        allowed = tuple(n for n in classes if _allows(spec, pools, kind, n))
+        allowed = tuple(n for n in classes if _has_distractors(spec, pools, kind, n))
         if allowed:
             pools.sizes[kind] = allowed
     if not pools.sizes:
@@ -125,7 +125,7 @@ def make_pools(spec: SplitSpec) -> Pools:
     return pools
 
 
-def _allows(spec: SplitSpec, pools: Pools, kind: str, cubes: int) -> bool:
+def _has_distractors(spec: SplitSpec, pools: Pools, kind: str, cubes: int) -> bool:
     """Return whether at least every twentieth reference of every split has such distractors."""
     for split in range(len(SPLITS)):
         if len(pools.classes[cubes][split]) < (spec.answers if kind == "other" else 1):

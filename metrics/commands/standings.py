@@ -10,7 +10,7 @@ from metrics.commands.options import MARKDOWN, SEED
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import OVERWRITE
 from scenegen.command_line.output import line_width, print_line
-from scenegen.command_line.paths import InputPath, OutputFolder, OutputPath
+from scenegen.command_line.paths import InputPath, OutputPath
 
 
 @click.command(epilog=EXAMPLE + "bench compare baseline.json mine.json --metric chamfer")
@@ -94,7 +94,7 @@ def compare(
 @click.command(
     epilog=EXAMPLE + "bench leaderboard baseline.json mine.json --format html --out b.html"
 )
-@click.argument("scores", nargs=-1, type=InputPath(), metavar="[SCORES.json]...")
+@click.argument("scores", nargs=-1, required=True, type=InputPath(), metavar="SCORES.json...")
 @click.option(
     "--metric", "metrics", multiple=True,
     help="A score to show; may be repeated, and the first one ranks [default: the headline"
@@ -128,22 +128,7 @@ def compare(
     help="What is known of methods: by their name trained_on, supervised, told, paper, code, date.",
 )  # fmt: skip
 @click.option("--out", type=OutputPath(), help="Write to this file instead of printing.")
-@click.option(
-    "--html",
-    "folder",
-    type=OutputFolder(),
-    metavar="DIR",
-    help="Write a static site to this folder, fit for GitHub Pages: the rankings with paired tests,"
-    " a gallery, and a report of each score file.",
-)
-@click.option(
-    "--paper",
-    type=click.Choice(["task", "all", "none"]),
-    default="task",
-    show_default=True,
-    help="Which of the paper's own figures to show: those of the score files' tasks, all, or none.",
-)
-@click.option("--no-paper", is_flag=True, help="The same as --paper none.")
+@click.option("--no-paper", is_flag=True, help="Leave out what the paper reports.")
 @OVERWRITE
 def leaderboard(
     scores: tuple[str, ...],
@@ -155,8 +140,6 @@ def leaderboard(
     label: str,
     cards_path: str | None,
     out: str | None,
-    folder: str | None,
-    paper: Any,
     no_paper: bool,
     overwrite: bool,
 ) -> None:
@@ -169,6 +152,7 @@ def leaderboard(
     from metrics.score_file import read_scores
     from metrics.views.leaderboard.cards import read_cards, unmatched
     from metrics.views.leaderboard.ranking import leaderboard as rank
+    from metrics.views.leaderboard.ranking import to_html
     from metrics.views.table import to_latex, to_markdown, to_text, without_rests
     from scenegen.files.new_file import check_writable, write_text
 
@@ -180,23 +164,13 @@ def leaderboard(
     files = [read_scores(path) for path in scores]
     for sentence in unmatched(cards or {}, files):
         print_line(f"warning: {cards_path}: {sentence}", err=True)
-    shown: Any = "none" if no_paper else paper
-    if folder is not None:
-        from metrics.views.leaderboard.site import write_site
-
-        write_site(files, folder, metrics or None, paper=shown, cards=cards, overwrite=overwrite)
-        print_line(f"{folder}: {len(scores)} score files; open {Path(folder) / 'index.html'}")
-        if out is None:
-            return
     short = shown_tables == "headline"
-    tables = list(rank(files, metrics or None, paper=shown, headline=short, cards=cards))
+    tables = list(rank(files, metrics or None, paper=not no_paper, headline=short, cards=cards))
     if no_intervals:
         tables = [without_rests(table) for table in tables]
     if caption and tables:
         tables[0] = replace(tables[0], title=caption)
     if form == "html":
-        from metrics.views.leaderboard.site import to_html
-
         text = to_html(tables)
     elif form == "latex":
         text = to_latex(tables, label)

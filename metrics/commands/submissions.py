@@ -97,7 +97,7 @@ def score(
     from metrics.scoring.evaluate import open_runs, score_runs
     from metrics.scoring.runs import Settings, scorer_versions
     from metrics.submissions.validation import hints
-    from metrics.views.report import read_beside
+    from metrics.views.report import html_report, read_beside
     from metrics.views.score_tables import text_report, write_csv
     from scenegen.files.new_file import check_writable, write_text
 
@@ -108,7 +108,7 @@ def score(
         raise click.UsageError("--beside is for the page: give --html, too")
     with open_runs(submissions, truth) as runs:
         refuse_inputs(outputs, [runs.truth.path])
-        others = read_beside(beside, runs.files[0]) if beside else []
+        others = read_beside(beside, runs.truth)
         with (
             on_scheduler(scheduler, settings["processes"] or 0, scorer_versions) as cluster,
             progress_bar(len(runs.files[0]), "image") as bar,
@@ -117,18 +117,15 @@ def score(
         for file in runs.files:
             for hint in hints(file, runs.truth):
                 print_line(f"hint: {file.path}: {hint}", err=True)
-    if json_path:
-        write_scores(scores, json_path, overwrite)
-    if csv_path:
-        write_csv(scores, csv_path, overwrite)
-    try:
-        if html_path:
-            from metrics.views.report import html_report
-
-            truth_path, paths = Path(scores.meta.truth_path), [Path(path) for path in submissions]
-            write_text(html_path, html_report(scores, truth_path, paths, others), overwrite)
-    finally:  # a page that cannot be made loses no score
-        click.echo(text_report(scores, markdown, whole, line_width()))
+        if json_path:
+            write_scores(scores, json_path, overwrite)
+        if csv_path:
+            write_csv(scores, csv_path, overwrite)
+        try:
+            if html_path:
+                write_text(html_path, html_report(scores, runs, others), overwrite)
+        finally:  # a page that cannot be made loses no score
+            click.echo(text_report(scores, markdown, whole, line_width()))
 
 
 @click.command(epilog=EXAMPLE + "bench validate predictions.h5 --truth rooms.h5")
@@ -185,11 +182,11 @@ def view(
     needs("bench view", ("viser",), "view")
     from metrics.submissions.reader import open_predictions
     from metrics.submissions.truths import find_truth
-    from metrics.viewing.order import MOST_SCORED, require_rooms, shown_scores
-    from metrics.viewing.page import PredictionPage
+    from metrics.viewing import MOST_SCORED, predicted_rooms, require_rooms, shown_scores
     from scenegen.common.web_hosts import hosts_of
     from scenegen.rooms.reader import RoomsFile
     from scenegen.viewing.geometry import shapes_of
+    from scenegen.viewing.page import RoomsPage
     from scenegen.viewing.server import serve, started
 
     hosts = hosts_of(host, public, names)
@@ -203,8 +200,9 @@ def view(
             count = len(items) if items else min(len(predictions), MOST_SCORED)
             with progress_bar(count, "image") as bar:
                 scores = shown_scores(predictions, rooms, items, scores_path, bar.update)
+            shown = predicted_rooms(predictions, rooms, scores)
             with started(f"{predictions.method}: {submission}", hosts, port) as server:
-                PredictionPage(server, rooms, predictions, scores, shape_of)
+                RoomsPage(server, rooms, shape_of, *shown)
                 serve(server, hosts, print_line, open_browser)
 
 

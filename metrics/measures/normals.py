@@ -17,7 +17,6 @@ from metrics.measures.checks import (
     require_finite,
     require_fov,
     require_mask,
-    require_some,
 )
 from scenegen.camera import back_project, pixel_directions
 
@@ -92,17 +91,18 @@ def normal_scores(angles: Array) -> dict[str, float]:
     These are `normal_mean_degrees`, `normal_median_degrees`, `normal_rmse_degrees` (the root mean
     square), and `normal_within_<limit>`: the fractions, 0 to 1, of angles below WITHIN_DEGREES.
     Sources: Fouhey et al. 2013 (Data-Driven 3D Primitives) for 11.25, 22.5 and 30; Bae and Davison
-    2024 (DSINE) for 5 and 7.5. Raises EmptyError without
-    angles.
+    2024 (DSINE) for 5 and 7.5. All are NaN without angles.
     """
-    require_some(angles.size, "angles")
     require_finite(angles, "angles")
+    if not angles.size:
+        angles = np.full(1, np.nan)
     scores = {
         "normal_mean_degrees": float(angles.mean()),
         "normal_median_degrees": float(np.median(angles)),
         "normal_rmse_degrees": float(np.sqrt(np.square(angles).mean())),
     }
-    return scores | {f"normal_within_{w:g}": float(np.mean(angles < w)) for w in WITHIN_DEGREES}
+    within = {w: np.where(np.isnan(angles), np.nan, angles < w).mean() for w in WITHIN_DEGREES}
+    return scores | {f"normal_within_{w:g}": float(share) for w, share in within.items()}
 
 
 def normals_from_depth(

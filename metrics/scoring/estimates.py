@@ -169,10 +169,13 @@ def object_sizes(pixels: Array, image_pixels: int) -> Array:
     return np.array([size_range(share) for share in (pixels / image_pixels).tolist()], object)
 
 
-def floor_column(items: Mapping[str, Array], name: str, shown: Shown = "scored_view") -> str | None:
+def floor_column(
+    items: Mapping[str, Array], scene: Array, name: str, shown: Shown = "scored_view"
+) -> str | None:
     """Return which column of items is the floor of a score's skill; None where there is none.
 
-    Of several that were shown as much as the method, it is the lowest on average.
+    Of several that were shown as much as the method, it is that of the lowest mean over scenes,
+    (N,).
     """
     begins = [
         begin
@@ -180,7 +183,12 @@ def floor_column(items: Mapping[str, Array], name: str, shown: Shown = "scored_v
         if begin + name in items and (name != BEHIND or begin in SHOWN_AS_MUCH[shown])
     ]
     columns = [begin + name for begin in begins if np.isfinite(items[begin + name]).any()]
-    return min(columns, key=lambda column: float(np.nanmean(items[column])), default=None)
+
+    def mean(column: str) -> float:
+        there = np.isfinite(items[column])
+        return float(cluster_means(items[column][there], scene[there]).mean())
+
+    return min(columns, key=mean, default=None)
 
 
 def skills(
@@ -192,7 +200,7 @@ def skills(
     floor below 0, that of relief which goes against other scenes, counts as 0, the score of the
     empty room: so a bad floor wins nothing, and the skill of a relief never exceeds its score.
     """
-    column_of = {name: floor_column(items, name, shown) for name in SKILLED if name in items}
+    column_of = {name: floor_column(items, scene, name, shown) for name in SKILLED if name in items}
     names = [name for name, column in column_of.items() if column is not None]
     of_objects = [name for name in names if name in OBJECT_SCORES]
     if not any(np.isfinite(items[name]).any() for name in of_objects):

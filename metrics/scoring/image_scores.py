@@ -232,7 +232,7 @@ def score_prediction(
         truth: what it is compared with.
         reference: what belongs to that.
         other_relief: true relief of another scene, (H, W), scene units, NaN where it has none; None
-            where there is no other scene.
+            where there is no other scene, and the scores against it are NaN.
         non_finite: what to do with an image in which a scored pixel breaks `submissions.rules`.
             "penalise" gives it the worst value of every score, `metric_names.Metric.worst`.
 
@@ -319,7 +319,7 @@ def _scores_of_relief(
     said = room - geometry.depth[mask]
     relief = relief_scores(said, (reference.empty - truth.depth)[mask])
     if other_relief is None:
-        return relief
+        return relief | {OTHER_SCENE + name: np.nan for name in relief}
     other = other_relief[mask]
     both = np.isfinite(other)
     with_other = relief_scores(said[both], other[both]) if both.any() else relief

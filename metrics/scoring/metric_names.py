@@ -136,7 +136,9 @@ class Metric:
             "relief", those whose true relief nowhere exceeds `relief.RELIEF_ABOVE`; "inside", those
             without pixels inside objects (`shape.inside_objects`), and "bends", also those whose
             objects are flat; "behind", those that show little that the first view does not;
-            "boundary", those whose true depth nowhere jumps; else "".
+            "boundary", those whose true depth nowhere jumps; "planes", those in which no pixel has
+            a reliable normal from its depth; "partner", those whose view no other scene has; else
+            "".
     """
 
     name: str
@@ -147,7 +149,9 @@ class Metric:
     definition: str
     largest: float = math.inf
     smallest: float = 0.0
-    lacking: Literal["", "objects", "relief", "inside", "bends", "behind", "boundary"] = ""
+    lacking: Literal[
+        "", "objects", "relief", "inside", "bends", "behind", "boundary", "planes", "partner"
+    ] = ""
     of: Literal["points", "depth", "normals", "field of view", "answers"] = "depth"
 
     @property
@@ -371,6 +375,7 @@ def _derived(metric: Metric) -> Metric:
         definition=f"`{metric.name}` of normals derived from the predicted points, against those"
         " derived in the same way from the true points.",
         of="points",
+        lacking="planes",
     )
 
 
@@ -426,6 +431,7 @@ ALL |= {
         name=OTHER_SCENE + name,
         title=f"{ALL[name].title}, other scene",
         definition=f"`{name}` of the same prediction with the relief of another scene.",
+        lacking="partner",
     )
     for name in RELIEF
 }

@@ -237,7 +237,7 @@ class ScoreFile:
 
     def floor_of(self, name: str) -> str | None:
         """Return what begins the name of the column of items that is a score's floor; or None."""
-        column = floor_column(self.items, name, self.shown)
+        column = floor_column(self.items, self.clusters, name, self.shown)
         return None if column is None else column[: -len(name)]
 
     @property

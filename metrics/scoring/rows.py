@@ -17,7 +17,7 @@ from metrics.scoring.image_scores import (
     score_prediction,
     true_relief,
 )
-from metrics.scoring.metric_names import OBJECT_SCORES
+from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE
 from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.scoring.truth_digests import RowDigests, view_digests
 from metrics.submissions.problems import PredictionError
@@ -44,7 +44,8 @@ class ScoredRows:
 
     Attributes:
         scores: by name, (R, M).
-        floors: scores of the empty room and of cut-outs, by name, (M,).
+        floors: scores of the empty room, of cut-outs and of guesses at what is behind, by name,
+            (M,); those of OF_TRUTH.
         objects: of each of L objects that count in these rows: `row`, `object` and `pixels`, (L,),
             and its scores by name, (R, L).
         bad: for each row with values that are not finite, or normals of length 0, what is wrong;
@@ -96,8 +97,10 @@ def _joined(parts: Sequence[ScoredRows]) -> ScoredRows:
         return np.concatenate([getattr(part, kind)[name] for part in parts], axis=-1)
 
     first = parts[0]
+    scores = {name: column("scores", name) for name in first.scores}
+    alone = [n for n in scores if n.startswith(OTHER_SCENE) and not np.isfinite(scores[n]).any()]
     return ScoredRows(
-        {name: column("scores", name) for name in first.scores},
+        {name: values for name, values in scores.items() if name not in alone},
         {name: column("floors", name) for name in first.floors},
         {name: column("objects", name) for name in first.objects},
         {row: error for part in parts for row, error in part.bad.items()},
@@ -110,21 +113,20 @@ def other_scenes(scene_index: Array, view_index: Array) -> Array:
 
     It is the next scene's in the same view, and the first one's for the last scene; each row is
     that of exactly one other. A constant prediction therefore scores equally against its own and
-    the other scene, on average. Rows whose view is in no other scene are paired with each other. If
-    a row would be paired with its own scene, as there is one scene only, each row is paired with
-    itself.
+    the other scene, on average. Rows whose view is in no other scene are paired with each other.
+    Rows for which these are all of their own scene are paired with themselves.
     """
     views, index, rows_of = np.unique(view_index, return_inverse=True, return_counts=True)
     group = np.where(rows_of[index] > 1, index, len(views))
     order = np.lexsort((scene_index, group))
-    first = np.diff(group[order], prepend=-1) != 0
-    last = np.append(first[1:], True)
-    after = np.roll(order, -1)
-    after[last] = order[first]
-    partner = np.empty_like(order)
-    partner[order] = after
+    partner = np.arange(len(order))
+    for number in np.unique(group):
+        rows = order[group[order] == number]
+        # So far on, no scene meets itself, unless it has more than half of the rows.
+        most = np.unique(scene_index[rows], return_counts=True)[1].max()
+        partner[rows] = np.roll(rows, -most)
     same = scene_index[partner] == scene_index
-    return np.arange(len(partner)) if same.any() else partner
+    return np.where(same, np.arange(len(partner)), partner)
 
 
 def first_views(truth: RoomsFile) -> Array:

@@ -79,14 +79,14 @@ def matched_rows(
         problems = match_problems(file, truth)
         if partial:
             problems = [problem for problem in problems if problem.rule != "complete"]
-        refuse(file.path, problems)
+        raise_first_problem(file.path, problems)
         rows = np.intersect1d(rows, file.rows)
     if not rows.size:
         raise ScoringError(files[0].path, "no row that all runs answer", f"rows of {truth.path}")
     return rows
 
 
-def refuse(path: Path, problems: Sequence[Problem]) -> None:
+def raise_first_problem(path: Path, problems: Sequence[Problem]) -> None:
     """Raise ScoringError with the first of the problems, if there are any."""
     incomplete = any(problem.rule == "complete" for problem in problems)
     advice = "to score the rest, not comparably, say --allow-partial" if incomplete else ""

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from metrics.scoring.known_tests import Task
+from metrics.scoring.records import ScoreFile
 from metrics.scoring.runs import ScoringError
 from metrics.submissions.truths import TrueView
 from scenegen.files.content import column_digest, dataset_digest, joint_digest, row_digest
@@ -22,6 +24,10 @@ PER_PIXEL = ("depth", "normal", "object_id")
 RowDigests = tuple[bytes, ...]  # of PER_PIXEL
 
 
+class OtherTruthError(ScoringError):
+    """Scores of another truth than is asked for."""
+
+
 def view_digests(view: TrueView) -> RowDigests:
     """Return the digest of each array of a row that was read to be scored."""
     return tuple(row_digest(getattr(view, name)) for name in PER_PIXEL)
@@ -33,6 +39,25 @@ def stored_digest(truth: "RoomsFile | AnswersFile") -> str | None:
         digest = truth.attributes.get("truth_digest")
         return digest if isinstance(digest, str) else None
     return truth.stored_truth_digest
+
+
+def stated_truth(truth: "RoomsFile | AnswersFile") -> tuple[Task, str | None]:
+    """Return what an open truth says that it is, as `ScoreFile.truth`; None for no digest."""
+    return "rooms" if isinstance(truth, RoomsFile) else "iqtt", stored_digest(truth)
+
+
+def require_truth(file: ScoreFile, truth: tuple[Task, str | None], owner: object) -> None:
+    """Raise OtherTruthError unless a score file is of this truth, that of `owner`.
+
+    This is the rule for "the same test set": one task, and one digest of what scores depend on.
+    """
+    if file.truth != truth:
+        found, expected = (
+            f"scores of {task}, truth of digest {digest or 'none':.12}"
+            for task, digest in (file.truth, truth)
+        )
+        expected = f"{expected}, as {owner} has"
+        raise OtherTruthError(file.place, found, expected, "score it with the same --truth")
 
 
 def rooms_digest(truth: RoomsFile, scored: Mapping[int, RowDigests]) -> str:

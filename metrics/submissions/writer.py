@@ -19,7 +19,7 @@ from metrics.measures.alignment import Alignment
 from metrics.measures.answers import answers_from_scores
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import PredictionError, first_error, first_ids
-from scenegen.files.row_file import new_file, writer_name
+from scenegen.files.row_file import new_hdf5_file, writer_name
 from scenegen.files.schema import Column
 from scenegen.files.table import Table
 from scenegen.rooms.reader import RoomsFile
@@ -156,7 +156,7 @@ class RoomPredictionWriter:
     def _opened(self) -> Iterator[None]:
         with (
             RoomsFile(self._truth_path) as self._truth,
-            new_file(self._path, self._overwrite) as self._file,
+            new_hdf5_file(self._path, self._overwrite) as self._file,
         ):
             self._written = np.zeros(len(self._truth), np.bool_)
             self._rows: list[int] = []
@@ -268,7 +268,7 @@ def write_answers(
             problems = rules.value_problems(name, values[name], ids, against)
     if problems:
         raise first_error(PredictionError, path, problems)
-    with new_file(path, overwrite) as file:
+    with new_hdf5_file(path, overwrite) as file:
         file.attrs.update({**texts, "truth_fingerprint": fingerprint})
         _write_columns(file, "iqtt", values)
 

@@ -9,8 +9,8 @@ import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from metrics.scoring.records import ScoreFile
-from metrics.scoring.truth_digests import stored_digest
+from metrics.scoring.records import ScoreFile, Task
+from metrics.scoring.truth_digests import stated_truth
 from scenegen.common.errors import SceneGenError
 from scenegen.files import trial
 
@@ -23,7 +23,7 @@ def truth_at_hand(file: ScoreFile, named: Path | None = None) -> Path | None:
     """
     places = [named] if named is not None else _places(file, file.meta.truth_path)
     for path in places:
-        if os.path.isfile(path) and _truth_digest(file, path) == file.meta.truth_digest:
+        if os.path.isfile(path) and _stated_truth(file, path) == file.truth:
             return path
     return None
 
@@ -50,19 +50,19 @@ def _places(file: ScoreFile, recorded: str) -> Iterator[Path]:
             yield file.path.parent / Path(recorded).name
 
 
-def _truth_digest(file: ScoreFile, path: Path) -> str | None:
-    """Return the digest that a truth states of itself; None where it is none, or states nothing."""
+def _stated_truth(file: ScoreFile, path: Path) -> tuple[Task, str | None] | None:
+    """Return what a file says that it is, if it is a truth of the task; else None."""
     try:
         trial.try_file(path)
         if file.task == "rooms":
             from scenegen.rooms.reader import RoomsFile
 
             with RoomsFile(path) as rooms:
-                return stored_digest(rooms)
+                return stated_truth(rooms)
         from iqtt.files.reader import AnswersFile
 
         with AnswersFile(path) as answers:
-            return stored_digest(answers)
+            return stated_truth(answers)
     except (OSError, SceneGenError):
         return None
 

@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,13 +14,16 @@ from metrics.measures.answers import ABSTAINED
 from metrics.scoring.geometry import depth_as_scored
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
-from metrics.submissions.reader import QuestionPredictions, RoomPredictions, open_predictions
+from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
 from metrics.views.pictures import Picture, data_url, view_pictures
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.common.text_table import number
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import RoomsFile
+
+if TYPE_CHECKING:
+    from iqtt.files.reader import AnswersFile
 
 Array = NDArray[Any]
 SHOWN = 6  # examples in a list, where there are enough
@@ -47,15 +50,19 @@ class Example:
 Lists = list[tuple[str, list[Example]]]  # titles and examples
 
 
-def examples_of(scores: ScoreFile, truth: Path, submission: Path) -> Lists:
+def examples_of(
+    scores: ScoreFile, truth: "RoomsFile | AnswersFile", submission: Predictions
+) -> Lists:
     """Return titles and examples: the best, median and worst scenes, or answers right and wrong.
 
-    Raises OSError and FileFormatError where truth or submission cannot be read.
+    Raises OSError and FileFormatError where a file, all of which are open, cannot be read.
     """
-    if scores.task == "iqtt":
-        return _questions(scores, truth, submission)
-    name = shown_score(scores)
-    return _scenes(scores, truth, submission, name) if name else []
+    if isinstance(truth, RoomsFile):
+        assert isinstance(submission, RoomPredictions)
+        name = shown_score(scores)
+        return _scenes(scores, truth, submission, name) if name else []
+    assert isinstance(submission, QuestionPredictions)
+    return _questions(scores, truth.path, submission)
 
 
 def shown_score(scores: ScoreFile) -> str:
@@ -99,7 +106,7 @@ def chosen_scenes(
     return {title: entries.tolist() for title, entries in lists.items() if len(entries)}
 
 
-def _scenes(scores: ScoreFile, truth: Path, submission: Path, name: str) -> Lists:
+def _scenes(scores: ScoreFile, truth: RoomsFile, submission: RoomPredictions, name: str) -> Lists:
     values = np.asarray(scores.items[name], float)
     chosen = chosen_scenes(scores.clusters, values, metric(name).higher_is_better)
     entries = [entry for entries in chosen.values() for entry in entries]
@@ -114,22 +121,20 @@ def _scenes(scores: ScoreFile, truth: Path, submission: Path, name: str) -> List
 
 
 def room_examples(
-    scores: ScoreFile, truth: Path, submission: Path, entries: Sequence[int]
+    scores: ScoreFile, rooms: RoomsFile, predictions: RoomPredictions, entries: Sequence[int]
 ) -> Iterator[Example]:
     """Yield entries of a score file with the pictures of `pictures.view_pictures`.
 
     Raises OSError and FileFormatError where a file cannot be read or lacks an entry's row.
     """
-    with RoomsFile(truth) as rooms, open_predictions(submission) as predictions:
-        assert isinstance(predictions, RoomPredictions)
-        place = {row: i for i, row in enumerate(predictions.rows.tolist())}
-        for entry in entries:
-            row = int(scores.items["row"][entry])
-            if row not in place or row >= len(rooms):
-                expected = f"rows of {submission} and {truth}"
-                raise FileFormatError(scores.place, f"items.row: {row}", expected)
-            pictures = room_pictures(rooms, predictions, row, place[row])
-            yield Example(entry_name(scores, entry), _entry_scores(scores, entry), pictures)
+    place = {row: i for i, row in enumerate(predictions.rows.tolist())}
+    for entry in entries:
+        row = int(scores.items["row"][entry])
+        if row not in place or row >= len(rooms):
+            expected = f"rows of {predictions.path} and {rooms.path}"
+            raise FileFormatError(scores.place, f"items.row: {row}", expected)
+        pictures = room_pictures(rooms, predictions, row, place[row])
+        yield Example(entry_name(scores, entry), _entry_scores(scores, entry), pictures)
 
 
 def room_pictures(
@@ -175,7 +180,7 @@ def chosen_questions(right: NDArray[np.bool_], most: int = SHOWN) -> dict[str, l
     return lists
 
 
-def _questions(scores: ScoreFile, truth: Path, submission: Path) -> Lists:
+def _questions(scores: ScoreFile, truth: Path, predictions: QuestionPredictions) -> Lists:
     """Return questions answered rightly and wrongly; none where their pictures are not there."""
     from iqtt.files.reader import QuestionsFile
 
@@ -187,8 +192,7 @@ def _questions(scores: ScoreFile, truth: Path, submission: Path) -> Lists:
         questions = QuestionsFile(images, answers=joined)
     except SceneGenError:  # a file of answers by itself, or the questions of another split
         return []
-    with questions, open_predictions(submission) as predictions:
-        assert isinstance(predictions, QuestionPredictions)
+    with questions:
         answer = dict(zip(predictions.rows.tolist(), predictions.answers.tolist(), strict=True))
         ids = scores.ids.tolist()
         answers = np.array([answer.get(i, ABSTAINED) for i in ids])

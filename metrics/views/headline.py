@@ -36,7 +36,7 @@ KINDS_REMARK = (
 )
 
 
-def answer(scores: ScoreFile) -> Lead:
+def headline_lead(scores: ScoreFile) -> Lead:
     """Return the main result: the value of the first skill, or of the first score without any."""
     names = _main_scores(scores)
     name = next((name for name in names if name in scores.skills), names[0])

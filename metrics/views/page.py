@@ -24,15 +24,10 @@ _TEMPLATES = Path(__file__).parent / "templates"
 
 @dataclass(frozen=True)
 class Lead:
-    """A sentence that answers first: its beginning in bold, and the rest.
-
-    Attributes:
-        link: address that the beginning leads to; or empty.
-    """
+    """A sentence that answers first: its beginning in bold, and the rest."""
 
     strong: str
     text: str
-    link: str = ""
 
 
 @dataclass(frozen=True)
@@ -40,7 +35,7 @@ class Section:
     """What stands under a heading, in this order.
 
     Attributes:
-        leads, remarks: sentences, large and small.
+        remarks: sentences in small letters.
         tables: each with its title, unless that is the section's.
         examples: titles of lists, and their items with pictures.
         notes: a list in small letters.
@@ -48,7 +43,6 @@ class Section:
     """
 
     title: str
-    leads: Sequence[Lead] = ()
     remarks: Sequence[str] = ()
     tables: Sequence[Table] = ()
     examples: Sequence[tuple[str, Sequence[Example]]] = ()
@@ -57,21 +51,11 @@ class Section:
     folded: bool = False
 
 
-@dataclass(frozen=True)
-class Link:
-    """A link to another page of the same site; `current` marks the page itself."""
-
-    address: str
-    text: str
-    current: bool = False
-
-
 def html_page(
     title: str,
     sections: Sequence[Section],
     leads: Sequence[Lead] = (),
     warnings: Sequence[str] = (),
-    links: Sequence[Link] = (),
     sortable: bool = False,
 ) -> str:
     """Return a page that asks for nothing: `leads` and `warnings` first, then the sections.
@@ -90,7 +74,7 @@ def html_page(
     )
     policy += f"; script-src '{_digest(script)}'" if script else ""
     page: str = _template().render(
-        title=title, sections=sections, leads=leads, warnings=warnings, links=links,
+        title=title, sections=sections, leads=leads, warnings=warnings,
         style=Markup(style), policy=policy, script=Markup(script),
     )  # fmt: skip
     return page

@@ -2,18 +2,20 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from metrics.score_file import read_scores
 from metrics.scoring.estimates import CONFIDENCE
+from metrics.scoring.evaluate import Runs
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
 from metrics.scoring.records import ScoreFile
-from metrics.submissions.reader import Predictions
+from metrics.scoring.truth_digests import require_truth, stated_truth
 from metrics.views.by_angle import view_curves
 from metrics.views.examples import examples_of
-from metrics.views.headline import answer, headline_section, kinds_sections
-from metrics.views.page import Link, Section, html_page
+from metrics.views.headline import headline_lead, headline_section, kinds_sections
+from metrics.views.page import Section, html_page
 from metrics.views.plots import Chart, histogram
 from metrics.views.score_tables import (
     all_scores,
@@ -22,7 +24,10 @@ from metrics.views.score_tables import (
     source_text,
 )
 from metrics.views.table import make_table
-from scenegen.common.errors import SceneGenError
+from scenegen.rooms.reader import RoomsFile
+
+if TYPE_CHECKING:
+    from iqtt.files.reader import AnswersFile
 
 ROOMS_REMARK = (
     "Depths share the truth's range; the error ends at a tenth of it. Normals are x, y, z as red,"
@@ -34,29 +39,20 @@ CURVES_REMARK = (
 )
 
 
-class BesideError(SceneGenError):
-    """A score file that cannot stand beside others."""
-
-
 def html_report(
-    scores: ScoreFile,
-    truth_path: Path,
-    submissions: Sequence[Path],
-    beside: Sequence[ScoreFile] = (),
-    home: str = "",
+    scores: ScoreFile, runs: Runs | None = None, beside: Sequence[ScoreFile] = ()
 ) -> str:
-    """Return the page as text; pictures come from the truth and the first run.
+    """Return the page as text.
 
     Args:
-        truth_path: of the truth that was scored against.
-        submissions: the files that were scored; without any there are no pictures.
+        runs: what was scored, for pictures of the first run; None for no pictures.
         beside: scores of other methods on the same truth, to be shown beside these.
-        home: address of the page that this one belongs to, such as "index.html".
 
-    Raises BesideError where a file of `beside` is of another truth, OSError and FileFormatError
+    Raises OtherTruthError where a file of `beside` is of another truth, OSError and FileFormatError
     where a picture's row cannot be read.
     """
-    _require_same_truth(scores, beside)
+    for file in beside:
+        require_truth(file, scores.truth, scores.method)
     files = [scores, *beside]
     sections = [headline_section(files)]
     if scores.task == "iqtt":
@@ -66,7 +62,7 @@ def html_report(
     else:
         remark, title = ROOMS_REMARK, "Scenes"
         remark += " Of each scene it is the view whose score is nearest to the scene's mean."
-    examples = examples_of(scores, truth_path, submissions[0]) if submissions else []
+    examples = [] if runs is None else examples_of(scores, runs.truth, runs.files[0])
     if examples:
         sections.append(Section(title, remarks=[remark], examples=examples))
     if scores.task == "rooms":
@@ -77,9 +73,8 @@ def html_report(
     return html_page(
         scores.method,
         [*sections, *_all_numbers(scores)],
-        leads=[answer(scores)],
+        leads=[headline_lead(scores)],
         warnings=scores.warnings,
-        links=[Link(home, "Leaderboard")] if home else [],
     )
 
 
@@ -90,35 +85,17 @@ def curves_section(files: Sequence[ScoreFile]) -> list[Section]:
     return [Section(title, charts=charts, notes=[CURVES_REMARK])] if charts else []
 
 
-def read_beside(paths: Sequence[str | Path], predictions: Predictions) -> list[ScoreFile]:
-    """Read score files to show beside those of a submission that is about to be scored.
+def read_beside(paths: Sequence[str | Path], truth: "RoomsFile | AnswersFile") -> list[ScoreFile]:
+    """Read score files to show beside those of a truth that is about to be scored against.
 
-    Raises BesideError at once where one is of another task, or of a truth that the submission does
-    not name; else as `read_scores`.
+    Raises OtherTruthError where one is of another truth; of those that state no digest, as they
+    were released, `html_report` does. Else as `read_scores`.
     """
     files = [read_scores(path) for path in paths]
-    named = predictions.truth_fingerprint
+    task, digest = stated_truth(truth)
     for file in files:
-        scored = file.meta.truth_fingerprint
-        if file.task != predictions.task or (named and named != scored):
-            found = f"scores of {file.task}, truth {scored[:12]}"
-            expected = f"{predictions.task}, truth {(named or 'any')[:12]}, of {predictions.path}"
-            raise BesideError(file.place, found, expected)
+        require_truth(file, (task, digest or file.truth[1]), truth.path)
     return files
-
-
-def _require_same_truth(scores: ScoreFile, beside: Sequence[ScoreFile]) -> None:
-    """Raise BesideError unless all files are scores of one truth."""
-    expected = scores.task, scores.meta.truth_digest[:12]
-    for file in beside:
-        found = file.task, file.meta.truth_digest[:12]
-        if file.truth != scores.truth:
-            raise BesideError(
-                file.place,
-                "scores of {}, truth of digest {}".format(*found),
-                "{}, truth of digest {}, as of {}".format(*expected, scores.method),
-                "score it again with the same --truth",
-            )
 
 
 def _distributions(scores: ScoreFile) -> Iterator[Chart]:

@@ -15,6 +15,7 @@ from metrics.scoring.estimates import CONFIDENCE, question_skill
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
     HEADLINE,
+    OTHER_SCENE,
     WHOSE,
     in_order,
     metric,
@@ -245,11 +246,12 @@ def title_of(scores: ScoreFile) -> str:
 def notes_of(scores: ScoreFile) -> Iterator[str]:
     """Yield what has to be known to read the tables, and where the scores come from."""
     meta = scores.meta
-    yield from is_floor_of(scores)
+    yield from floor_sentences(scores)
     for warning in (*scores.warnings, *few_clusters(scores)):
         yield f"warning: {warning}"
     if scores.skills:
         yield f"{SKILL} {what_the_floor_is(scores)}"
+    yield from partner_sentences(scores)
     bootstrap = f"{meta.resamples} resamples, seed {meta.seed}"
     if scores.task == "rooms":
         claim = f"alignment: {scores.alignment}"
@@ -284,7 +286,7 @@ def unread_notes(files: Sequence[ScoreFile]) -> list[str]:
     ]
 
 
-def is_floor_of(scores: ScoreFile) -> list[str]:
+def floor_sentences(scores: ScoreFile) -> list[str]:
     """Return a sentence where a method scores what its floor does; else none."""
     headline = [name for name in scores.headline if name in scores.skills]
     names = [name for name in headline if scores.skills[name].is_floor]
@@ -292,14 +294,27 @@ def is_floor_of(scores: ScoreFile) -> list[str]:
     return [f"this method is the floor ({', '.join(floors)}) of {', '.join(names)}"] * bool(names)
 
 
+def partner_sentences(scores: ScoreFile) -> list[str]:
+    """Return a sentence where skills of relief leave out images for want of another scene."""
+    name = "relief_iou"
+    if name not in scores.skills:
+        return []
+    has_score, has_floor = (
+        int(np.isfinite(scores.items[column]).sum()) for column in (name, OTHER_SCENE + name)
+    )
+    why = "no other scene has the view of the others"
+    text = f"skills of relief are over {has_floor} of {has_score} images: {why}"
+    return [text] * (has_floor < has_score)
+
+
 def few_clusters(scores: ScoreFile) -> list[str]:
     """Return a warning where bootstrapped intervals rest on too few scenes or shapes; else none."""
     labels = scores.clusters if scores.task == "rooms" else scores.items.get("shape", scores.ids)
     units = "scenes" if scores.task == "rooms" else "shapes"
-    return too_few(len(np.unique(labels)), units) if scores.meta.resamples else []
+    return too_few_warning(len(np.unique(labels)), units) if scores.meta.resamples else []
 
 
-def too_few(count: int, units: str) -> list[str]:
+def too_few_warning(count: int, units: str) -> list[str]:
     """Return a warning where so many scenes or shapes do not suffice for intervals; else none."""
     if not 1 < count < FEW_CLUSTERS:
         return []

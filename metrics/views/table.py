@@ -61,12 +61,10 @@ class Row:
     Attributes:
         kind: "" for an ordinary row. Rows of other kinds, such as "floor", have their name in
             italics, and LaTeX has a line between kinds.
-        link: address of the page that the row's name leads to; or empty.
     """
 
     cells: tuple[Cell, ...]
     kind: str = ""
-    link: str = ""
 
 
 @dataclass(frozen=True)
@@ -84,9 +82,9 @@ class Table:
     named_by: int = 0
 
 
-def make_row(cells: Iterable[Cell | str], kind: str = "", link: str = "") -> Row:
+def make_row(cells: Iterable[Cell | str], kind: str = "") -> Row:
     """Return a row of cells, of which those without anything but a value are texts."""
-    return Row(tuple(c if isinstance(c, Cell) else Cell(c) for c in cells), kind, link)
+    return Row(tuple(c if isinstance(c, Cell) else Cell(c) for c in cells), kind)
 
 
 def make_table(title: str, head: Sequence[str], rows: Iterable[Iterable[Cell | str]]) -> Table:

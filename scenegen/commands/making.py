@@ -230,10 +230,10 @@ def _print_exposure(out: str) -> None:
 def _set_bytes(out: str) -> int:
     """Return the size of a file of rooms and of its shards, if it has any."""
     from scenegen.files.places import as_place, listing
-    from scenegen.files.sets.shards import set_name
+    from scenegen.files.sets.shards import name_of_set
 
     place = as_place(out)
-    files = [one for one in listing(place.parent) if set_name(one.name) == place.name]
+    files = [one for one in listing(place.parent) if name_of_set(one.name) == place.name]
     return sum(file.stat().st_size for file in (place, *files))
 
 

@@ -51,14 +51,14 @@ def view(
 ) -> None:
     """Show the scenes of a file in 3D, in the browser.
 
-    The page has the true surfels of every view, the meshes of the objects, cameras and lights. It
-    asks for nothing outside this machine. Ctrl-C ends it.
+    The page has the true surfels of every view, the meshes of the objects, and cameras. It asks for
+    nothing outside this machine. Ctrl-C ends it.
     """
     needs("scenegen view", ("viser",), "view")
     from scenegen.common.web_hosts import hosts_of
     from scenegen.rooms.reader import RoomsFile
     from scenegen.viewing.geometry import shapes_of
-    from scenegen.viewing.page import ScenePage, scene_rows
+    from scenegen.viewing.page import RoomsPage, scene_rows
     from scenegen.viewing.server import serve, started
 
     hosts = hosts_of(host, public, names)
@@ -66,7 +66,7 @@ def view(
         scenes = scene_rows(rooms, items)
         shape_of = shapes_of(rooms.spec, **meshes)
         with started(file, hosts, port) as server:
-            ScenePage(server, rooms, shape_of, scenes).show()
+            RoomsPage(server, rooms, shape_of, scenes)
             serve(server, hosts, print_line, open_browser)
 
 

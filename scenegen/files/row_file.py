@@ -15,7 +15,7 @@ CLOSING_SLACK = 8192  # bytes that HDF5 may need to close a file beyond what it 
 
 
 @contextmanager
-def new_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
+def new_hdf5_file(path: str | Path, overwrite: bool = False) -> Iterator[h5py.File]:
     """Open a new HDF5 file, which gets its name when the block ends well, as `written_beside`."""
     with written_beside(path, overwrite) as temporary, new_hdf5(temporary) as file:
         yield file

@@ -136,7 +136,7 @@ def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tu
     return scenes, upload_table(np.concatenate(camera, axis=1))
 
 
-def _cast(kind: Any, values: Any) -> Any:
+def _converted(kind: Any, values: Any) -> Any:
     """Convert to one of Dr.Jit's computed types; its stubs do not say that these are callable."""
     return kind(values)
 
@@ -206,9 +206,9 @@ def _trace(
         total = image if spec.spp % 2 else mi.Vector3f(0)
         image = _sum_of_samples(total, spec.spp // 2 * 2, look, bool(meshes)) / spec.spp
     if spec.image_dtype == "uint8":
-        image = _cast(dr.uint8_array_t(mi.Vector3f), dr.round(dr.clip(image, 0, 1) * 255))
+        image = _converted(dr.uint8_array_t(mi.Vector3f), dr.round(dr.clip(image, 0, 1) * 255))
     elif spec.image_dtype == "float16":
-        image = _cast(dr.float16_array_t(mi.Vector3f), image)
+        image = _converted(dr.float16_array_t(mi.Vector3f), image)
     normal = mi.Vector3f(dr.dot(n, right), dr.dot(n, up), dr.dot(n, back))
     albedo = dr.select(object_id >= 0, reflectance_at(scenes, item, object_id) * own, dr.nan)
     return {
@@ -216,7 +216,7 @@ def _trace(
         "image": list(image),
         "depth": [dr.select(object_id >= 0, t, dr.nan)],
         "normal": list(normal),
-        "object_id": [_cast(dr.int8_array_t(mi.Float), object_id)],
+        "object_id": [_converted(dr.int8_array_t(mi.Float), object_id)],
     }
 
 

@@ -60,7 +60,7 @@ class RoomsWork:
         """Scenes that a worker process makes in one go."""
         return max(1, BLOCK // len(self.spec.views))
 
-    def rows(self, block: Block, workers: int) -> Generator[Packed, None, dict[str, str]]:
+    def packed_rows(self, block: Block, workers: int) -> Generator[Packed, None, dict[str, str]]:
         """Render scenes in order, and meanwhile pack their rows in threads.
 
         Returns why models were refused, by name.

@@ -11,7 +11,7 @@ import h5py
 
 from scenegen.common.errors import FileFormatError
 from scenegen.files.input_file import is_virtual
-from scenegen.files.row_file import new_file
+from scenegen.files.row_file import new_hdf5_file
 from scenegen.layout import WITHHELD
 from scenegen.rooms.reader import INPUT, RoomsFile
 
@@ -39,10 +39,10 @@ def withhold_truth(truth: str | Path, out: str | Path, overwrite: bool = False) 
     Neither the seed nor the command that made the rooms is in it. Its fingerprint and digests are
     those of the truth; whoever guesses preset and seed can make the truth again.
 
-    Raises OSError as `row_file.new_file`, FileFormatError as `RoomsFile`, and where the rooms are a
-    set of shards, or lack their truth themselves.
+    Raises OSError as `row_file.new_hdf5_file`, FileFormatError as `RoomsFile`, and where the rooms
+    are a set of shards, or lack their truth themselves.
     """
-    with RoomsFile(truth) as rooms, new_file(out, overwrite) as file:
+    with RoomsFile(truth) as rooms, new_hdf5_file(out, overwrite) as file:
         source = rooms.opened.file
         if not rooms.has_truth:
             raise FileFormatError(truth, "rooms without truth", "a whole file of rooms")

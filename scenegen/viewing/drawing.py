@@ -1,29 +1,22 @@
-"""Arrays on a 3D page: surfels, meshes, cameras, lights, and the camera that looks at them."""
+"""Arrays on a 3D page: surfels, meshes, cameras, marks, and where a browser looks from."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import Room
-from scenegen.viewing.geometry import Mesh, Surfels
+from scenegen.viewing.geometry import Mesh, Surfels, has_surfel
 
 if TYPE_CHECKING:
-    from viser import ClientHandle, ViserServer
-
-    from scenegen.description.scenes import SceneSpec
+    from viser import ViserServer
 
 Array = NDArray[Any]
 OPENCV = np.diag([1.0, -1.0, -1.0])  # from its axes (y down, z forward) to those of `camera`
 FRUSTUM = 0.12  # scene units
 SHOWN, OTHER = (30, 110, 200), (150, 150, 150)  # colours of cameras
-LIGHT = 0.04  # radius, scene units
-UP = np.array([0.0, 1.0, 0.0])
-NARROW = 576  # pixels; in narrower pages viser puts its controls over the lower part
-FREE = 0.4  # of the height of such a page
+BACK = 2.2  # how many times farther than a view's camera it and a prediction are looked at from
 MARK, MARK_COLOR = "/mark", (220, 0, 160)
 
 
@@ -43,14 +36,15 @@ def draw_surfels(
 
 
 def draw_mesh(server: "ViserServer", mesh: Mesh) -> None:
-    """Draw triangles, each shaded by itself; the room is seen from inside only."""
+    """Draw triangles, each shaded by itself."""
+    corners = mesh.triangles.reshape(-1, 3)
     server.scene.add_mesh_simple(
         f"/meshes/{mesh.object_id}",
-        mesh.triangles.reshape(-1, 3),
-        np.arange(3 * len(mesh.triangles)).reshape(-1, 3),
+        corners,
+        np.arange(len(corners)).reshape(-1, 3),
         color=mesh.color,
         flat_shading=True,
-        side="double" if mesh.object_id else "front",
+        side="double",
     )
 
 
@@ -75,55 +69,27 @@ def draw_camera(
     handle.on_click(lambda _: clicked())
 
 
-def draw_lights(server: "ViserServer", scene: "SceneSpec") -> None:
-    """Draw lights as balls of their colour, the brightest channel full, each with its number."""
-    for k, light in enumerate(scene.lights):
-        color = srgb_bytes(np.array(light.color) / max(*light.color, 1e-12))
-        server.scene.add_icosphere(f"/lights/{k}", LIGHT, color, position=light.position)
-        server.scene.add_label(f"/lights/{k}/label", f"Light {k}")
-
-
-def draw_mark(server: "ViserServer", points: Sequence[Array], size: float) -> None:
-    """Draw a ball of this radius at each point, (3,), and a line from the first to each other."""
+def mark(server: "ViserServer", points: Sequence[Array], size: float) -> None:
+    """Draw a ball of this radius at each point, (3,), in the place of those that were marked."""
+    server.scene.remove_by_name(MARK)
     for k, point in enumerate(points):
         server.scene.add_icosphere(f"{MARK}/{k}", size, MARK_COLOR, position=point)
-    if len(points) > 1:
-        lines = np.array([[points[0], other] for other in points[1:]])
-        server.scene.add_line_segments(
-            f"{MARK}/line", lines, MARK_COLOR, thickness=2.0, thickness_units="screen"
-        )
 
 
-def clear_mark(server: "ViserServer") -> None:
-    """Remove what `draw_mark` drew."""
-    server.scene.remove_by_name(MARK)
+def look_from(server: "ViserServer", room: Room, beside: Array | None) -> None:
+    """Let all browsers look as a view's camera does, at a point at the median depth.
 
-
-@dataclass(frozen=True, eq=False)
-class Look:
-    """A way to look at a scene, with y up.
-
-    Attributes:
-        position, target: points to look from and at, (3,), world.
-        size: width and height of what has to be in view, in heights of the field of view.
+    Args:
+        beside: by how much something else is moved, (3,), that is looked at, too, from farther back
+            and from the middle of both; or None.
     """
-
-    position: Array
-    target: Array
-    fov_y_degrees: float
-    size: tuple[float, float]
-
-
-def look(client: "ClientHandle", how: Look) -> None:
-    """Let a browser look so; with a larger field of view where its page is too narrow for that."""
-    camera = client.camera
-    free = FREE if camera.image_width < NARROW else 1.0
-    larger = max(1.0, how.size[0] / camera.aspect, how.size[1] / free)
-    half = larger * np.tan(np.radians(how.fov_y_degrees) / 2)
-    forward = how.target - how.position
-    right = np.cross(forward, UP)
-    above = np.cross(right, forward) / max(float(np.linalg.norm(right)), 1e-12)  # as long
-    with client.atomic():
-        camera.position = how.position
-        camera.look_at = how.target - (1 - free) * half * above
-        camera.up_direction, camera.fov = UP, float(2 * np.arctan(half))
+    position, back = room.world_from_camera[:3, 3], room.world_from_camera[:3, 2]
+    depth = room.depth[has_surfel(room.depth)]
+    target = position - back * (float(np.median(depth)) if depth.size else 1.0)
+    if beside is not None:
+        target, position = target + beside / 2, target + beside / 2 + BACK * (position - target)
+    cameras: list[Any] = [client.camera for client in server.get_clients().values()]
+    # The initial one is where "Reset view" goes, and that of browsers to come.
+    for camera in (server.initial_camera, *cameras):
+        camera.position, camera.look_at = position, target
+        camera.fov = float(np.radians(room.fov_y_degrees))

@@ -1,7 +1,7 @@
 """What a scene looks like in 3D, as plain arrays: surfels, their colours, meshes, and clicks."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -12,7 +12,7 @@ from scenegen.camera import back_project, pixel_size, transform_points, transfor
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.description.scenes import PlacedObject, SceneSpec
 from scenegen.description.specs import BUILT_IN, DatasetSpec
-from scenegen.objects.scene_mesh import room_mesh, world_from_object
+from scenegen.objects.scene_mesh import world_from_object
 from scenegen.objects.sources import file_objects
 from scenegen.rooms.preview import depth_bytes, id_colors, normal_bytes, srgb_bytes
 from scenegen.rooms.reader import Room
@@ -25,6 +25,9 @@ ShapeOf = Callable[[PlacedObject], Array]  # triangles of its unit shape
 FARTHEST = 1000.0  # scene units; browsers draw nothing beyond
 RIGID_TOLERANCE = 1e-6  # by which R^T R may differ from the identity
 COLORINGS = ("Image", "Depth", "Normal", "Object id")
+GAP = 1.1  # between true and predicted surfels, in widths of the image
+TOO_NEAR, RIGHT, TOO_FAR = (0, 80, 200), (222, 222, 222), (200, 30, 0)
+UNKNOWN = (120, 0, 140)  # the truth has no depth there
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,10 +47,6 @@ class Surfels:
     def of_pixels(self, values: Array) -> Array:
         """Return the values, (H, W, ...), of the points' pixels, (N, ...)."""
         return np.asarray(values[self.pixels[:, 0], self.pixels[:, 1]])
-
-    def moved(self, by: Array) -> "Surfels":
-        """Return the same surfels moved by a vector, (3,), world frame, scene units."""
-        return replace(self, points=(self.points + by).astype(np.float32))
 
 
 def has_surfel(depth: Array) -> Array:
@@ -98,12 +97,37 @@ def pixel_colors(room: Room, coloring: str) -> Array:
     return srgb_bytes(room.radiance)
 
 
+def error_colors(error: Array, full: float) -> Array:
+    """Return colours, (N, 3) uint8, of predicted minus true depths, (N,), NaN where not known.
+
+    Blue is too near, grey is right, red is too far. Errors of `full` scene units and more have the
+    full colour.
+    """
+    finite = np.isfinite(error)
+    place = np.clip(np.where(finite, error, 0.0) / full, -1.0, 1.0)
+    channels = zip(TOO_NEAR, RIGHT, TOO_FAR, strict=True)
+    colors = np.stack([np.interp(place, (-1, 0, 1), channel) for channel in channels], axis=-1)
+    colors[~finite] = UNKNOWN
+    return np.rint(colors).astype(np.uint8)
+
+
+def aside(room: Room) -> Array:
+    """Return by how much a prediction is moved to the right of a view to be beside the truth, (3,).
+
+    World frame, scene units: a little more than the width of what the view shows.
+    """
+    right = room.world_from_camera[:3, 0]
+    across = surfels_of(room).points @ right
+    width = float(np.ptp(across)) if len(across) else 1.0
+    return np.asarray(GAP * width * right)
+
+
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles of one colour.
 
     Attributes:
-        object_id: 0 for the room, k for the k-th object.
+        object_id: k for the k-th object.
         triangles: corners, (F, 3, 3), world frame, counter-clockwise seen from outside.
         color: (3,) uint8, sRGB: its reflectance.
     """
@@ -164,14 +188,11 @@ def thinned(triangles: Array) -> Array:
 
 
 def scene_meshes(scene: SceneSpec, shape_of: ShapeOf) -> tuple[list[Mesh], list[str]]:
-    """Return the room, where there is one, and the objects; and why others are left out.
+    """Return the objects of a scene, and why others are left out.
 
     An object is left out where `shape_of` raises SceneGenError; each reason is told once.
     """
     meshes, reasons = list[Mesh](), dict[str, None]()
-    if scene.room_reflectance is not None:
-        color = srgb_bytes(np.array(scene.room_reflectance))
-        meshes.append(Mesh(0, np.asarray(room_mesh().triangles), color))
     for k, item in enumerate(scene.objects, start=1):
         try:
             triangles = shape_of(item)

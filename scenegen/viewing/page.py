@@ -1,9 +1,12 @@
-"""The 3D page: one scene at a time, controls beside it, and the values of a clicked surfel."""
+"""The 3D page: one scene at a time, controls beside it, and the values of a clicked surfel.
+
+A file of rooms has one, with or without predictions beside the truth.
+"""
 
 import html
 import threading
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -17,10 +20,15 @@ from scenegen.rooms.reader import Room, RoomsFile
 from scenegen.viewing import drawing
 from scenegen.viewing.geometry import (
     COLORINGS,
+    RIGHT,
+    TOO_FAR,
+    TOO_NEAR,
     Mesh,
     ShapeOf,
     Surfels,
+    aside,
     check_camera,
+    error_colors,
     has_surfel,
     hit_by,
     pixel_colors,
@@ -29,40 +37,55 @@ from scenegen.viewing.geometry import (
 )
 
 if TYPE_CHECKING:
-    from viser import ClientHandle, SceneClickEvent, ViserServer
+    from viser import SceneClickEvent, ViserServer
 
 Array = NDArray[Any]
-ALL_VIEWS = "All views"
-LAYERS = {  # controls that show a part of the scene: name, and whether it is shown first
-    "surfels": ("Surfels", True),
-    "meshes": ("Object meshes", True),
-    "room": ("Room mesh", False),
-    "cameras": ("Cameras", True),
-    "lights": ("Lights", True),
+Scenes = Sequence[tuple[int, ...]]  # of each scene the rows of its views
+ALL_VIEWS, ERROR = "All views", "Error of depth"
+TRUTH, PREDICTION = "/truth", "/prediction"  # of the page's tree
+LAYERS = {  # controls that show a part of the scene
+    "truth": "True surfels",
+    "prediction": "Predicted surfels",
+    "beside": "Prediction beside the truth",
+    "meshes": "Object meshes",
+    "cameras": "Cameras",
 }
+OF_PREDICTIONS = ("prediction", "beside")
 MOST_REASONS = 3  # why meshes are missing
 CLICK = 3.0  # pixels of the screen by which a click may miss
 NOTHING_CLICKED = "Click on a surfel to read its values."
-LOOK = "margin:0.4em 0.8em;font-size:0.85em;overflow-wrap:anywhere"
+STYLE = "margin:0.4em 0.8em;font-size:0.85em;overflow-wrap:anywhere"
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """Predictions of the rooms of a file.
+
+    Attributes:
+        orders: scenes from the worst to the best, by the titles of scores.
+        points: returns those of a view, (H, W, 3), camera frame, scene units; NaN for none.
+        normal: returns those of a view, (H, W, 3), camera frame; None where there are none.
+        scores: returns the scores of a row as texts, by their titles; the first is of this title.
+    """
+
+    orders: Mapping[str, Scenes]
+    points: Callable[[Room], Array]
+    normal: Callable[[Room], Array] | None
+    scores: Callable[[int, str], Mapping[str, str]]
 
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
-    """Surfels of a view as they are drawn.
+    """Surfels of a view as they are drawn: `colors` is (N, 3) uint8, sRGB."""
 
-    Attributes:
-        name: where they are in the page's tree, such as "/truth/0".
-        colors: (N, 3) uint8, sRGB.
-    """
-
-    name: str
+    kind: str  # TRUTH or PREDICTION
     room: Room
     surfels: Surfels
     colors: Array
 
 
-class ScenePage:
-    """The page of a file of rooms on a running server, empty until `show` is called.
+class RoomsPage:
+    """The page of a file of rooms on a running server, which shows the first scene.
 
     Every change of a control draws anew, one change at a time.
 
@@ -71,95 +94,68 @@ class ScenePage:
         rooms: whose scenes are shown.
         shape_of: from `geometry.shapes_of`.
         scenes: from `scene_rows`.
+        predicted: what is shown beside the truth; its orders replace that of `scenes`.
 
     Attributes:
         controls: viser's handles by name; what they show is their `value`.
         clouds: what is drawn now.
     """
 
-    scene_label = "Scene"
-    layers = LAYERS
-
     def __init__(
         self,
         server: "ViserServer",
         rooms: RoomsFile,
         shape_of: ShapeOf,
-        scenes: Sequence[tuple[int, ...]],
+        scenes: Scenes,
+        predicted: Predicted | None = None,
     ) -> None:
-        self.scenes = scenes
         self.controls: dict[str, Any] = {}
         self.clouds: list[Cloud] = []
         self._server, self._rooms, self._shape_of = server, rooms, shape_of
+        self._scenes, self._predicted = scenes, predicted
         self._lock, self._drawing = threading.RLock(), False
         self._rows: tuple[int, ...] = ()
         self._views: dict[str, Room] = {}
         self._meshes: list[Mesh] = []
         self._reasons: list[str] = []  # why meshes are missing
-        self._looking: drawing.Look | None = None
-        gui = server.gui
-        self.add("scene", gui.add_slider(self.scene_label, 0, len(scenes) - 1, 1, 0))
-        self.add("view", gui.add_dropdown("View", [ALL_VIEWS]))
+        self._looking: tuple[Any, ...] = ()  # row that is looked at, and whether beside another
+        gui, last = server.gui, len(scenes) - 1
+        if predicted is not None:
+            self._add("sort", gui.add_dropdown("Sort by", list(predicted.orders)))
+        label = "Scene" if predicted is None else "Scene, 0 is the worst"
+        self._add("scene", gui.add_slider(label, 0, last, 1, 0))
+        self._add("view", gui.add_dropdown("View", [ALL_VIEWS]))
         self._about, self._clicked = gui.add_html(""), gui.add_html("")
         with gui.add_folder("What is drawn"):
-            self.add("colour", gui.add_dropdown("Colour of surfels", COLORINGS))
-            self.add("size", gui.add_slider("Size of surfels", 0.1, 4.0, 0.1, 2.0))
-            for name, (label, shown) in self.layers.items():
-                self.add(name, gui.add_checkbox(label, shown))
-        hint = "Moves you to the camera of a view when you choose one."
-        self.add("follow", gui.add_checkbox("Look from each new view", True, hint=hint))
+            colorings = COLORINGS if predicted is None else (ERROR, *COLORINGS)
+            self._add("colour", gui.add_dropdown("Colour of surfels", colorings))
+            if predicted is not None:
+                hint = "Error of depth, in scene units, that has the full colour."
+                full = gui.add_number("Full colour at", 0.05, min=0.001, max=10, hint=hint)
+                self._add("full", full)
+            self._legend = gui.add_html("", visible=False)
+            self._add("size", gui.add_slider("Size of surfels", 0.1, 4.0, 0.1, 2.0))
+            # Cameras would hide predictions, which are looked at from behind them.
+            later = () if predicted is None else ("cameras",)
+            for name, label in LAYERS.items():
+                if predicted is not None or name not in OF_PREDICTIONS:
+                    self._add(name, gui.add_checkbox(label, name not in later))
         gui.add_button("Look from this view").on_click(lambda _: self._look())
         server.scene.on_click()(self._click)
-        server.on_client_connect(lambda client: self._look_again([client]))
+        self.show()
 
-    def add(self, name: str, control: Any) -> Any:
-        """Draw anew whenever this control changes; return it."""
+    def _add(self, name: str, control: Any) -> None:
+        """Draw anew whenever this control changes."""
         self.controls[name] = control
         control.on_update(lambda _: self.show())
-        return control
+
+    def _is_on(self, name: str) -> bool:
+        return name in self.controls and bool(self.controls[name].value)
 
     @property
     def text(self) -> str:
         """What the page says of the scene, as HTML."""
         return str(self._about.content)
-
-    def make_clouds(self, shown: Sequence[Room]) -> list[Cloud]:
-        """Return what to draw of these views."""
-        return [self.truth_cloud(room) for room in shown]
-
-    def truth_cloud(self, room: Room) -> Cloud:
-        """Return the true surfels of a view."""
-        surfels = surfels_of(room)
-        colors = surfels.of_pixels(pixel_colors(room, self.controls["colour"].value))
-        return Cloud(f"/truth/{room.index}", room, surfels, colors)
-
-    def describe(self, shown: Sequence[Room]) -> str:
-        """Return what to say of these views, as HTML: scene, objects, size of the images."""
-        room = shown[0]
-        names = ", ".join(item.shape for item in room.scene.objects) or "none"
-        height, width = room.depth.shape
-        count = len(room.scene.cameras)
-        views = f"{count} views" if count > 1 else "1 view"
-        return paragraph(
-            f"Scene {room.scene.index}: {views} of {width} x {height} pixels. Objects: {names}."
-        )
-
-    def describe_surfel(self, cloud: Cloud, i: int) -> dict[str, str]:
-        """Return what to say of the i-th surfel of a cloud."""
-        room, (y, x) = cloud.room, cloud.surfels.pixels[i]
-        point, normal = cloud.surfels.points[i], room.normal[y, x]
-        return {
-            "depth": f"{room.depth[y, x]:.5f}",
-            "normal": ", ".join(f"{value:.3f}" for value in normal) + " (camera)",
-            "point": ", ".join(f"{value:.4f}" for value in point) + " (world)",
-        }
-
-    def start(self, room: Room) -> drawing.Look:
-        """Return how to look first: from a view's camera, at a point at the median depth."""
-        position, back = room.world_from_camera[:3, 3], room.world_from_camera[:3, 2]
-        depth, (height, width) = room.depth[has_surfel(room.depth)], room.depth.shape
-        target = position - back * (float(np.median(depth)) if depth.size else 1.0)
-        return drawing.Look(position, target, room.fov_y_degrees, (width / height, 1.0))
 
     def show(self) -> None:
         """Draw what the controls say."""
@@ -173,32 +169,31 @@ class ScenePage:
             except (SceneGenError, OSError) as error:
                 self._server.scene.reset()
                 self._rows, self._views, self.clouds = (), {}, []
-                self._about.content = paragraph(f"This scene cannot be shown. {error}")
+                self._about.content = _paragraph(f"This scene cannot be shown. {error}")
             finally:
                 self._drawing = False
 
     def _update(self) -> None:
-        rows = self.scenes[min(max(self.controls["scene"].value, 0), len(self.scenes) - 1)]
+        scenes = self._scenes
+        if self._predicted is not None:
+            scenes = self._predicted.orders[self.controls["sort"].value]
+            if scenes is not self._scenes:  # sorted by another score
+                self._scenes, self.controls["scene"].value = scenes, 0
+        rows = scenes[min(max(self.controls["scene"].value, 0), len(scenes) - 1)]
         if rows != self._rows:
             rooms = [self._rooms[row] for row in rows]
             for room in rooms:
                 check_camera(room)
-            self._rows, self._views = rows, {view_label(room): room for room in rooms}
+            self._rows, self._views = rows, {_view_label(room): room for room in rooms}
             self._meshes, self._reasons = scene_meshes(rooms[0].scene, self._shape_of)
             names = list(self._views)
             self.controls["view"].options = [*names, *([ALL_VIEWS] if len(names) > 1 else [])]
             self.controls["view"].value = names[0]
         shown = self._shown()
         self._draw(shown)
-        reasons = self._reasons[:MOST_REASONS]
-        missing = "".join(paragraph(f"No mesh: {reason}.") for reason in reasons)
-        self._about.content = self.describe(shown) + missing
-        self._clicked.content = paragraph(NOTHING_CLICKED)
-        start, last = self.start(shown[0]), self._looking
-        same = last is not None and np.array_equal(
-            (start.position, start.target), (last.position, last.target)
-        )
-        if self.controls["follow"].value and not same:
+        self._about.content = self._description(shown)
+        self._clicked.content = _paragraph(NOTHING_CLICKED)
+        if self._looking != (shown[0].index, self._is_beside()):
             self._look()
 
     def _shown(self) -> list[Room]:
@@ -207,19 +202,67 @@ class ScenePage:
 
     def _draw(self, shown: Sequence[Room]) -> None:
         """Draw these views in the place of all that was drawn."""
-        is_on = {name: self.controls[name].value for name in LAYERS}
         self._server.scene.reset()
-        self.clouds = self.make_clouds(shown) if is_on["surfels"] else []
+        self.clouds = [cloud for room in shown for cloud in self._clouds_of(room)]
         for cloud in self.clouds:
-            size = self.controls["size"].value
-            drawing.draw_surfels(self._server, cloud.name, cloud.surfels, cloud.colors, size)
-        for mesh in self._meshes:
-            if is_on["meshes" if mesh.object_id else "room"]:
-                drawing.draw_mesh(self._server, mesh)
-        for label, room in self._views.items() if is_on["cameras"] else ():
+            name, size = f"{cloud.kind}/{cloud.room.index}", self.controls["size"].value
+            drawing.draw_surfels(self._server, name, cloud.surfels, cloud.colors, size)
+        for mesh in self._meshes if self._is_on("meshes") else ():
+            drawing.draw_mesh(self._server, mesh)
+        for label, room in self._views.items() if self._is_on("cameras") else ():
             drawing.draw_camera(self._server, room, room in shown, partial(self._choose, label))
-        if is_on["lights"]:
-            drawing.draw_lights(self._server, shown[0].scene)
+
+    def _clouds_of(self, room: Room) -> list[Cloud]:
+        """Return the true surfels of a view, and the predicted ones."""
+        coloring, clouds = self.controls["colour"].value, list[Cloud]()
+        if self._is_on("truth"):
+            surfels = surfels_of(room)
+            pixels = pixel_colors(room, "Image" if coloring == ERROR else coloring)
+            clouds.append(Cloud(TRUTH, room, surfels, surfels.of_pixels(pixels)))
+        if self._predicted is None:
+            return clouds
+        full = self.controls["full"].value
+        self._legend.content, self._legend.visible = _legend(full), coloring == ERROR
+        if self._is_on("prediction"):
+            points = self._predicted.points(room)
+            surfels = surfels_of(room, points)
+            if coloring == ERROR:
+                colors = error_colors(surfels.of_pixels(-points[..., 2] - room.depth), full)
+            else:
+                colors = surfels.of_pixels(pixel_colors(self._with_normal(room), coloring))
+            if self._is_beside():
+                moved = (surfels.points + aside(room)).astype(np.float32)
+                surfels = replace(surfels, points=moved)
+            clouds.append(Cloud(PREDICTION, room, surfels, colors))
+        return clouds
+
+    def _with_normal(self, room: Room) -> Room:
+        """Return a view with the predicted normals in the place of its own, where there are any."""
+        if self._predicted is None or self._predicted.normal is None:
+            return room
+        normal = self._predicted.normal(room)
+        length = np.linalg.norm(normal, axis=-1, keepdims=True)
+        return replace(room, normal=np.nan_to_num(normal / np.where(length > 0, length, 1.0)))
+
+    def _is_beside(self) -> bool:
+        return all(map(self._is_on, ("truth", "prediction", "beside")))
+
+    def _description(self, shown: Sequence[Room]) -> str:
+        """Return what to say of these views, as HTML: scene, objects, scores, missing meshes."""
+        scene, (height, width) = shown[0].scene, shown[0].depth.shape
+        names = ", ".join(item.shape for item in scene.objects) or "none"
+        views = f"{len(scene.cameras)} views" if len(scene.cameras) > 1 else "1 view"
+        size = f"{views} of {width} x {height} pixels"
+        parts = [_paragraph(f"Scene {scene.index}: {size}. Objects: {names}.")]
+        if self._predicted is not None:
+            for room in shown:
+                lines = dict(self._predicted.scores(room.index, self.controls["sort"].value))
+                absent = np.count_nonzero(~has_surfel(-self._predicted.points(room)[..., 2]))
+                if absent:
+                    lines["Not shown"] = f"{absent} pixels whose depth is no place in view"
+                parts += [_paragraph(_view_label(room)), _table(lines)]
+        parts += [_paragraph(f"No mesh: {reason}.") for reason in self._reasons[:MOST_REASONS]]
+        return "".join(parts)
 
     def _choose(self, label: str) -> None:
         self.controls["view"].value = label
@@ -227,15 +270,8 @@ class ScenePage:
 
     def _look(self) -> None:
         for room in self._shown()[:1]:
-            self._looking = how = self.start(room)
-            first = self._server.initial_camera  # where "Reset view" goes
-            first.position, first.look_at, first.up = how.position, how.target, drawing.UP
-            self._look_again(self._server.get_clients().values())
-
-    def _look_again(self, clients: Iterable["ClientHandle"]) -> None:
-        if self._looking is not None:
-            for client in clients:
-                drawing.look(client, self._looking)
+            self._looking = room.index, self._is_beside()
+            drawing.look_from(self._server, room, aside(room) if self._is_beside() else None)
 
     def _click(self, event: "SceneClickEvent") -> None:
         """Mark the surfel that a click hits first, and its pixel in other clouds; describe it."""
@@ -245,9 +281,9 @@ class ScenePage:
         with self._lock:
             hits = [(hit_by(cloud.surfels, *ray, angle), cloud) for cloud in self.clouds]
             near = [(hit[1], hit[0], cloud) for hit, cloud in hits if hit is not None]
-            drawing.clear_mark(self._server)
-            self._clicked.content = paragraph(NOTHING_CLICKED)
             if not near:
+                drawing.mark(self._server, [], 0.0)
+                self._clicked.content = _paragraph(NOTHING_CLICKED)
                 return
             _, i, cloud = min(near, key=lambda hit: hit[0])
             y, x = cloud.surfels.pixels[i]
@@ -256,10 +292,28 @@ class ScenePage:
                 if other is not cloud and other.room is cloud.room:
                     there = (other.surfels.pixels == (y, x)).all(axis=1)
                     points += list(other.surfels.points[there])
-            drawing.draw_mark(self._server, points, cloud.surfels.spacing)
-            lines = {"view": view_label(cloud.room), "pixel": f"row {y}, column {x}"}
-            lines["object"] = object_name(cloud.room, int(cloud.room.object_id[y, x]))
-            self._clicked.content = table(lines | self.describe_surfel(cloud, i))
+            drawing.mark(self._server, points, cloud.surfels.spacing)
+            self._clicked.content = _table(self._pixel_lines(cloud.room, int(y), int(x)))
+
+    def _pixel_lines(self, room: Room, y: int, x: int) -> dict[str, str]:
+        """Return what to say of a pixel of a view, true and predicted, by title."""
+        depth, point = float(room.depth[y, x]), room.points_world[y, x]
+        lines = {
+            "view": _view_label(room),
+            "pixel": f"row {y}, column {x}",
+            "object": _object_name(room, int(room.object_id[y, x])),
+            "depth": f"{depth:.5f}",
+            "normal": ", ".join(f"{value:.3f}" for value in room.normal[y, x]) + " (camera)",
+            "point": ", ".join(f"{value:.4f}" for value in point) + " (world)",
+        }
+        if self._predicted is not None:
+            predicted = -float(self._predicted.points(room)[y, x, 2])
+            lines["predicted depth"] = f"{predicted:.5f}"
+            lines["difference"] = f"{predicted - depth:+.5f}"
+            if self._predicted.normal is not None:
+                normal = self._predicted.normal(room)[y, x]
+                lines["predicted normal"] = ", ".join(f"{value:.3f}" for value in normal)
+        return lines
 
 
 def scene_rows(rooms: RoomsFile, items: Sequence[int] | None = None) -> list[tuple[int, ...]]:
@@ -277,29 +331,34 @@ def scene_rows(rooms: RoomsFile, items: Sequence[int] | None = None) -> list[tup
     return [tuple(views) for views in scenes.values()]
 
 
-def view_label(room: Room) -> str:
-    """Return the name of a view for the list of views."""
+def _view_label(room: Room) -> str:
     return f"View {room.view_index}, row {room.index}"
 
 
-def object_name(room: Room, object_id: int) -> str:
-    """Return an object id in words."""
+def _object_name(room: Room, object_id: int) -> str:
     if object_id < 1:
         return "0, the room" if object_id == 0 else "nothing"
     items = room.scene.objects[object_id - 1 : object_id]
     return ", ".join([str(object_id), *(item.shape for item in items)])
 
 
-def paragraph(text: str) -> str:
+def _paragraph(text: str) -> str:
     """Return a text as a paragraph of HTML; names in it may come from other people's files."""
-    return f'<p style="{LOOK}">{html.escape(printable(text))}</p>'
+    return f'<p style="{STYLE}">{html.escape(printable(text))}</p>'
 
 
-def table(lines: Mapping[str, str]) -> str:
+def _table(lines: Mapping[str, str]) -> str:
     """Return names and values as a table in HTML."""
     rows = "".join(
         f'<tr><th scope="row" style="text-align:left;padding-right:0.8em">'
         f"{html.escape(name)}</th><td>{html.escape(printable(text))}</td></tr>"
         for name, text in lines.items()
     )
-    return f'<table style="{LOOK}">{rows}</table>'
+    return f'<table style="{STYLE}">{rows}</table>'
+
+
+def _legend(full: float) -> str:
+    """Return the colours of errors and their limit, in scene units, as HTML."""
+    stops = ", ".join(f"rgb{color}" for color in (TOO_NEAR, RIGHT, TOO_FAR))
+    bar = f'<div style="height:0.8em;background:linear-gradient(to right, {stops})"></div>'
+    return f'<div style="{STYLE}">{bar}{full:g} too near, right, {full:g} too far</div>'

@@ -26,13 +26,11 @@ def served(rooms):
     """Serve a page of a file of rooms; give it and its server."""
     from scenegen.common.web_hosts import Hosts
     from scenegen.viewing.geometry import shapes_of
-    from scenegen.viewing.page import ScenePage, scene_rows
+    from scenegen.viewing.page import RoomsPage, scene_rows
     from scenegen.viewing.server import started
 
     with started("test", Hosts(), 0) as server:
-        page = ScenePage(server, rooms, shapes_of(rooms.spec), scene_rows(rooms))
-        page.show()
-        yield page, server
+        yield RoomsPage(server, rooms, shapes_of(rooms.spec), scene_rows(rooms)), server
 
 
 def visited(visit, server):

@@ -62,7 +62,7 @@ def sample_sheet(
         one_hot[i, i % len(card.classes) if label is None else card.classes.index(label)] = 1
     items = np.arange(count)
     positions = sample_cameras(replace(spec, views=(0.0,)), items)[:, 0]
-    views = known_views(spec, positions, *sample_lights(spec, items)[1:], one_hot)
+    views = unrendered_views(spec, positions, *sample_lights(spec, items)[1:], one_hot)
     source = torch.Generator().manual_seed(item_seed(seed, 0, Purpose.PICTURES))
     noise = torch.randn(count, model.config.networks.z, generator=source)
     tiles = drawn(model, model.prior(noise, views.condition), views)
@@ -119,7 +119,7 @@ def turned(world_from_camera: Array, spec: DatasetSpec, degrees: float) -> Camer
     return Camera((place[0], place[1], place[2]), spec.camera_target, spec.fov_y_degrees)
 
 
-def known_views(
+def unrendered_views(
     spec: DatasetSpec, positions: Array, light_position: Array, light_color: Array, one_hot: Array
 ) -> Views:
     """Return the cameras, lights and reflectance of views that were never rendered.

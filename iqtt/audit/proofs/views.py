@@ -156,7 +156,9 @@ def _difference(questions: QuestionsFile, row: int, count: int) -> str:
     for k in range(len(images)):
         used = slice(0, int(lights[k]))
         lamps_used = light_position[k, used], light_color[k, used]
-        hit, face, radiance, sure = _cast(spec, distance, cubes[k, :count], views[k], *lamps_used)
+        hit, face, radiance, sure = _first_hits(
+            spec, distance, cubes[k, :count], views[k], *lamps_used
+        )
         shown = np.bincount(hit[hit >= 0], minlength=count)
         unsure = np.count_nonzero(~sure)
         if np.abs(shown - visible[k, :count]).max() > unsure:
@@ -182,7 +184,7 @@ def _least_difference(color: Array, label: Array) -> float:
     return float(min(gaps, default=np.inf))
 
 
-def _cast(
+def _first_hits(
     spec: SplitSpec,
     distance: float,
     cubes: Array,

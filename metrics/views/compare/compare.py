@@ -9,6 +9,7 @@ first.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,36 +126,28 @@ def compare(
         allow_incomparable: compare files that say that they are not comparable, over the rows that
             all of them hold.
 
-    Raises ComparisonError where the files do not belong together, and UnknownMetricError.
+    Raises OtherTruthError and ComparisonError where the files do not belong together, and
+    UnknownMetricError.
     """
     names = require_same_test(files, metrics, allow_incomparable)
     orders = common_rows(files)
     clusters = files[0].clusters[orders[0]]
-    shapes = files[0].items.get("shape", files[0].ids)[orders[0]]  # of questions
     labels = labels_of(files)
     pairs = [(name, i) for name in names for i in range(1, len(files))]
 
     def difference(name: str, i: int) -> Difference:
-        a, b, there = pair(files[i], files[0], name, (orders[i], orders[0]))
-        scenes = clusters[there]
-        apart = cluster_means(a - b, scenes)
-        # What is independent, for intervals and for tests: scenes, and shapes that are asked about.
-        means = sums = apart
-        if files[0].task == "iqtt":
-            means = linearised_means(apart, shapes[there])[:, 0]
-            index = np.unique(shapes[there], return_inverse=True)[1]
-            sums = np.bincount(index, apart).astype(np.float64)
-        ends = bootstrap_interval(means[:, None], seed, resamples, CONFIDENCE)
-        low, high = (None if math.isnan(end) else float(end) for (end,) in ends)
+        paired = _paired(files[i], files[0], name, (orders[i], orders[0]))
+        a, b, apart = paired.values, paired.reference_values, paired.apart
+        low, high = _interval(paired.means, seed, resamples)
         better = apart if metric(name).higher_is_better else -apart
         exact = files[0].task == "iqtt" and files[i].runs == files[0].runs == 1
-        exact = exact and len(means) == len(apart)
-        p_value = mcnemar_exact(a == 1.0, b == 1.0) if exact else sign_flip_test(sums, seed)
+        exact = exact and len(paired.means) == len(apart)
+        p_value = mcnemar_exact(a == 1.0, b == 1.0) if exact else sign_flip_test(paired.sums, seed)
         return Difference(
             metric=name,
             method=labels[i],
-            value=float(cluster_means(a, scenes).mean()),
-            reference_value=float(cluster_means(b, scenes).mean()),
+            value=float(cluster_means(a, paired.clusters).mean()),
+            reference_value=float(cluster_means(b, paired.clusters).mean()),
             difference=float(apart.mean()),
             low=low,
             high=high,
@@ -164,7 +157,7 @@ def compare(
             wins=int(np.count_nonzero(better > 0.0)),
             losses=int(np.count_nonzero(better < 0.0)),
             ties=int(np.count_nonzero(better == 0.0)),
-            smallest=_smallest(means, exact, ALPHA / len(pairs)),
+            smallest=_smallest(paired.means, exact, ALPHA / len(pairs)),
         )
 
     differences = [difference(name, i) for name, i in pairs]
@@ -184,6 +177,56 @@ def compare(
         seed=seed,
         resamples=resamples,
     )
+
+
+def difference_interval(
+    file: ScoreFile, reference: ScoreFile, name: str
+) -> tuple[float | None, float | None]:
+    """Return the interval of a paired difference in a score, as `Difference` has it.
+
+    Raises ComparisonError as `compare` for two files of one test set.
+    """
+    of_reference, order = common_rows([reference, file])
+    paired = _paired(file, reference, name, (order, of_reference))
+    return _interval(paired.means, 0, RESAMPLES)
+
+
+class _Paired(NamedTuple):
+    """A score of a method and of the reference, over the M rows that have it.
+
+    Attributes:
+        values, reference_values, clusters: of each row, (M,).
+        apart: differences of scenes, or of questions, (S,).
+        means, sums: differences of what is independent, for intervals and for tests: of scenes, or
+            of shapes that are asked about.
+    """
+
+    values: Array
+    reference_values: Array
+    clusters: NDArray[np.int64]
+    apart: Array
+    means: Array
+    sums: Array
+
+
+def _paired(
+    file: ScoreFile, reference: ScoreFile, name: str, orders: tuple[NDArray[np.int64], ...]
+) -> _Paired:
+    """Return a score of two files; `orders` are from `common_rows`. Raises as `pair`."""
+    a, b, there = pair(file, reference, name, orders)
+    clusters = reference.clusters[orders[1]][there]
+    apart = cluster_means(a - b, clusters)
+    if reference.task == "rooms":
+        return _Paired(a, b, clusters, apart, apart, apart)
+    shapes = reference.items.get("shape", reference.ids)[orders[1]][there]
+    index = np.unique(shapes, return_inverse=True)[1]
+    sums = np.bincount(index, apart).astype(np.float64)
+    return _Paired(a, b, clusters, apart, linearised_means(apart, shapes)[:, 0], sums)
+
+
+def _interval(means: Array, seed: int, resamples: int) -> tuple[float | None, float | None]:
+    low, high = bootstrap_interval(means[:, None], seed, resamples, CONFIDENCE)
+    return (None, None) if math.isnan(low[0]) else (float(low[0]), float(high[0]))
 
 
 def _smallest(apart: Array, exact: bool, alpha: float) -> float | None:

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from metrics.measures.checks import LARGEST_MAGNITUDE
 from metrics.scoring.metric_names import EMPTY_ROOM, HEADLINE, OF_TRUTH, changed, metric
 from metrics.scoring.records import ID_COLUMNS, ScoreFile
+from metrics.scoring.truth_digests import require_truth
 from scenegen.common.errors import SceneGenError
-from scenegen.common.text_table import plain
 
 Array = NDArray[np.float64]
 IDS_SHOWN = 5
@@ -27,24 +27,14 @@ def require_same_test(
 ) -> tuple[str, ...]:
     """Return the names of the scores to compare, if the files are of one test set.
 
-    Raises ComparisonError where they are not, or where one of them says that it is not comparable
-    and that is not allowed, and UnknownMetricError.
+    Raises OtherTruthError where they are not, ComparisonError where one of them says that it is not
+    comparable and that is not allowed, and UnknownMetricError.
     """
     if len(files) < 2:
         raise ComparisonError("comparison", f"{len(files)} score file", "two or more")
     first = files[0]
     for file in files:
-        for what, theirs, ours in (
-            ("task", file.task, first.task),
-            ("truth of digest", file.meta.truth_digest, first.meta.truth_digest),
-        ):
-            if file.truth != first.truth and theirs != ours:
-                raise ComparisonError(
-                    file.place,
-                    f"scores of {what} {plain(theirs)[:12]}",
-                    f"{plain(ours)[:12]} as in {first.place}",
-                    "only scores of one test set compare: score all submissions with one --truth",
-                )
+        require_truth(file, first.truth, first.place)
         if not file.comparable and not allow_incomparable:
             why = "; ".join(file.warnings) or "not comparable"
             raise ComparisonError(

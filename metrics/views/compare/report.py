@@ -2,12 +2,14 @@
 
 import json
 from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
 
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
+from metrics.submissions.reader import RoomPredictions, open_predictions
 from metrics.views.at_hand import submission_at_hand, truth_at_hand
 from metrics.views.compare.compare import (
     ALPHA,
@@ -36,13 +38,14 @@ from metrics.views.score_tables import (
     floor_text,
     labels_of,
     score_cell,
-    too_few,
+    too_few_warning,
     unread_notes,
     what_the_floor_is,
 )
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import Interval, number
+from scenegen.rooms.reader import RoomsFile
 
 FORMAT_NAME = "pix2shape-bench/comparison"
 FORMAT_VERSION = "1.0"
@@ -187,7 +190,10 @@ def _legend(comparison: Comparison) -> list[str]:
         f"better/worse/same: {items}. p: {test}, two-sided; Holm: corrected for {comparisons}.",
         f"least shown: what this test set would show in {POWER:.0%} of cases after the correction,"
         " as the differences spread here; none: no difference, or none can be told.",
-        *(f"warning: {text}" for text in (too_few(comparison.clusters, "scenes") if rooms else ())),
+        *(
+            f"warning: {text}"
+            for text in (too_few_warning(comparison.clusters, "scenes") if rooms else ())
+        ),
     ]
 
 
@@ -306,12 +312,19 @@ def _examples(
     names = (comparison.reference, *comparison.methods)
     score, labels = metric(name), [names[i] for i, path in enumerate(paths) if path is not None]
     chosen = chosen_scenes(reference.clusters[orders[0]], apart, score.higher_is_better)
+    with ExitStack() as stack:
+        rooms = stack.enter_context(RoomsFile(where))
+        opened = [stack.enter_context(open_predictions(path)) for _, path in there]
+        seen_in = {
+            place: [
+                list(room_examples(file, rooms, predictions, order[entries].tolist()))
+                for (file, _), predictions, order in zip(there, opened, orders, strict=True)
+                if isinstance(predictions, RoomPredictions)
+            ]
+            for place, entries in chosen.items()
+        }
     lists: Lists = []
     for place, entries in chosen.items():
-        seen = [
-            room_examples(file, where, path, order[entries].tolist())
-            for (file, path), order in zip(there, orders, strict=True)
-        ]
         scenes = f"{len(entries)} scenes" if len(entries) > 1 else "1 scene"
         title = f"{scenes} by the difference in {score.title}, {_LISTS[place]}: "
         examples = [
@@ -320,7 +333,7 @@ def _examples(
                 f"{score.title} {apart[entry]:+.4g}",
                 list(_side_by_side(views, labels)),
             )
-            for entry, *views in zip(entries, *seen, strict=True)
+            for entry, *views in zip(entries, *seen_in[place], strict=True)
         ]
         lists.append((title + f"{labels[1]} against {labels[0]}", examples))
     return lists

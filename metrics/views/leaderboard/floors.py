@@ -1,16 +1,14 @@
 """Floors beside scores: the empty room, guesses, chance, and probes that know nothing of 3D."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 
 from metrics.score_file import SCORE_AGAIN
 from metrics.scoring.metric_names import EMPTY_ROOM, RELIEF, WHOSE
 from metrics.scoring.records import ScoreFile
-from metrics.views.by_angle import angle_floors
 from metrics.views.leaderboard.rows import Cells
 from metrics.views.score_tables import floor_text
-from metrics.views.table import Cell, Table, make_table
+from metrics.views.table import Cell
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import number
 
@@ -38,22 +36,6 @@ def floor_cells(file: ScoreFile, names: Sequence[str]) -> Cells:
                 row[name] = file.skills[name].floor
     if file.task == "iqtt" and not any(label.startswith(CHANCE) for label in rows):
         rows[CHANCE] = {"iqtt_accuracy": 1.0 / file.meta.counts["answers"]}
-    return _shown(rows)
-
-
-def floor_cells_of_groups(file: ScoreFile, name: str, keys: Sequence[str]) -> Cells:
-    """Return the floors of a score by view angle, or by kind of question."""
-    if file.task == "rooms":
-        values = angle_floors(file, name) if is_shared(name) else {}
-        return _shown({FLOOR + WHOSE[str(file.floor_of(name))]: values} if values else {})
-    floors = file.question_floors
-    best = {kind: floors[kind].accuracy for kind in keys if kind in floors}
-    chance = dict.fromkeys(keys, 1.0 / file.meta.counts["answers"])
-    same = all(best[kind] == chance[kind] for kind in best)
-    return _shown({CHANCE: chance} if same else {f"{FLOOR}best": best, CHANCE: chance})
-
-
-def _shown(rows: Mapping[str, Mapping[str, float]]) -> Cells:
     return {
         label: {key: Cell(number(value)) for key, value in row.items()}
         for label, row in rows.items()
@@ -90,20 +72,3 @@ def _stated(file: ScoreFile) -> dict[str, float]:
         for name, skill in file.skills.items()
         if is_shared(name)
     }
-
-
-def floors_table(files: Sequence[ScoreFile]) -> Table | None:
-    """Return the best probe on each kind of question in these files; None if none is known."""
-    floors = {kind: floor for file in files for kind, floor in file.question_floors.items()}
-    if not floors:
-        return None
-    rows = [
-        (kind, Cell(number(f.accuracy), f"± {f.error:.3f}"), f.probe, f"{f.questions:,}")
-        for kind, f in floors.items()
-    ]
-    note = (
-        "Fraction of right answers of the best probe without 3D, with its standard error, on"
-        " questions of the same settings about training shapes: docs/results.md."
-    )
-    head = ("kind", "floor", "probe", "questions")
-    return replace(make_table("3D-IQTT: floors by kind of question", head, rows), notes=(note,))

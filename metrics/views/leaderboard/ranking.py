@@ -6,9 +6,8 @@ and so do floors and the paper's figures, which were measured on the authors' da
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -17,15 +16,11 @@ from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import HEADLINE, OBJECT_SCORES, metric
 from metrics.scoring.records import ID_COLUMNS, Score, ScoreFile, Skill, Task
 from metrics.submissions.layout import Shown
-from metrics.views.by_angle import angle_floors
-from metrics.views.compare.compare import Comparison, compare
-from metrics.views.compare.pairing import ComparisonError
+from metrics.views.compare.compare import difference_interval
 from metrics.views.leaderboard.cards import VIEWS_SEEN, Card, card_cells
 from metrics.views.leaderboard.floors import (
     SKILL_OF,
     floor_cells,
-    floor_cells_of_groups,
-    floors_table,
     is_shared,
     own_floors,
     require_same_floors,
@@ -36,28 +31,25 @@ from metrics.views.leaderboard.rows import (
     Entry,
     build_table,
     figure_cells,
-    paper_table,
     score_column,
     skill_column,
 )
+from metrics.views.page import Section, html_page
 from metrics.views.paper import PAPER_KIND, TABLES, Figure
 from metrics.views.score_tables import (
     INTERVAL,
     SKILL,
     few_clusters,
-    is_floor_of,
+    floor_sentences,
     labels_of,
-    too_few,
+    too_few_warning,
     what_the_floor_is,
 )
 from metrics.views.table import Table
 from scenegen.common.errors import SceneGenError
-from scenegen.common.text_table import by_number, plain
+from scenegen.common.text_table import plain
 
-Paper = Literal["all", "task", "none"]
 WIDEST = 6  # columns of scores in one table
-ANGLES = "Angle between each view and its scene's first one."
-KINDS = 'Kinds of wrong answers; "-2" ends those of questions with two answers.'
 AS_RANKED = "Rows as in the ranking."
 # Ranks methods that see a scene's first view alone. Others look at what it asks for.
 BEHIND = "behind_depth_error"
@@ -78,72 +70,59 @@ class Ranking:
     Attributes:
         entries: the methods, best first; those that are not comparable come last.
         tables: the ranking; where it would be too wide, that of skills, then the scores.
-        groups: scores by view angle, or by kind of question.
-        comparison: of the comparable methods with the first one, where it was asked for.
         mute: why the test set cannot tell methods apart, so that none has a rank; or empty.
     """
 
-    title: str
     entries: tuple[Entry, ...]
     tables: tuple[Table, ...]
-    groups: tuple[Table, ...]
-    comparison: Comparison | None = None
     mute: str = ""
-
-    @property
-    def files(self) -> list[ScoreFile]:
-        """The score files, best first."""
-        return [entry.file for entry in self.entries]
 
 
 def leaderboard(
     files: Sequence[ScoreFile],
     metrics: Sequence[str] | None = None,
     *,
-    paper: Paper = "task",
+    paper: bool = True,
     headline: bool = False,
     cards: Mapping[str, Card] | None = None,
 ) -> tuple[Table, ...]:
-    """Return the tables of all test sets, and then those that belong to none; see `rankings`.
+    """Return the tables of all test sets; see `rankings`.
 
     With `headline` it is the ranking of each test set alone.
     """
-    ranked, others = rankings(files, metrics, paper=paper, cards=cards)
-    if headline:
-        return tuple(ranking.tables[0] for ranking in ranked)
-    tables = [table for ranking in ranked for table in (*ranking.tables, *ranking.groups)]
-    return (*tables, *others)
+    ranked = rankings(files, metrics, paper=paper, cards=cards)
+    most = 1 if headline else None
+    return tuple(table for ranking in ranked for table in ranking.tables[:most])
+
+
+def to_html(tables: Sequence[Table]) -> str:
+    """Return the tables of a leaderboard as one page, whose columns are sorted at a click."""
+    sections = [Section(table.title, tables=[table]) for table in tables]
+    return html_page("Leaderboard", sections, sortable=True)
 
 
 def rankings(
     files: Sequence[ScoreFile],
     metrics: Sequence[str] | None = None,
     *,
-    paper: Paper = "task",
-    tested: bool = False,
-    links: Mapping[int, str] | None = None,
+    paper: bool = True,
     cards: Mapping[str, Card] | None = None,
-) -> tuple[list[Ranking], list[Table]]:
-    """Return what is shown of each test set, in the order of the files, and further tables.
+) -> list[Ranking]:
+    """Return what is shown of each test set, in the order of the files.
 
     The digest of its truth tells a test set, wherever its file lay and whatever made it. Methods
-    that were shown different views of a scene have rankings of their own. Further tables have what
-    probes reached on the kinds of questions, and the paper's own tables.
+    that were shown different views of a scene have rankings of their own.
 
     Args:
         files: any number, of any test sets.
         metrics: the scores to show; the first one ranks. A task that has none of them, or any task
             if they are None, shows `metric_names.HEADLINE`, skills before the scores themselves.
-        paper: which of the paper's figures to show: "none"; or those of the shown scores in each
-            ranking, and the paper's tables of which some figure found no place, "all" of them or
-            those of the files' tasks.
-        tested: whether to compare the methods with the first one.
-        links: addresses of the methods' own pages, by the id of the score file.
-        cards: what is known of methods, by their names; shown in the rankings.
+        paper: whether the paper's figures of the shown scores stand below each ranking.
+        cards: what is known of methods, by their names.
 
     Raises LeaderboardError where a file is given twice or files that claim to score all of one test
-    set score different rows of it, FloorError where they state different floors of it, and
-    UnknownMetricError.
+    set score different rows of it, FloorError where they state different floors of it,
+    ComparisonError where they disagree about its scenes, and UnknownMetricError.
     """
     _require_once(files)
     tasks = {name: metric(name).task for name in metrics or ()}
@@ -151,8 +130,7 @@ def rankings(
     for file in files:
         key = (file.truth, file.shown_of_several, file.older)
         groups.setdefault(key, []).append(file)
-    ranked: list[Ranking] = []
-    placed: set[Figure] = set()
+    ranked = []
     for (truth, seen, older), members in groups.items():
         task = truth[0]
         together = [file for file in files if (file.truth, file.older) == (truth, older)]
@@ -163,18 +141,9 @@ def rankings(
         headline = [n for n in behind_first if n != BEHIND or seen in ("first_view", "no_view")]
         there = [n for n in headline if any(n in file.metrics for file in members)]
         columns = _columns(members, names or there or HEADLINE[task][:1], headline=not names)
-        figures = [] if paper == "none" else _figures(members, columns)
-        ranking, used = _ranking(members, files, columns, figures, tested, links or {}, cards or {})
-        ranked.append(ranking)
-        placed.update(used)
-    others = [table] if (table := floors_table(files)) else []
-    if paper != "none":
-        shown = {file.task for file in files if paper == "task"} or {"rooms", "iqtt"}
-        for source in TABLES:
-            kept = tuple(f for f in source.figures if metric(f.metric).task in shown)
-            if not placed.issuperset(kept):
-                others.append(paper_table(replace(source, figures=kept)))
-    return ranked, others
+        figures = _figures(members, columns) if paper else []
+        ranked.append(_ranking(members, files, columns, figures, cards or {}))
+    return ranked
 
 
 def _require_once(files: Sequence[ScoreFile]) -> None:
@@ -221,8 +190,8 @@ def _figures(files: Sequence[ScoreFile], columns: Mapping[str, Column]) -> list[
     """Return the paper's figures of the shown scores; none beside other kinds of questions."""
     if any(set(file.by_distractor) - {PAPER_KIND} for file in files):
         return []
-    tables = [table for table in TABLES if not table.ablation]
-    return [f for table in tables for f in table.figures if f.metric in columns]
+    figures = [f for table in TABLES if not table.ablation for f in table.figures]
+    return [f for f in figures if f.metric in columns and f.view_angle is None]
 
 
 def _ranking(
@@ -230,34 +199,24 @@ def _ranking(
     files: Sequence[ScoreFile],
     columns: Mapping[str, Column],
     figures: Sequence[Figure],
-    tested: bool,
-    links: Mapping[int, str],
     cards: Mapping[str, Card],
-) -> tuple[Ranking, list[Figure]]:
-    """Return what is shown of a test set, and the figures of the paper that have found a place."""
+) -> Ranking:
+    """Return what is shown of a test set that these members of the files score."""
     labels = labels_of(members)
     order = _order(members, columns)
     ranked = [members[i] for i in order]
-    comparison = compared_with_first(ranked) if tested else None
-    key = next(iter(columns))
-    mute = _why_none_is_told_apart(ranked[0], key)
-    entries = tuple(
-        Entry(
-            _label(members[i], labels[i], cards.get(members[i].method, Card()).supervised),
-            members[i],
-            _by_key(members[i]),
-            own_floors(members[i]),
-            rank,
-            links.get(id(members[i]), ""),
-            card_cells(cards.get(members[i].method, Card()), members[i]) if cards else {},
-        )
-        for i, rank in zip(order, [""] * len(order) if mute else _ranks(ranked, key), strict=True)
-    )
-    title, first = _title(ranked[0]), ranked[0]  # comparable, if any is
-    names = [key for key in columns if not key.startswith(SKILL_OF)]
+    key, first = next(iter(columns)), ranked[0]  # comparable, if any is
+    mute = _why_none_is_told_apart(first, key)
+    ranks = [""] * len(order) if mute else _ranks(ranked, key)
+    entries = []
+    for i, rank in zip(order, ranks, strict=True):
+        file, card = members[i], cards.get(members[i].method, Card())
+        label = _label(file, labels[i], card.supervised)
+        cells = card_cells(card, file) if cards else {}
+        entries.append(Entry(label, file, _by_key(file), own_floors(file), rank, cells))
+    title = _title(first)
     notes = [*filter(None, [mute]), *_notes(ranked, key), *_same_request_notes(members, files)]
-    placed = [f for f in figures if f.view_angle is None and f.metric in columns]
-    floors = floor_cells(first, names)
+    floors = floor_cells(first, [key for key in columns if not key.startswith(SKILL_OF)])
     skill = SKILL_OF + key.removeprefix(SKILL_OF)
     line = next((label for label, row in floors.items() if skill in row and not mute), "")
     tables = [
@@ -266,20 +225,15 @@ def _ranking(
             part,
             entries,
             {k: row for k, row in floors.items() if row.keys() & part.keys()},
-            figure_cells([f for f in placed if f.metric in part], lambda f: f.metric),
+            figure_cells([f for f in figures if f.metric in part]),
             [AS_RANKED] if i else notes,
+            lambda a, b, k: not mute and bool(_differ(a.file, b.file, k)),
             line,
             ranked=not i,
-            differ=lambda a, b, k: not mute and bool(_differ(a.file, b.file, k)),
         )
         for i, part in enumerate(_parts(columns))
     ]
-    groups = []
-    for name in names:
-        for table, used in _group_tables(title, entries, name, figures):
-            groups.append(table)
-            placed += used
-    return Ranking(title, entries, tuple(tables), tuple(groups), comparison, mute), placed
+    return Ranking(tuple(entries), tuple(tables), mute)
 
 
 def _order(files: Sequence[ScoreFile], columns: Mapping[str, Column]) -> list[int]:
@@ -330,18 +284,13 @@ def _told_apart(file: ScoreFile, first: ScoreFile, key: str) -> bool:
 def _differ(first: ScoreFile, file: ScoreFile, key: str) -> bool | None:
     """Return whether the interval of a paired difference does not hold 0; None without intervals.
 
-    Skills over a floor that the files do not share, and files that cannot be paired, are told apart
-    where their own intervals do not meet.
+    Skills over a floor that the files do not share are told apart where their own intervals do not
+    meet.
     """
     name = key.removeprefix(SKILL_OF)
     if name == key or is_shared(name):
-        try:
-            (apart,) = compare([first, file], [name]).differences
-        except ComparisonError:
-            pass
-        else:
-            low, high = apart.low, apart.high
-            return None if low is None or high is None else not low <= 0 <= high
+        low, high = difference_interval(file, first, name)
+        return None if low is None or high is None else not low <= 0 <= high
     a, b = (_by_key(f)[key] for f in (first, file))
     if a.low is None or a.high is None or b.low is None or b.high is None:
         return None
@@ -369,64 +318,11 @@ def _why_none_is_told_apart(file: ScoreFile, key: str) -> str:
     return f"This test set cannot tell methods apart: {why}. No method has a rank."
 
 
-def compared_with_first(files: Sequence[ScoreFile]) -> Comparison | None:
-    """Return the comparison of ranked files with the first one.
-
-    Files that lack a score that the first one has, or cannot be paired with it, are left out;
-    without any other there is no comparison.
-    """
-    ranked = [file for file in files if file.comparable]
-    if not ranked:
-        return None
-    first = ranked[0]
-    names = [name for name in first.headline if name in first.items]
-    paired = [file for file in ranked[1:] if _pairs(first, file, names)]
-    return compare([first, *paired], names) if paired and names else None
-
-
-def _pairs(first: ScoreFile, file: ScoreFile, names: Sequence[str]) -> bool:
-    if not all(name in file.items for name in names):
-        return False
-    try:
-        compare([first, file], names, resamples=100)
-    except ComparisonError:
-        return False
-    return True
-
-
 def _parts(columns: Mapping[str, Column]) -> list[dict[str, Column]]:
     """Return the columns as one table; where it would be too wide, skills and scores apart."""
     skills = {key: column for key, column in columns.items() if key.startswith(SKILL_OF)}
     scores = {key: column for key, column in columns.items() if key not in skills}
     return [skills, scores] if skills and len(columns) > WIDEST else [dict(columns)]
-
-
-def _group_tables(
-    title: str, entries: Sequence[Entry], name: str, figures: Sequence[Figure]
-) -> Iterator[tuple[Table, list[Figure]]]:
-    """Yield a score by view angle or by kind of question, with the paper's figures it shows."""
-    first = entries[0].file
-    by_angle = first.task == "rooms"
-    rows = []
-    for entry in entries:
-        groups = entry.file.by_view_angle if by_angle else entry.file.by_distractor
-        scores = {key: group[name] for key, group in groups.items() if name in group}
-        floors = {} if is_shared(name) else angle_floors(entry.file, name)
-        rows.append(replace(entry, scores=scores, floors=floors))
-    keys = by_number({key for row in rows for key in row.scores})
-    if len(keys) < (1 if by_angle else 2):  # a single kind stands in the title
-        return
-    used = [f for f in figures if f.metric == name and str(f.view_angle) in keys]
-    column = score_column(name)
-    table = build_table(
-        f"{title}: {column.head} by {'view angle' if by_angle else 'kind of question'}",
-        {key: replace(column, head=f"{key}°" if by_angle else plain(key)) for key in keys},
-        rows,
-        floor_cells_of_groups(first, name, keys),
-        figure_cells(used, lambda f: str(f.view_angle)),
-        [ANGLES if by_angle else KINDS, AS_RANKED],
-    )
-    yield table, used
 
 
 def _title(file: ScoreFile) -> str:
@@ -485,9 +381,11 @@ def _notes(files: Sequence[ScoreFile], key: str) -> Iterator[str]:
         " 95% interval of their paired difference does not hold 0."
     )
     yield SHARED
-    yield from (f"{file.method}: {text}." for file in files for text in is_floor_of(file))
+    yield from (f"{file.method}: {text}." for file in files for text in floor_sentences(file))
     scored = first.metrics[name].n if first.task == "rooms" and name in first.metrics else 0
-    warnings = too_few(scored, f"scenes with a score of {metric(name).title}") if scored else []
+    warnings = (
+        too_few_warning(scored, f"scenes with a score of {metric(name).title}") if scored else []
+    )
     yield from (f"Warning: {text}." for text in few_clusters(first) or warnings)
 
 

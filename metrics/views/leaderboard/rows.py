@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import Score, ScoreFile, Skill
-from metrics.views.paper import REPORTED, SOURCE, Figure, PaperTable
+from metrics.views.paper import REPORTED, SOURCE, Figure
 from metrics.views.score_tables import score_cell
 from metrics.views.table import Cell, Row, Table, make_row
 
@@ -39,7 +39,6 @@ class Entry:
         scores: by the keys of the columns.
         floors: those that other methods do not share, by the keys of the columns.
         rank: its place, which methods that are not told apart share; empty for those without one.
-        link: address of its own page; or empty.
         card: cells of its card, by their heads; empty where no method has one.
     """
 
@@ -48,7 +47,6 @@ class Entry:
     scores: Mapping[str, Score | Skill]
     floors: Mapping[str, float]
     rank: str = ""
-    link: str = ""
     card: Mapping[str, Cell] = field(default_factory=dict)
 
 
@@ -59,22 +57,21 @@ def build_table(
     floors: Cells,
     figures: Cells,
     notes: Sequence[str],
-    line: str = "",
-    ranked: bool = False,
-    differ: Callable[[Entry, Entry, str], bool] | None = None,
+    differ: Callable[[Entry, Entry, str], bool],
+    line: str,
+    ranked: bool,
 ) -> Table:
     """Return a table of the scored methods, then of floors, then of the paper's figures.
 
     Args:
         columns: the columns by their keys.
         entries: the methods, best first.
-        differ: tells whether two methods differ in a column by more than chance; by default, where
-            their intervals do not meet.
         notes: stand below the table, before those on marks of its rows.
+        differ: tells whether two methods differ in a column by more than chance.
         line: label of the floor that stands right below the methods with a rank.
         ranked: whether the first column shows the ranks.
     """
-    best = {k: _best(entries, k, column, differ or _apart) for k, column in columns.items()}
+    best = {k: _best(entries, k, column, differ) for k, column in columns.items()}
     about = tuple(dict.fromkeys(head for e in entries for head in e.card)) if ranked else ()
     rows = [
         make_row(
@@ -88,15 +85,14 @@ def build_table(
                 *(entry.card.get(head, Cell()) for head in about),
             ],
             "" if entry.file.comparable else "incomparable",
-            entry.link,
         )
         for entry in entries
     ]
     above = sum(bool(entry.rank) for entry in entries)
     keys, notes = (*columns, *about), list(notes)
-    rows[above:above] = unranked_rows("floor", {k: v for k, v in floors.items() if k == line}, keys)
-    rows += unranked_rows("floor", {k: v for k, v in floors.items() if k != line}, keys)
-    rows += unranked_rows("reported", figures, keys)
+    rows[above:above] = _unranked("floor", {k: v for k, v in floors.items() if k == line}, keys)
+    rows += _unranked("floor", {k: v for k, v in floors.items() if k != line}, keys)
+    rows += _unranked("reported", figures, keys)
     if ranked and line in floors and any(e.file.comparable for e in entries[above:]):
         notes.append(BELOW)
     if not all(entry.file.comparable for entry in entries):
@@ -108,7 +104,7 @@ def build_table(
     return Table(title, head, tuple(rows), tuple(notes), named_by=1)
 
 
-def unranked_rows(kind: str, cells: Cells, keys: Sequence[str]) -> list[Row]:
+def _unranked(kind: str, cells: Cells, keys: Sequence[str]) -> list[Row]:
     """Return a row without a rank for each label."""
     return [
         make_row(["", label, *(row.get(key, Cell()) for key in keys)], kind)
@@ -138,14 +134,6 @@ def _best(
     return first if is_better and differ(first, second, key) else None
 
 
-def _apart(first: Entry, second: Entry, key: str) -> bool:
-    """Return whether the intervals of two methods' scores do not meet."""
-    a, b = first.scores[key], second.scores[key]
-    if a.low is None or a.high is None or b.low is None or b.high is None:
-        return False
-    return a.low > b.high or b.low > a.high
-
-
 def score_column(name: str) -> Column:
     """Return the column of a score: title, an arrow that tells which way is better, and unit."""
     score = metric(name)
@@ -158,29 +146,11 @@ def skill_column(name: str) -> Column:
     return Column(f"{metric(name).title}: skill ↑")
 
 
-def figure_cells(
-    figures: Iterable[Figure], key: Callable[[Figure], str], place: bool = True
-) -> dict[str, dict[str, Cell]]:
-    """Return figures of the paper as printed; `place` adds table and labels to the row's name."""
+def figure_cells(figures: Iterable[Figure]) -> Cells:
+    """Return figures of the paper as printed, by method, data and table, then by score."""
     rows: dict[str, dict[str, Cell]] = {}
     for f in figures:
-        labels = "" if f.labels is None or not place else f", {f.labels} labels"
-        table = f" (Table {f.table})" if place else ""
-        label = f"{f.method}, {f.data}{labels}{table} {REPORTED_MARK}"
-        rows.setdefault(label, {})[key(f)] = Cell(f.text, f"± {f.spread}" if f.spread else "")
+        labels = "" if f.labels is None else f", {f.labels} labels"
+        label = f"{f.method}, {f.data}{labels} (Table {f.table}) {REPORTED_MARK}"
+        rows.setdefault(label, {})[f.metric] = Cell(f.text, f"± {f.spread}" if f.spread else "")
     return rows
-
-
-def paper_table(table: PaperTable) -> Table:
-    """Return a table of the paper on its own."""
-
-    def key(figure: Figure) -> str:
-        angle = "" if figure.view_angle is None else f" {figure.view_angle}°"
-        labels = "" if figure.labels is None else f", {figure.labels} labels"
-        return metric(figure.metric).title + angle + labels
-
-    keys = tuple(dict.fromkeys(map(key, table.figures)))
-    rows = unranked_rows("reported", figure_cells(table.figures, key, place=False), keys)
-    title = f"{SOURCE}, {table.kind} {table.number}: {REPORTED}. {table.caption}"
-    notes = (f"{REPORTED_MARK} {REPORTED}. Unit: {table.unit}.", table.remark)
-    return Table(title, ("#", "method", *keys), tuple(rows), notes, named_by=1)

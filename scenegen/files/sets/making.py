@@ -27,7 +27,7 @@ from scenegen.files.sets.manifest import (
 )
 from scenegen.files.sets.plan import Block, Piece, Plan
 from scenegen.files.sets.sets import Packed, Progress, write_piece, write_views
-from scenegen.files.sets.shards import set_name
+from scenegen.files.sets.shards import name_of_set
 from scenegen.files.sets.workers import in_order, processors
 from scenegen.files.sets.workspace import remove_leftovers, run_lock
 
@@ -42,7 +42,7 @@ class Work(Protocol):
     def block(self) -> int:
         """Items that a worker process makes in one go."""
 
-    def rows(self, block: Block, workers: int) -> Generator[Packed, None, Any]:
+    def packed_rows(self, block: Block, workers: int) -> Generator[Packed, None, Any]:
         """Make the rows of a block, on one of `workers` equal shares of this machine.
 
         What it returns at the end goes to `note` of `make_set`.
@@ -84,13 +84,13 @@ def make_set(
     elif cluster is not None:
         place = place.absolute()  # workers are in other folders
     if len(pieces) == 1 and cluster is None:  # after a kill there is nothing to go on with
-        _kept(place, request, pieces, overwrite)
+        _completed_files(place, request, pieces, overwrite)
         list(_made_here(place.parent, pieces, plan, work, workers, overwrite, progress, note))
         _remove(place, request.files if overwrite else (), keep=pieces[0].names)
         return
     lock = place.with_name(f".{place.name}.lock")
     with nullcontext() if is_remote(place) else run_lock(lock, place):
-        ledger = _Ledger(place, request, _kept(place, request, pieces, overwrite))
+        ledger = _Ledger(place, request, _completed_files(place, request, pieces, overwrite))
         missing = [piece for piece in pieces if not ledger.has(piece)]
         if overwrite:
             _remove(place, request.files)
@@ -176,7 +176,7 @@ def _made_here(
     blocks = (block for piece in pieces for block in piece.blocks if block.items)
     if workers > 1:
         blocks = (part for block in blocks for part in block.cut(work.block))
-    make = partial(work.rows, workers=workers)
+    make = partial(work.packed_rows, workers=workers)
     with closing(in_order(make, blocks, workers, note)) as rows:
         for piece in pieces:
             yield write_piece(folder, piece, rows, plan.compression, overwrite, progress)
@@ -191,7 +191,9 @@ def _made_on_worker(
     ends: list[Any] = []
     share = max(1, processors() // threads_of_worker())
     blocks = [block for block in pieces[number].blocks if block.items]
-    with closing(in_order(partial(work.rows, workers=share), blocks, 1, ends.append)) as rows:
+    with closing(
+        in_order(partial(work.packed_rows, workers=share), blocks, 1, ends.append)
+    ) as rows:
         records = write_piece(place.parent, pieces[number], rows, plan.compression)
         next(rows, None)
     return records, ends
@@ -224,7 +226,7 @@ def check_shared(place: Path, request: Manifest) -> None:
         raise SceneGenError(where, "; ".join(differences), expected)
 
 
-def _kept(
+def _completed_files(
     place: Path, request: Manifest, pieces: Sequence[Piece], overwrite: bool
 ) -> list[FileRecord]:
     """Return the records of files that earlier runs of the request completed, and that are right.
@@ -285,4 +287,4 @@ def _remove(place: Path, files: Sequence[str], keep: Sequence[str] = ()) -> None
 
 def _files(folder: Path, names: Sequence[str]) -> list[Path]:
     """Return which files of these names are in a folder, and which shards of theirs."""
-    return [path for path in listing(folder) if {path.name, set_name(path.name)} & set(names)]
+    return [path for path in listing(folder) if {path.name, name_of_set(path.name)} & set(names)]

@@ -16,7 +16,7 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check, from_json
 from scenegen.files.new_file import written_beside
 from scenegen.files.places import as_place
-from scenegen.files.sets.shards import set_name
+from scenegen.files.sets.shards import name_of_set
 from scenegen.files.sets.workers import in_threads, processors
 
 ENDING = ".manifest.json"
@@ -99,7 +99,7 @@ class Manifest:
 
     def shards_of(self, file: str) -> list[FileRecord]:
         """Return the complete shards of one of `files`, in order; itself if it has none."""
-        return [shard for shard in self.shards if file in (shard.file, set_name(shard.file))]
+        return [shard for shard in self.shards if file in (shard.file, name_of_set(shard.file))]
 
 
 def _check_name(name: str) -> None:

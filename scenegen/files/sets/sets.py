@@ -13,7 +13,7 @@ import numpy as np
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import CONTENT_DIGEST, SHA256, dataset_digest, seal
 from scenegen.files.new_file import written_beside
-from scenegen.files.row_file import new_file, new_hdf5
+from scenegen.files.row_file import new_hdf5, new_hdf5_file
 from scenegen.files.schema import Column, name_axes
 from scenegen.files.sets.manifest import FileRecord, file_sha256
 from scenegen.files.sets.plan import Bundle, Part, Piece, Sheet
@@ -81,7 +81,7 @@ def _fill(
             packed = next(rows)
             extend_together(tables, packed)
             progress(packed[0].count)
-        _mark(attributes, block.part, _digests(tables))
+        _add_marks(attributes, block.part, _digests(tables))
         for sheet, table in zip(block.part.sheets, tables, strict=True):
             row_digests[sheet.file] |= table.row_digests()
     for file, of_file, of_rows in zip(files, attributes, row_digests, strict=True):
@@ -108,35 +108,35 @@ def write_views(
     ]
     with ExitStack() as writing:
         places = [folder / name for name in bundle.files]
-        files = [writing.enter_context(new_file(place, overwrite=True)) for place in places]
+        files = [writing.enter_context(new_hdf5_file(place, overwrite=True)) for place in places]
         for part in bundle.parts:
             if part.items:
                 of_part = [[one for one in listed if one.part == part.name] for listed in lists]
-                digests = _show_part(files, folder, part, of_part)
+                digests = _write_virtual_columns(files, folder, part, of_part)
             else:
                 digests = _digests(_tables(files, part, 0, compression))
-            _mark(attributes, part, digests)
+            _add_marks(attributes, part, digests)
         for file, listed, of_file in zip(files, lists, attributes, strict=True):
             _write_list(file, listed)
             _seal(file, of_file)
 
 
-def _show_part(
+def _write_virtual_columns(
     files: Sequence[h5py.File], folder: Path, part: Part, shards: Sequence[Sequence[Shard]]
 ) -> dict[str, str]:
-    """Show the columns of a part of all shards of each file; return their digests by name."""
+    """Write columns that show a part of all shards of each file; return their digests by name."""
     joined = [_joined_columns(folder, of_file) for of_file in shards]
     digests = {}
     for sheet in part.sheets:
         group = _group(files[sheet.file], sheet)
         for path, column in sheet.paths.items():
             digest, dtype = joined[sheet.file][path]
-            dataset = _show(group, column, path, shards[sheet.file], dtype)
+            dataset = _virtual_dataset(group, column, path, shards[sheet.file], dtype)
             dataset.attrs[SHA256] = digests[column.name] = digest
     return digests
 
 
-def _show(
+def _virtual_dataset(
     group: h5py.Group, column: Column, path: str, shards: Sequence[Shard], dtype: Any
 ) -> h5py.Dataset:
     """Write a virtual data set that shows a column of all shards."""
@@ -171,10 +171,10 @@ def merge_file(
         source: that a reader has checked.
         parts: what it holds, without marks, which are copied.
 
-    Raises as `new_file`, and FileFormatError where a value is not the one that was
+    Raises as `new_hdf5_file`, and FileFormatError where a value is not the one that was
     written to its shard. Nothing is then left.
     """
-    with new_file(out, overwrite) as file:
+    with new_hdf5_file(out, overwrite) as file:
         attributes = {k: v for k, v in source.file.attrs.items() if k != CONTENT_DIGEST}
         whole = Bundle({source.path.name: attributes}, parts).whole()
         sheets = [sheet for part in parts for sheet in part.sheets]
@@ -227,7 +227,9 @@ def _digests(tables: Sequence[Table]) -> dict[str, str]:
     return {name: dataset.attrs[SHA256] for name, dataset in columns}
 
 
-def _mark(attributes: Sequence[dict[str, Any]], part: Part, digests: Mapping[str, str]) -> None:
+def _add_marks(
+    attributes: Sequence[dict[str, Any]], part: Part, digests: Mapping[str, str]
+) -> None:
     """Add the marks of a part to the root attributes of its files."""
     for mark in part.marks:
         for number in mark.files:

@@ -80,7 +80,7 @@ def shard_name(path: str | Path, number: int, count: int) -> str:
     return f"{path.stem}-{number:05d}-of-{count:05d}{path.suffix}"
 
 
-def set_name(name: str) -> str | None:
+def name_of_set(name: str) -> str | None:
     """Return the name of the set that a shard of this name belongs to; None if it is no shard's."""
     match = SHARD_NAME.fullmatch(name)
     return None if match is None else "".join(match.groups())
@@ -238,7 +238,7 @@ def _read_list(listed: h5py.Dataset, path: Path) -> list[Shard]:
     for line in StoredArray(listed)[()]:
         with describing(where):
             shard = from_json(Shard, line, "shard", LONGEST_LINE)
-        if set_name(shard.file) != path.name:
+        if name_of_set(shard.file) != path.name:
             expected = f"such as {shard_name(path, 0, len(listed))}"
             raise FileFormatError(where, shard.file, expected, "the set was renamed or damaged")
         shards.append(shard)

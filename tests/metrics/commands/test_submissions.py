@@ -44,8 +44,6 @@ def test_a_baseline_goes_all_the_way(truths, folder):
     pages = ("--html", "c.html", "--predictions", "oracle.h5", "--truth", truths.rooms)
     assert bench("compare", "empty-room.json", "oracle.json", *pages).exit_code == 0
     assert (folder / "c.html").read_text().count("data:image/webp") == 6 * 6
-    assert bench("leaderboard", "oracle.json", "--html", "site").exit_code == 0
-    assert (folder / "site" / "index.html").is_file()
     assert read_scores(folder / "oracle.json").metrics["chamfer"].value == 0
     compared = bench("compare", "empty-room.json", "oracle.json", "--json", "c.json")
     assert compared.exit_code == 0, compared.output
@@ -69,27 +67,23 @@ def test_scores_of_another_truth_do_not_stand_beside(truths, folder, check_refus
     assert not (folder / "x.html").exists()
 
 
-def test_a_page_that_cannot_be_made_loses_no_score(truths, folder):
+def test_a_page_that_cannot_be_made_loses_no_score(truths, folder, monkeypatch):
+    def fails(*_):
+        raise OSError(5, "cannot be read", "rooms.h5")
+
     bench("baseline", "oracle", "--data", truths.rooms, "--out", "b.h5")
-    bench("score", "b.h5", "--json", "b.json")
+    monkeypatch.setattr("metrics.views.report.html_report", fails)
+    told = bench("score", "b.h5", "--json", "b.json", "--html", "b.html")
+    assert told.exit_code == 2
+    assert (folder / "b.json").exists()
+    assert "chamfer" in told.stdout
+    assert not (folder / "b.html").exists()
     other = (folder / "b.json").read_text()
     digest = json.loads(other)["meta"]["truth_digest"]
     (folder / "other.json").write_text(other.replace(digest, "0" * 64))
-    outs = ("--json", "b2.json", "--html", "b2.html")
-    told = bench("score", "b.h5", *outs, "--beside", "other.json")
-    assert told.exit_code == 2
-    assert (folder / "b2.json").exists()
-    assert "chamfer" in told.stdout
-    assert not (folder / "b2.html").exists()
-
-
-def test_an_output_that_is_there_is_refused_before_a_site_is_written(truths, folder):
-    bench("baseline", "oracle", "--data", truths.rooms, "--out", "oracle.h5")
-    bench("score", "oracle.h5", "--json", "oracle.json")
-    (folder / "board.md").write_text("mine")
-    given = ("--html", "site", "--out", "board.md")
-    assert bench("leaderboard", "oracle.json", *given).exit_code == 2
-    assert not (folder / "site").exists()
+    beside = ("--html", "c.html", "--json", "c.json", "--beside", "other.json")
+    assert bench("score", "b.h5", *beside).exit_code == 2
+    assert not (folder / "c.json").exists(), "refused before anything is scored"
 
 
 def test_pictures_of_another_split_are_left_out(truths, folder):
@@ -111,7 +105,7 @@ def test_pictures_of_another_split_are_left_out(truths, folder):
         ("compare a.json", ("a.json",)),
         ("compare broken.json broken.json", ("broken.json",)),
         ("leaderboard broken.json", ("broken.json",)),
-        ("leaderboard --metric beauty", ("beauty",)),
+        ("leaderboard", ("SCORES.json",)),
         ("baseline best --data x.h5", ("best",)),
         ("baseline oracle", ("--data",)),
         ("baseline oracle --data nothing.h5", ("nothing.h5",)),
@@ -158,7 +152,7 @@ def test_scores_never_replace_the_truth_that_a_submission_names(
 
 
 def test_what_cannot_be_viewed(truths, folder, check_refusal):
-    """What can is in `tests/metrics/viewing`; here no page is ever served."""
+    """What can is in `tests/metrics/test_viewing.py`; here no page is ever served."""
     pytest.importorskip("viser")
     from submissions import good_answers, good_rooms
 

@@ -18,7 +18,7 @@ from metrics.measures.checks import (
 )
 from metrics.measures.depth import compare_depth, depth_scores
 from metrics.measures.image_search import nearest_distances_on_image
-from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
+from metrics.measures.normals import angular_errors_degrees, normals_from_depth
 from metrics.measures.statistics import (
     bootstrap_interval,
     cluster_means,
@@ -68,7 +68,6 @@ CASES = [
     (EmptyError, "mask", angular_errors_degrees, CLOUD + 1.0, CLOUD * NAN),
     (MeasureError, "normals", angular_errors_degrees, CLOUD[:1], CLOUD),
     (MeasureError, "mask", angular_errors_degrees, CLOUD, CLOUD, np.ones(2)),
-    (EmptyError, "angles", normal_scores, np.zeros(0)),
     (MeasureError, "depth", normals_from_depth, np.ones(4), 20.0),
     *((MeasureError, "scores", answers_from_scores, bad) for bad in WRONG_SCORES),
     (EmptyError, "scores", answers_from_scores, CLOUD[:0]),

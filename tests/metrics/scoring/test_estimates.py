@@ -5,7 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from metrics.scoring.estimates import ROUNDING, Bootstrap, skills
+from metrics.scoring.estimates import ROUNDING, Bootstrap, floor_column, skills
 from metrics.scoring.metric_names import SKILLED
 
 SCENES = 6
@@ -74,3 +74,13 @@ def test_rows_without_objects_leave_the_other_skills_as_they_were():
     whole, less = skills_of(items), skills_of(some)
     assert list(whole) == list(less) == list(SKILLED)
     assert less["chamfer"].low == pytest.approx(whole["chamfer"].low, abs=1e-12)
+
+
+def test_the_floor_is_the_lowest_over_scenes_not_over_images():
+    scene = np.array([0, 0, 0, 1])
+    items = {
+        "balls_behind_depth_error": np.array([0.1, 0.1, 0.1, 0.9]),
+        "blocks_behind_depth_error": np.array([0.4, 0.4, 0.4, np.nan]),
+    }
+    name = "behind_depth_error"
+    assert floor_column(items, scene, name, "first_view") == "blocks_behind_depth_error"

@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 from h5_edits import replaced
+from made_scores import rooms_scores
 
 from baselines.trivial import write_room_baseline
 from metrics.measures.chamfer_hausdorff import nearest_distances
@@ -14,10 +15,13 @@ from metrics.measures.surface import surface_distances, surface_of
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
-from metrics.scoring.image_scores import true_relief
+from metrics.scoring.image_scores import reference_of, score_prediction, true_relief
 from metrics.scoring.metric_names import OF_CUT_OUT, metric
 from metrics.scoring.rows import other_scenes
 from metrics.scoring.runs import Settings
+from metrics.submissions.reader import PredictedView
+from metrics.submissions.truths import TrueView
+from metrics.views.score_tables import partner_sentences
 from scenegen.camera import back_project, pixel_size
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
@@ -257,6 +261,43 @@ def test_every_row_serves_once_as_that_of_another_scene():
     lonely = other_scenes(np.array([4, 4, 9, 9, 2]), np.array([0, 1, 0, 3, 0]))
     assert lonely.tolist() == [2, 3, 4, 1, 0]
     assert other_scenes(np.zeros(3, int), np.arange(3)).tolist() == [0, 1, 2]
+    alone = other_scenes(np.array([4, 4, 9, 9, 4]), np.array([0, 1, 0, 1, 7]))
+    assert alone.tolist() == [2, 3, 0, 1, 4], "a row without a partner takes none from the others"
+    uneven = np.array([4, 4, 9, 9])
+    assert (uneven[other_scenes(uneven, np.arange(4))] != uneven).all()
+
+
+def test_an_image_without_a_plane_has_no_score_of_derived_normals(folder):
+    with RoomsFile(folder / "rooms.h5") as rooms:
+        room = rooms[0]
+    row = np.zeros(room.depth.shape, bool)
+    row[len(row) // 2] = True  # rounding alone would choose a side of its planes
+    camera = room.fov_y_degrees, room.world_from_camera
+    depth = np.where(row, room.depth, np.nan)
+    view = TrueView(depth, room.normal, np.where(row, room.object_id, -1), *camera)
+    same = PredictedView("depth", "none", np.nan_to_num(depth, nan=1.0).astype(float), None)
+    found = score_prediction(same, view, reference_of(view)).scores
+    derived = [value for name, value in found.items() if name.startswith("derived_normal")]
+    assert derived
+    assert np.isnan(derived).all()
+    assert found["rmse"] == 0.0
+
+
+def test_a_row_without_a_partner_is_left_out_of_the_skill_of_relief(tmp_path):
+    other = [0.1, 0.1, 0.1, np.nan]
+    columns = {"relief_iou": [0.5] * 4, "other_scene_relief_iou": other}
+    columns |= {"object_depth_error": [0.1] * 4, "empty_room_object_depth_error": [0.2] * 4}
+    file = rooms_scores("m", columns, range(4))
+    write_scores(file, tmp_path / "m.json")
+    found = read_scores(tmp_path / "m.json")
+    assert found.skills["relief_iou"].value == pytest.approx(0.4 / 0.9)
+    assert "over 3 of 4 images" in partner_sentences(found)[0]
+    assert (
+        partner_sentences(
+            rooms_scores("m", columns | {"other_scene_relief_iou": [0.1] * 4}, range(4))
+        )
+        == []
+    )
 
 
 def test_the_scores_of_one_scene_have_no_skill_of_relief(make_rooms, tmp_path):

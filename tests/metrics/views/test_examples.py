@@ -5,7 +5,7 @@ import pytest
 
 from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter
-from metrics.scoring.evaluate import score
+from metrics.scoring.evaluate import open_runs, score
 from metrics.views.examples import chosen_questions, chosen_scenes, examples_of
 from scenegen.rooms.reader import RoomsFile
 
@@ -60,7 +60,8 @@ def test_the_best_scenes_are_not_those_in_which_nothing_is_predicted(truths, tmp
             if room.scene.index in empty:
                 depth, _ = empty_room(room.world_from_camera, room.fov_y_degrees, *depth.shape)
             out.add(row, depth=np.nan_to_num(depth, nan=1.0))
-    lists = examples_of(score([path], truths.rooms), truths.rooms, path)
+    with open_runs([path], truths.rooms) as runs:
+        lists = examples_of(score([path], truths.rooms), runs.truth, runs.files[0])
     by_place = {title.split()[0]: examples for title, examples in lists}
     assert all("Relief correlation" in title for title, _ in lists)
     shown = {int(example.name.split()[1].strip(",")) for example in by_place["Best"]}

@@ -8,11 +8,10 @@ from made_scores import iqtt_scores, simple_rooms
 from pages import Page
 
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
-from metrics.scoring.evaluate import score
+from metrics.scoring.evaluate import open_runs, score
 from metrics.views.compare.compare import compare
 from metrics.views.compare.report import html_report as html_comparison
-from metrics.views.leaderboard.ranking import leaderboard
-from metrics.views.leaderboard.site import to_html, write_site
+from metrics.views.leaderboard.ranking import leaderboard, to_html
 from metrics.views.page import Lead, Section, html_page
 from metrics.views.report import html_report
 from scenegen.rooms.reader import RoomsFile
@@ -47,27 +46,31 @@ def pages(make_rooms, truths, tmp_path_factory):
     answers = truths.iqtt.with_name("iqtt-test-answers.h5")
     write_answers(folder / "q.h5", truths.iqtt, method="m", answer=np.arange(6) % 3)
     questions = replace(score([folder / "q.h5"], answers), method=HOSTILE)
-    made = {
-        "rooms": html_report(files[1], rooms, [folder / "1.h5"], files[:1]),
-        "questions": html_report(questions, answers, [folder / "q.h5"], [questions]),
-        "little": html_report(iqtt_scores("one", [1.0]), folder, []),
+    with (
+        open_runs([folder / "1.h5"], rooms) as runs,
+        open_runs([folder / "q.h5"], answers) as asked,
+    ):
+        made = {
+            "rooms": html_report(files[1], runs, files[:1]),
+            "questions": html_report(questions, asked, [questions]),
+        }
+    made |= {
+        "little": html_report(iqtt_scores("one", [1.0])),
         "compared": html_comparison(compare(files), files),
         "ranked": to_html(leaderboard([*files, questions, simple_rooms("other")])),
     }
     for name, text in made.items():
         assert len(text) < LARGEST
         (folder / f"{name}.html").write_text(text)
-    write_site([*files, questions], folder / "site")
-    paths = {name: folder / f"{name}.html" for name in made}
-    return paths | {f"site-{n}": folder / "site" / f"{n}.html" for n in ("index", "gallery")}
+    return {name: folder / f"{name}.html" for name in made}
 
 
 @pytest.mark.parametrize(
     ("width", "scheme", "names"),
     [
-        (360, "dark", ("rooms", "questions", "compared", "site-index")),
+        (360, "dark", ("rooms", "questions", "compared", "ranked")),
         (1280, "light", ("rooms",)),
-        pytest.param(360, "dark", ("little", "ranked", "site-gallery"), marks=pytest.mark.slow),
+        pytest.param(360, "dark", ("little",), marks=pytest.mark.slow),
     ],
 )
 def test_pages_fit_read_well_and_stay_silent(visit, pages, width, scheme, names):
@@ -102,18 +105,9 @@ def test_tables_of_a_leaderboard_are_sorted_at_a_click_and_pictures_enlarged(vis
         assert abs(picture.locator("img").bounding_box()["width"] - wide) < 20
 
 
-def test_links_of_a_site_lead_to_reports_and_back(visit, pages):
-    seen = visit(pages["site-index"].as_uri())
-    links = seen.page.locator("a").evaluate_all("all => all.map(a => a.getAttribute('href'))")
-    folder = pages["site-index"].parent
-    assert set(links) == {path.name for path in folder.iterdir()}
-    for path in folder.glob("report-*.html"):
-        assert "index.html" in Page(path.read_text()).addresses
-
-
 def test_sections_hold_texts_of_others_as_texts():
-    leads = [Lead(HOSTILE, HOSTILE, "a.html"), Lead(HOSTILE, HOSTILE)]
-    section = Section(HOSTILE, leads=leads, remarks=[HOSTILE], notes=[HOSTILE])
-    page = Page(html_page(HOSTILE, [section], warnings=[HOSTILE]))
+    leads = [Lead(HOSTILE, HOSTILE)]
+    section = Section(HOSTILE, remarks=[HOSTILE], notes=[HOSTILE])
+    page = Page(html_page(HOSTILE, [section], leads=leads, warnings=[HOSTILE]))
     assert "img" not in page.tags
-    assert page.text.count(HOSTILE.replace("\u202e", "\\u202e")) == 10
+    assert page.text.count(HOSTILE.replace("\u202e", "\\u202e")) == 8

@@ -14,10 +14,11 @@ from iqtt.floors import Floor
 from metrics.measures.empty_room import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import Skill
-from metrics.scoring.evaluate import score
+from metrics.scoring.evaluate import open_runs, score
 from metrics.scoring.records import Submission
+from metrics.scoring.truth_digests import OtherTruthError
 from metrics.views.headline import headline_section, kinds_sections
-from metrics.views.report import BesideError, html_report
+from metrics.views.report import html_report
 from metrics.views.score_tables import (
     all_scores,
     group_tables,
@@ -79,7 +80,7 @@ def test_groups_stand_in_the_order_of_their_numbers(form, tmp_path):
     group = {"iqtt_accuracy": make_score("iqtt_accuracy", 0.5)}
     scores = iqtt_scores("a", [1, 0], by_rotation_angle=dict.fromkeys(spans, group))
     if form == "html":
-        text = re.sub('data:[^"]*', "", html_report(scores, tmp_path, []))
+        text = re.sub('data:[^"]*', "", html_report(scores))
     else:
         text = text_report(scores, form == "markdown", whole=True)
     shown = re.findall(r"\b(?:\d+)-(?:\d+)\b", text)
@@ -109,9 +110,10 @@ def test_the_page_is_whole_escapes_names_and_loads_nothing(rooms_path, tmp_path)
     runs = (Submission(HOSTILE, "0" * 64, HOSTILE),)
     meta = replace(scores.meta, truth_path=HOSTILE, submissions=runs)
     hostile = replace(scores, method=HOSTILE, meta=replace(meta, truth_given=False))
-    text = html_report(hostile, rooms_path, [path], [replace(hostile, method=f"{HOSTILE}2")])
     controls = replace(scores, method=CONTROLS, meta=replace(meta, truth_path=CONTROLS))
-    assert set(html_report(controls, rooms_path, [path])).isdisjoint(CONTROLS.replace("[2J", ""))
+    with open_runs([path], rooms_path) as runs:
+        text = html_report(hostile, runs, [replace(hostile, method=f"{HOSTILE}2")])
+        assert set(html_report(controls, runs)).isdisjoint(CONTROLS.replace("[2J", ""))
     page = Page(text)
     assert len(page.pictures) == 3 * 2 * 6  # a third of the eight scenes each, in six pictures
     assert all(address.startswith("data:") for address in page.addresses)
@@ -135,8 +137,8 @@ def test_the_headline_stands_beside_floor_paper_and_other_methods(tmp_path):
     assert cells == {"score": "Chamfer", "skill": "-0.2", "mine": "0.2000", "floor": "0.1600",
                      "paper †": "0.103", "other": "0.2000"}  # fmt: skip
     elsewhere = simple_rooms("other", digest="0" * 64)
-    with refused(BesideError, "other"):
-        html_report(mine, tmp_path, [], [elsewhere])
+    with refused(OtherTruthError, "other"):
+        html_report(mine, beside=[elsewhere])
 
 
 def test_questions_stand_by_kind_beside_chance_floor_and_people():
@@ -153,7 +155,8 @@ def test_examples_of_questions_say_what_is_right(truths, tmp_path):
     path, answers = tmp_path / "x.h5", truths.iqtt.with_name("iqtt-test-answers.h5")
     write_answers(path, truths.iqtt, method="m", answer=np.array([0, 1, 2, -1, 1, 0]))
     scores = score([path], answers)
-    page = Page(html_report(scores, answers, [path]))
+    with open_runs([path], answers) as runs:
+        page = Page(html_report(scores, runs))
     right = int(scores.items["iqtt_accuracy"].sum())
     assert f"{right} of {right} questions answered rightly" in page.text
     assert f"{6 - right} of {6 - right} questions answered wrongly" in page.text
@@ -174,6 +177,6 @@ def test_examples_of_questions_say_what_is_right(truths, tmp_path):
 def test_little_is_a_page_too(scores, tmp_path):
     gone = {name: np.nan * c for name, c in scores.items.items() if name in scores.metrics}
     for shown in (scores, stated(scores, items={**scores.items, **gone})):
-        page = Page(html_report(shown, tmp_path, []))
+        page = Page(html_report(shown))
         assert scores.method in page.text
         assert "nan" not in page.text

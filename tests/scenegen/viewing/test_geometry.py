@@ -12,7 +12,12 @@ from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.objects.catalogue import built_in_shape
 from scenegen.viewing.geometry import (
     FARTHEST,
+    RIGHT,
+    TOO_FAR,
+    TOO_NEAR,
+    UNKNOWN,
     check_camera,
+    error_colors,
     hit_by,
     pixel_colors,
     scene_meshes,
@@ -46,6 +51,14 @@ def test_pixels_without_a_depth_in_view_have_no_surfel(rooms):
     assert len(surfels(rooms[0], depth * np.nan).points) == 0
 
 
+def test_colours_of_errors_tell_sign_and_size():
+    colors = error_colors(np.array([-9.0, -0.1, 0.0, 0.05, 0.1, np.inf, np.nan]), 0.1)
+    half = np.rint(np.add(RIGHT, TOO_FAR) / 2 + 1e-9)
+    assert np.abs(colors[3] - half).max() <= 1
+    others = [TOO_NEAR, TOO_NEAR, RIGHT, TOO_FAR, UNKNOWN, UNKNOWN]
+    assert colors[[0, 1, 2, 4, 5, 6]].tolist() == [list(color) for color in others]
+
+
 @pytest.mark.parametrize("angle", [0.0, 0.001])
 def test_a_click_hits_the_surfel_of_its_pixel(rooms, angle):
     room = rooms[0]
@@ -77,7 +90,7 @@ def test_meshes_are_where_the_surfels_are(rooms):
     for room in rooms:
         meshes, missing = scene_meshes(room.scene, shape_of)
         assert missing == []
-        assert [mesh.object_id for mesh in meshes] == list(range(len(room.scene.objects) + 1))
+        assert [mesh.object_id for mesh in meshes] == list(range(1, len(room.scene.objects) + 1))
         for mesh in meshes:
             seen = room.points_world[room.object_id == mesh.object_id][::29, None]
             low, high = mesh.triangles.min(axis=1) - 0.01, mesh.triangles.max(axis=1) + 0.01
@@ -98,10 +111,10 @@ def test_meshes_that_are_not_there_are_named_once(meshes, make_rooms, tmp_path):
     path = make_rooms(tmp_path / "x.h5", 2, how, objects=(2, 2), **source.settings)
     with open_rooms(path) as rooms:
         shown, missing = scene_meshes(rooms[0].scene, shapes_of(rooms.spec))
-        assert ([mesh.object_id for mesh in shown], len(missing)) == ([0], 1)
+        assert (shown, len(missing)) == ([], 1)
         assert "--objects-root" in missing[0]
         shown, missing = scene_meshes(rooms[0].scene, shapes_of(rooms.spec, **told))
-        assert (len(shown), missing) == (3, [])
+        assert (len(shown), missing) == (2, [])
         with pytest.raises(SceneGenError):
             shapes_of(rooms.spec, objects_root=str(tmp_path), cache_dir=told["cache_dir"])
 

@@ -43,7 +43,7 @@ def test_coverage_clicks_and_the_slider(visit, rooms):
     first, turned, other = (objects(rooms[row]) for row in (0, 1, 2))
     with served(rooms) as (page, server):
         seen = visited(visit, server)
-        switch(page, meshes=False, cameras=False, lights=False, size=1.2, colour="Object id")
+        switch(page, meshes=False, cameras=False, size=1.2, colour="Object id")
         eventually(lambda: overlap(saturated(picture(seen)), first), SAME)
         shown = saturated(picture(seen))
         # A wrong pose, or a mirrored axis, would not pass.
@@ -54,7 +54,7 @@ def test_coverage_clicks_and_the_slider(visit, rooms):
         told.wait_for(state="attached")
         assert seen.page.get_by_text(f"{rooms[0].depth[y, x]:.5f}", exact=True).count() == 1
 
-        switch(page, surfels=False, meshes=True)
+        switch(page, truth=False, meshes=True)
         eventually(lambda: overlap(drawn(picture(seen)), first), SAME)
         switch(page, view="View 1, row 1")
         eventually(lambda: overlap(drawn(picture(seen)), turned), SAME)

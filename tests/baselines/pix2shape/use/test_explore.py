@@ -68,7 +68,7 @@ def test_what_is_known_of_views_is_what_training_was_told(several_path):
     positions = sample_cameras(spec, np.arange(3)).reshape(9, 3)
     count, *lights = (np.repeat(own, 3, axis=0) for own in sample_lights(spec, np.arange(3)))
     assert len(set(count.tolist())) > 1
-    found = explore.known_views(spec, positions, *lights, np.zeros((9, 0)))
+    found = explore.unrendered_views(spec, positions, *lights, np.zeros((9, 0)))
     assert found.scene.fov_y_degrees == expected.scene.fov_y_degrees
     slots = found.scene.light_color.shape[1]
     there = (found.scene.light_color != 0).any(dim=2)

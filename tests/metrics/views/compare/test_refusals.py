@@ -9,6 +9,7 @@ from made_scores import DIGEST, iqtt_scores, rooms_scores, stated
 from refusals import refused
 
 from metrics.scoring.metric_names import UnknownMetricError
+from metrics.scoring.truth_digests import OtherTruthError
 from metrics.views.compare.compare import compare
 from metrics.views.compare.pairing import ComparisonError
 
@@ -43,18 +44,21 @@ UNUSABLE = "2 of 6 rows without a usable number: 1, 3"
 
 
 @pytest.mark.parametrize("allowed", [False, True])
+def test_scores_of_two_truths(allowed):
+    for other, found in (
+        (OTHER_BITS, "rooms, truth of digest ffff"),
+        (iqtt_scores("b", [1]), "iqtt"),
+    ):
+        with refused(OtherTruthError, "", found, f"{DIGEST[:12]}, as a.json has"):
+            compare([A, other], ["chamfer"], allow_incomparable=allowed)
+
+
+@pytest.mark.parametrize("allowed", [False, True])
 @pytest.mark.parametrize(
     ("files", "where", "found", "expected"),
     [
         ([], "comparison", "0 score file", "two or more"),
         ([A], "comparison", "1 score file", "two or more"),
-        (
-            [A, OTHER_BITS],
-            "b.json",
-            "scores of truth of digest ffff",
-            f"{DIGEST[:12]} as in a.json",
-        ),
-        ([A, iqtt_scores("b", [1, 0])], "b", "scores of task iqtt", "rooms as in a.json"),
         ([A, FEWER], "b.json", "4 rows, without 1, 4", "the 6 of a.json"),
         ([FEWER, A], "a.json", "6 rows, with 1, 4", "the 4 of b.json"),
         ([A, OTHER_ROWS], "b.json", "6 rows, without 0, 1, 2, 3, 4 ...", "the 6 of a.json"),

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_scores import DIGEST, iqtt_scores, make_score, rooms_scores, stated
+from made_scores import DIGEST, iqtt_scores, rooms_scores, stated
 from refusals import refused
 
 from iqtt.floors import CHANCE, Floor
@@ -15,12 +15,10 @@ from metrics.scoring.metric_names import UnknownMetricError
 from metrics.views.leaderboard.cards import HEAD, read_cards, unmatched
 from metrics.views.leaderboard.floors import FloorError
 from metrics.views.leaderboard.ranking import LeaderboardError, leaderboard, rankings
-from metrics.views.leaderboard.site import lead_of
 from metrics.views.paper import TABLES
 from scenegen.common.errors import SpecError
 
 SCENES = [0, 0, 1, 1]
-PAPER = ("task", "all", "none")
 
 
 def rooms(name, chamfer=0.2, mse=0.02, **other):
@@ -46,7 +44,7 @@ def best(table):
 
 def test_ranks_and_best_cells():
     files = [rooms("b", 0.3, 0.01), rooms("a", 0.1, 0.02), rooms("c", 0.3, 0.04)]
-    (table,) = leaderboard(files, paper="none")
+    (table,) = leaderboard(files, paper=False)
     assert ranks(table) == [("1", "a"), ("2", "b"), ("2", "c")]
     assert best(table) == [[True, False, False], [False, False, True], [False, False, False]]
     assert table.head[2] == "Chamfer ↓ (scene unit)"
@@ -59,7 +57,7 @@ def test_higher_is_better_where_it_is():
     floors = (Floor("mirror", CHANCE, 1 / 3, 2500),)
     rights = {"low": [1, 0, 0] * 5, "high": [1, 1, 1] * 5}
     files = [iqtt_scores(name, right, question_floors=floors) for name, right in rights.items()]
-    table, _ = leaderboard(files, paper="none")
+    (table,) = leaderboard(files, paper=False)
     assert best(table) == [[True, True], [False, False], [False, False]]
     floor = f"floor: {CHANCE}"
     assert ranks(table) == [("1", "high"), ("", floor), ("", "low")]
@@ -70,27 +68,27 @@ def test_higher_is_better_where_it_is():
 def test_what_is_not_comparable_is_never_ranked_nor_best():
     part = rooms("part", 0.001, 0.001, comparable=False)
     for files in ([part, rooms("a")], [rooms("a"), part]):
-        (table,) = leaderboard(files, paper="none")
+        (table,) = leaderboard(files, paper=False)
         assert ranks(table) == [("1", "a"), ("", "part ‡")]
         assert table.rows[1].kind == "incomparable"
         assert best(table) == [[False] * 3] * 2, "a method alone is better than none"
         assert any(note.startswith("‡ not comparable") for note in table.notes)
-    assert best(leaderboard([part], paper="none")[0]) == [[False] * 3]
+    assert best(leaderboard([part], paper=False)[0]) == [[False] * 3]
 
 
 def test_test_sets_are_never_ranked_together():
     other = "f" * 64
     files = [rooms("a", 0.3), rooms("b", 0.1, truth=other, digest=other), rooms("c", 0.2)]
-    first, second = leaderboard(files, paper="none")
+    first, second = leaderboard(files, paper=False)
     assert not any(note.startswith("Not ranked with") for note in (*first.notes, *second.notes))
     assert ranks(first) == [("1", "c"), ("2", "a")]
     assert ranks(second) == [("1", "b")]
     # One fingerprint, two tasks: still two test sets.
-    assert len(leaderboard([rooms("a"), iqtt_scores("b", [1])], paper="none")) == 2
+    assert len(leaderboard([rooms("a"), iqtt_scores("b", [1])], paper=False)) == 2
 
 
 def test_truths_of_one_request_but_other_bits_are_not_ranked_together():
-    first, second = leaderboard([rooms("a"), rooms("b", digest="f" * 64)], paper="none")
+    first, second = leaderboard([rooms("a"), rooms("b", digest="f" * 64)], paper=False)
     assert [len(table.rows) for table in (first, second)] == [1, 1]
     for table, other in ((first, "f" * 12), (second, DIGEST[:12])):
         assert any(note.startswith(f"Not ranked with truth {other}") for note in table.notes)
@@ -99,7 +97,7 @@ def test_truths_of_one_request_but_other_bits_are_not_ranked_together():
 def test_known_test_sets_bear_their_name(monkeypatch):
     known = KnownTest("rooms-test", "rooms", DIGEST, 3, "scenegen render")
     monkeypatch.setattr("metrics.scoring.known_tests.KNOWN_TESTS", (known,))
-    assert leaderboard([rooms("a")], paper="none")[0].title.endswith(", rooms-test")
+    assert leaderboard([rooms("a")], paper=False)[0].title.endswith(", rooms-test")
 
 
 def test_files_that_claim_the_whole_test_set_must_agree_on_it():
@@ -115,11 +113,11 @@ def test_files_that_claim_the_whole_test_set_must_agree_on_it():
 def test_scores_that_are_missing_leave_a_hole():
     a, b = rooms("a"), rooms("b")
     less = replace(b, columns={k: v for k, v in b.columns.items() if k != "chamfer"})
-    table = leaderboard([less, a], paper="none")[0]
+    table = leaderboard([less, a], paper=False)[0]
     assert ranks(table) == [("1", "a"), ("", "b")]
     assert values(table)["b"][0] == "-"
     assert best(table) == [[False] * 3] * 2
-    table = leaderboard([less, a], ["mse_depth", "normal_mean_degrees"], paper="none")[0]
+    table = leaderboard([less, a], ["mse_depth", "normal_mean_degrees"], paper=False)[0]
     assert values(table)["b"] == ["0.02000", "-"]
     with pytest.raises(UnknownMetricError):
         leaderboard([a], ["cd"])
@@ -128,7 +126,7 @@ def test_scores_that_are_missing_leave_a_hole():
 def test_labels_tell_runs_and_claims():
     runs = [[0.198] * 4, [0.2] * 4, [0.202] * 4]
     several = rooms("a", np.array(runs), runs=3, alignment="scale_shift")
-    table = leaderboard([several, rooms("b")], paper="none")[0]
+    table = leaderboard([several, rooms("b")], paper=False)[0]
     rest = rests(table)["a (3 runs; scored scaled and shifted)"][0]
     assert rest.startswith("± 0.002000 [")
 
@@ -137,7 +135,7 @@ def test_cards_stand_beside_the_scores(tmp_path):
     path = tmp_path / "cards.yaml"
     path.write_text("a: {supervised: true, date: 2026-01-02, code: 'https://a.b', paper: P}\n")
     cards = read_cards(path)
-    table = leaderboard([rooms("a"), rooms("b")], paper="none", cards=cards)[0]
+    table = leaderboard([rooms("a"), rooms("b")], paper=False, cards=cards)[0]
     assert table.head[-6:] == HEAD
     assert values(table)["a (supervised)"][-6:] == [
         *("-", "-", "the scored view", "P", "https://a.b", "2026-01-02")
@@ -178,7 +176,7 @@ def skilled(name, chamfer=0.2, **other):
 
 def test_skill_stands_before_the_score_and_floors_below_the_methods():
     names = ["hausdorff", "chamfer"]
-    table = leaderboard([skilled("worse", 0.3), skilled("better")], names, paper="none")[0]
+    table = leaderboard([skilled("worse", 0.3), skilled("better")], names, paper=False)[0]
     heads = ("Hausdorff ↓ (scene unit)", "Chamfer ↓ (scene unit)")
     assert table.head[2:] == (*heads, "Chamfer: skill ↑")
     assert [row.kind for row in table.rows] == ["", "", "floor"]
@@ -196,16 +194,6 @@ def test_skill_stands_before_the_score_and_floors_below_the_methods():
     assert values(table)["floor: chance"] == ["-", "0.3333"]
 
 
-def test_the_floor_by_view_angle_is_the_empty_rooms_at_that_angle():
-    items = {"view_angle_degrees": np.array([0, 35, 0, 35])}
-    items["empty_room_chamfer"] = np.array([0.1, 0.5, 0.3, 0.7])
-    file = rooms("a")
-    file = stated(replace(file, columns={**file.columns, **items}), by_view_angle=angles(0.2))
-    _, table = leaderboard([file], paper="none")
-    assert table.head[2:] == ("0°", "5°", "35°")
-    assert values(table)["floor: empty room"] == ["0.2000", "-", "0.6000"]
-
-
 def test_methods_that_are_not_above_the_floor_have_no_rank_and_the_next_column_orders_them():
     columns = {"shape_error": [0.1] * 4, "relief_iou": [0.1] * 4}
     shapes = {"flat": (0.0, 0.0, 0.0), "tries": (-0.1, -0.2, 0.0), "knows": (0.3, 0.1, 0.5)}
@@ -217,12 +205,11 @@ def test_methods_that_are_not_above_the_floor_have_no_rank_and_the_next_column_o
         })
         for n, ends in shapes.items()
     ]  # fmt: skip
-    table = leaderboard(files, paper="none")[0]
+    table = leaderboard(files, paper=False)[0]
     floor = "floor: flat cut-out"
     assert ranks(table)[:4] == [("1", "knows"), ("", floor), ("", "tries"), ("", "flat")]
-    (ranking,), _ = rankings(files[:2], paper="none")
+    (ranking,) = rankings(files[:2], paper=False)
     assert ranks(ranking.tables[0])[:3] == [("", floor), ("", "tries"), ("", "flat")]
-    assert lead_of(ranking).strong == "No method"
 
 
 def relief(name, iou, floor):
@@ -234,7 +221,7 @@ def relief(name, iou, floor):
 
 def test_the_skill_of_relief_ranks_and_its_floor_stands_beside_each_score():
     guess, seen = relief("guess", 0.37, 0.36), relief("seen", 0.35, 0.2)
-    table = leaderboard([guess, seen], paper="none")[0]
+    table = leaderboard([guess, seen], paper=False)[0]
     assert table.head[2:] == (
         "Segmentation (relief IoU): skill ↑",
         "Segmentation (relief IoU) ↑ (fraction)",
@@ -249,7 +236,7 @@ def test_what_is_too_wide_becomes_two_tables():
     names = ("chamfer", "hausdorff", "mse_depth", "relief_iou")
     columns = {name: [0.2] * 4 for name in names}
     skills = {name: Skill(0.5, None, None, 0.4, f"empty_room_{name}") for name in names[:3]}
-    ranking, scores = leaderboard([rooms_scores("a", columns, SCENES, skills=skills)], paper="none")
+    ranking, scores = leaderboard([rooms_scores("a", columns, SCENES, skills=skills)], paper=False)
     names = ("Chamfer", "Hausdorff", "MSE-depth")
     assert ranking.head[2:] == tuple(f"{name}: skill ↑" for name in names)
     assert scores.head[2] == "Segmentation (relief IoU) ↑ (fraction)"
@@ -274,44 +261,6 @@ def test_a_submission_stands_there_once():
     assert leaderboard([a, replace(a, meta=replace(a.meta, truth_digest="f" * 64))])
 
 
-def by_kind(*rights):
-    kinds = ("matched", "near")
-    return {
-        kind: {"iqtt_accuracy": make_score("iqtt_accuracy", right)}
-        for kind, right in zip(kinds, rights, strict=True)
-    }
-
-
-def test_questions_by_kind_with_the_floors_of_each_kind():
-    table = (Floor("near", "trees", 0.6, 2500), Floor("matched", CHANCE, 1 / 3, 2500))
-    told = {"by_distractor": by_kind(0.3, 0.7), "question_floors": table}
-    file = iqtt_scores("a", [1, 0, 1, 0], **told)
-    _, kinds, floors = leaderboard([file], paper="none")
-    assert kinds.head[2:] == ("matched", "near")
-    assert values(kinds) == {
-        "a": ["0.3000", "0.7000"],
-        "floor: best": ["0.3333", "0.6000"],
-        "floor: chance": ["0.3333", "0.3333"],
-    }
-    assert [[cell.value for cell in row.cells] for row in floors.rows] == [
-        ["near", "0.6000", "trees", "2,500"],
-        ["matched", "0.3333", CHANCE, "2,500"],
-    ]
-
-
-def angles(shift):
-    return {str(a): {"chamfer": make_score("chamfer", a / 100 + shift)} for a in (5, 35, 0)}
-
-
-def test_scores_by_view_angle_keep_the_order_of_the_ranking():
-    files = [rooms("b", 0.3, by_view_angle=angles(0.0)), rooms("a", by_view_angle=angles(0.1))]
-    _, table = leaderboard(files, paper="none")
-    assert table.head[2:] == ("0°", "5°", "35°")
-    assert ranks(table) == [("", "a"), ("", "b")]
-    assert best(table) == [[False] * 3] * 2, "without intervals nothing is told apart"
-    assert values(table)["b"][0] == "0"
-
-
 def varied(name, off, seed):
     """40 scenes of Chamfer distances about 0.2, with noise of their own."""
     noise = np.random.default_rng(seed).normal(0, 0.02, 40)
@@ -320,10 +269,10 @@ def varied(name, off, seed):
 
 def test_bold_needs_a_difference_that_its_interval_does_not_cross():
     files = [varied("a", 0.0, 1), varied("b", 0.004, 2), varied("c", 0.08, 3)]
-    (table,) = leaderboard(files, paper="none")
+    (table,) = leaderboard(files, paper=False)
     assert [row.cells[0].value for row in table.rows] == ["1", "1", "3"]
     assert best(table) == [[False]] * 3
-    (table,) = leaderboard(files[::2], paper="none")
+    (table,) = leaderboard(files[::2], paper=False)
     assert best(table) == [[True], [False]]
 
 
@@ -333,76 +282,53 @@ def test_a_set_that_cannot_tell_methods_apart_says_so():
     none = [{"chamfer": [0.1 * k] * 4, "object_depth_error": [nan] * 4} for k in (1, 2)]
     for columns in (one, none):
         files = [rooms_scores(n, c, range(4)) for n, c in zip("ab", columns, strict=True)]
-        ((ranking,), _) = rankings(files, ["chamfer"], paper="none")
+        (ranking,) = rankings(files, ["chamfer"], paper=False)
         assert ranking.mute
         assert [entry.rank for entry in ranking.entries] == ["", ""]
         assert best(ranking.tables[0]) == [[False]] * 2
-        assert lead_of(ranking).strong == "No method"
-    assert not rankings([rooms("a"), rooms("b")], paper="none")[0][0].mute
+    assert not rankings([rooms("a"), rooms("b")], paper=False)[0].mute
 
 
 def test_a_method_that_is_the_floor_says_so():
     floor = Skill(0.0, 0.0, 0.0, 0.4, "empty_room_chamfer")
     files = [skilled("room", 0.4, skills={"chamfer": floor}), skilled("better")]
-    table = leaderboard(files, ["chamfer"], paper="none")[0]
+    table = leaderboard(files, ["chamfer"], paper=False)[0]
     ((cell, *_),) = [row.cells[3:] for row in table.rows if row.cells[1].value == "room"]
     assert (cell.value, cell.rest, cell.best) == ("0", "is the floor", False)
     assert sum(note.startswith("room: ") for note in table.notes) == 1
 
 
-def shown_figures(tables):
-    """Values of the paper's rows."""
-    rows = [row for table in tables for row in table.rows if row.kind == "reported"]
-    assert all(row.cells[1].value.endswith(" †") for row in rows)
-    assert not any(row.cells[0].value or cell.best for row in rows for cell in row.cells)
-    return [cell.value for row in rows for cell in row.cells[2:] if cell.value != "-"]
-
-
-@pytest.mark.parametrize("names", [[], ["rooms"], ["iqtt"], ["rooms", "iqtt"]])
-def test_every_figure_of_the_paper_is_shown_marked_and_unranked(names):
-    made = {"rooms": rooms("a", 0.11, by_view_angle=angles(0.2)), "iqtt": iqtt_scores("b", [1, 0])}
-    tables = leaderboard([made[name] for name in names], paper="all")
-    shown = shown_figures(tables)
-    assert {figure.text for table in TABLES for figure in table.figures} <= set(shown)
-    assert len(shown) >= sum(len(table.figures) for table in TABLES)
-    if names:
-        kinds = {row.kind for row in tables[0].rows}
-        # The questions are of mirror images, and the paper's are not.
-        assert kinds == ({"", "reported"} if names[0] == "rooms" else {"", "floor"})
-
-
-def test_only_the_tables_of_the_task_are_shown_unless_asked_for():
-    files = [rooms("a", by_view_angle=angles(0.2))]
-    shown = {paper: shown_figures(leaderboard(files, paper=paper)) for paper in PAPER}
-    accuracies = {f.text for f in TABLES[2].figures}
-    assert accuracies.isdisjoint(shown["task"])
-    assert {f.text for f in TABLES[1].figures} <= set(shown["task"])
-    assert accuracies <= set(shown["all"])
-    assert shown["none"] == []
-
-
-def test_figures_of_other_scores_or_angles_do_not_slip_into_a_ranking():
-    ranking, turned, *_ = leaderboard([rooms("a", by_view_angle=angles(0.2))])
-    assert len(ranking.rows) == 1 + 4
+def test_the_papers_figures_of_the_shown_scores_are_marked_and_unranked():
+    (ranking,) = leaderboard([rooms("a", 0.11)])
+    reported = [row for row in ranking.rows if row.kind == "reported"]
+    assert len(reported) == 4
+    assert all(row.cells[1].value.endswith(" †") for row in reported)
+    assert not any(row.cells[0].value or cell.best for row in reported for cell in row.cells)
     assert values(ranking)["PTN, ShapeNet scenes (Table 1) †"][0] == "0.181"
-    assert values(turned)["Pix2Shape, Shape scenes (Table 2) †"] == ["-", "0.098", "0.112"]
     other = {"other": iqtt_scores("a", [1]).by_distractor["mirror"]}
     for kinds in (other, {}):
-        people, *_ = leaderboard([iqtt_scores("a", [1], by_distractor=kinds)])
+        (people,) = leaderboard([iqtt_scores("a", [1], by_distractor=kinds)])
         assert sum(row.kind == "reported" for row in people.rows) == len(TABLES[2].figures)
     label = "Human Evaluation, 3D-IQTT, 0 labels (Table 3) †"
     assert (values(people)[label][-1], rests(people)[label][-1]) == ("0.7329", "± 0.148")
+    # The questions are of mirror images, and the paper's are not.
+    kinds = {row.kind for row in leaderboard([iqtt_scores("b", [1, 0])])[0].rows}
+    assert kinds == {"", "floor"}
 
 
 def test_methods_that_see_the_first_view_alone_are_ranked_apart():
     columns = {name: [0.2] * 4 for name in ("shape_error", "behind_depth_error", "chamfer")}
     shown = {"a": "scored_view", "b": "first_view", "c": "no_view", "d": "first_view"}
     files = [replace(rooms_scores(n, columns, SCENES), shown=s) for n, s in shown.items()]
-    looks, first, none = rankings(files, paper="none")[0]
-    assert [[f.method for f in r.files] for r in (looks, first, none)] == [["a"], ["b", "d"], ["c"]]
+    looks, first, none = rankings(files, paper=False)
+    assert [[entry.label for entry in r.entries] for r in (looks, first, none)] == [
+        ["a"],
+        ["b", "d"],
+        ["c"],
+    ]
     heads = [ranking.tables[0].head[2:] for ranking in (looks, first, none)]
     assert [head[0].split()[0] for head in heads] == ["Shape", "Depth", "Depth"]
     assert not any("behind" in column for column in heads[0])
     alone = [replace(file, columns={**file.columns, "view_index": 0 * file.ids}) for file in files]
-    (together,) = rankings(alone, paper="none")[0]
-    assert len(together.files) == 4
+    (together,) = rankings(alone, paper=False)
+    assert len(together.entries) == 4

@@ -1,0 +1,161 @@
+"""Predictions of rooms for a 3D page: which rows are shown, in which order, with what beside."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.score_file import read_scores
+from metrics.scoring.geometry import points_as_scored
+from metrics.scoring.metric_names import HEADLINE, OF_TRUTH, OTHER_SCENE, in_order, metric
+from metrics.scoring.records import ID_COLUMNS, OPTIONAL_COLUMNS, ScoreFile
+from metrics.scoring.rows import score_rows
+from metrics.scoring.runs import Progress, ScoringError, Settings, matched_rows
+from metrics.scoring.truth_digests import require_truth, stated_truth
+from metrics.submissions.reader import Predictions, RoomPredictions
+from scenegen.common.errors import SpecError
+from scenegen.rooms.reader import Room, RoomsFile
+from scenegen.viewing.page import Predicted, Scenes, scene_rows
+
+Array = NDArray[Any]
+MOST_SCORED = 100  # rows that are scored unless others are asked for
+SHOWN_SCORES = ("relief_iou", "chamfer", "hausdorff", "rmse", "normal_mean_degrees")
+UNITS = {"fraction": "", "correlation": "", "ratio": "", "degree": "degrees"}  # behind a number
+
+
+@dataclass(frozen=True, eq=False)
+class RowScores:
+    """Scores of some rows of a submission.
+
+    Attributes:
+        rows: of the truth, ascending, (N,).
+        values: (N,) by name of the score; NaN where a row has no such score.
+    """
+
+    rows: Array
+    values: Mapping[str, Array]
+
+
+def require_rooms(predictions: Predictions) -> RoomPredictions:
+    """Return a submission of rooms. Raises ScoringError for answers to questions."""
+    if not isinstance(predictions, RoomPredictions):
+        found, hint = f"answers to {predictions.task}", "only rooms are shown in 3D"
+        raise ScoringError(predictions.path, found, "predictions of rooms", hint)
+    return predictions
+
+
+def shown_scores(
+    predictions: RoomPredictions,
+    truth: RoomsFile,
+    items: Sequence[int] | None = None,
+    scores_path: str | Path | None = None,
+    progress: Progress = lambda done: None,
+) -> RowScores:
+    """Return the scores of the rows to show, from a score file or computed here.
+
+    Args:
+        items: rows of the truth; None for all of the score file, or the first MOST_SCORED that are
+            predicted.
+        scores_path: a score file of these predictions; of several runs, its scores are means.
+            Without it, the rows are scored as by `bench score --non-finite penalise`.
+        progress: called with the number of rows that were scored since it was last called.
+
+    Raises:
+        OSError, JsonError: as `read_scores`.
+        ScoringError: predictions of another truth, or scores of others.
+        SpecError: a row that is not predicted or has no score.
+    """
+    there, path = matched_rows([predictions], truth, partial=True), str(predictions.path)
+    stored = None if scores_path is None else _scores_of(scores_path, predictions, truth)
+    if stored is not None:
+        there, path = np.intersect1d(there, stored.ids), stored.place
+    rows = there if items is None else np.unique(np.array(items, np.int64))
+    rows = rows[:MOST_SCORED] if items is None and stored is None else rows
+    unknown = rows[~np.isin(rows, there)]
+    if unknown.size or not rows.size:
+        found = f"row {unknown[0]}" if unknown.size else "no row"
+        raise SpecError("items", found, f"some of the {len(there)} rows of {path}")
+    if stored is not None:
+        here, ids = (
+            np.searchsorted(stored.ids, rows),
+            (*ID_COLUMNS["rooms"], *OPTIONAL_COLUMNS["rooms"]),
+        )
+        return RowScores(rows, {n: c[here] for n, c in stored.items.items() if n not in ids})
+    settings = Settings(allow_partial=True, non_finite="penalise")
+    scored = score_rows([predictions], truth, rows, settings, progress)
+    return RowScores(rows, {name: runs[0] for name, runs in scored.scores.items()})
+
+
+def _scores_of(path: str | Path, predictions: RoomPredictions, truth: RoomsFile) -> ScoreFile:
+    """Read a score file of a submission. Raises ScoringError for scores of others."""
+    scores = read_scores(path)
+    require_truth(scores, stated_truth(truth), truth.path)
+    if predictions.sha256 not in {run.sha256 for run in scores.meta.submissions}:
+        found = f"scores of {', '.join(run.path for run in scores.meta.submissions)}"
+        expected = f"those of {predictions.path} as it is now"
+        raise ScoringError(path, found, expected, "score it again, or leave out --scores")
+    return scores
+
+
+def predicted_rooms(
+    predictions: RoomPredictions, truth: RoomsFile, scores: RowScores
+) -> tuple[Scenes, Predicted]:
+    """Return the scenes of the rows of `scores`, and what a page shows of their predictions.
+
+    A submission has its normals, and points as they are scored.
+    """
+    rows, entry_of = scores.rows.tolist(), {int(row): i for i, row in enumerate(predictions.rows)}
+    place_of = {row: i for i, row in enumerate(rows)}
+    scenes, names = scene_rows(truth, rows), _sortable(scores)
+    orders = {title: worst_first(scores, name, scenes) for title, name in names.items()}
+
+    def points(room: Room) -> Array:
+        view = predictions.view(entry_of[room.index])
+        return points_as_scored(view, room.depth, room.fov_y_degrees)
+
+    def normal(room: Room) -> Array:
+        return predictions.normal(entry_of[room.index])
+
+    def texts(row: int, title: str) -> dict[str, str]:
+        values = {name: float(column[place_of[row]]) for name, column in scores.values.items()}
+        shown = [n for n in dict.fromkeys((names[title], *SHOWN_SCORES)) if n in values]
+        return {metric(name).title: _text(name, values[name]) for name in shown}
+
+    return scenes, Predicted(orders, points, normal if predictions.has_normals else None, texts)
+
+
+def _sortable(scores: RowScores) -> dict[str, str]:
+    """Return titles of scores that some row has, headline first, with the names of the scores."""
+    finite = [name for name, column in scores.values.items() if np.isfinite(column).any()]
+    names = in_order(name for name in finite if not name.startswith((*OF_TRUTH, OTHER_SCENE)))
+    headline = [name for name in names if name in HEADLINE["rooms"]]
+    return {metric(name).title: name for name in (*headline, *names)}
+
+
+def worst_first(
+    scores: RowScores, name: str, scenes: Iterable[tuple[int, ...]]
+) -> list[tuple[int, ...]]:
+    """Return scenes, each the rows of its views, from the worst mean score to the best.
+
+    The views of a scene come in the same order. What has no such score comes last, equals stay in
+    their order.
+    """
+    sign = 1.0 if metric(name).higher_is_better else -1.0
+    value = dict(zip(scores.rows.tolist(), (sign * scores.values[name]).tolist(), strict=True))
+
+    def place(rows: Sequence[int]) -> float:
+        finite = [value[row] for row in rows if np.isfinite(value[row])]
+        return float(np.mean(finite)) if finite else np.inf
+
+    inside = [tuple(sorted(rows, key=lambda row: place([row]))) for rows in scenes]
+    return sorted(inside, key=place)
+
+
+def _text(name: str, value: float) -> str:
+    if not np.isfinite(value):
+        return "none"
+    unit = metric(name).unit
+    return f"{value:.4g} {UNITS.get(unit, unit)}".rstrip()
