@@ -9,8 +9,7 @@ import torch
 from refusals import refused
 
 from baselines.pix2shape.network.empty_rooms import Cameras
-from baselines.pix2shape.use.answers import answer_file
-from baselines.pix2shape.use.predict import predict_rooms
+from baselines.pix2shape.predict import answer_file, predict_rooms
 from baselines.pix2shape.weights import FOLDER, names, open_weights, suited
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
@@ -25,7 +24,7 @@ from scenegen.rooms.reader import RoomsFile
 
 
 def test_they_are_small_and_each_has_its_card() -> None:
-    assert sum(path.stat().st_size for path in FOLDER.iterdir()) <= 25_000_000
+    assert sum(path.stat().st_size for path in FOLDER.iterdir()) <= 14_000_000
     for name in names():
         model, card = open_weights(name)
         assert card.settings == model.config
@@ -49,7 +48,7 @@ def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
     preset = name.removesuffix("-rays").removesuffix("-paper")
     make_dataset(data, preset_spec(preset, seed=77, views=(0.0, 55.0)), 4)
     assert suited(data, model.config.method) == name
-    assert suited(data) == f"{preset.removesuffix('-single')}-rays"
+    assert suited(data) == f"{preset}-rays"
     predict_rooms(model, data, out)
     with RoomsFile(data) as rooms, open_predictions(out) as predictions:
         truth = rooms.read("depth", slice(None))

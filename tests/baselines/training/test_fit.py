@@ -20,6 +20,7 @@ from baselines.training.checkpoint import (
     new_state,
 )
 from baselines.training.fit import Loss, TrainingError, falling_late, fit
+from baselines.training.machine import Machine
 from scenegen.common.random.seeding import Purpose, item_rng
 
 
@@ -76,8 +77,8 @@ def run(folder: Path, state: Any, spoil: Spoil | None = None, **how: Any) -> lis
     folder.mkdir(exist_ok=True)
     told: list[Any] = []
     steps = Steps(state.network, *[spoil] * (spoil is not None))
-    how = {"every": 2, "progress": lambda *now: told.append(now), **how}
-    fit(folder, METHOD, state, steps, falling_late, **how)
+    how = {"progress": lambda *now: told.append(now), **how}
+    fit(folder, METHOD, state, steps, falling_late, Machine(every=2), **how)
     return told
 
 
@@ -93,8 +94,10 @@ def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:
 def test_each_step_sees_what_the_one_before_it_changed(tmp_path):
     state, told = begun(), []
     steps = Steps(state.network.eval())
-    how = {"every": 2, "progress": lambda *now: told.append(now)}
-    fit(tmp_path, METHOD, state, steps, falling_late, **how)
+    fit(
+        tmp_path, METHOD, state, steps, falling_late, Machine(every=2),
+        progress=lambda *now: told.append(now),
+    )  # fmt: skip
     assert [now[:2] for now in told] == [(done, 5) for done in range(1, 6)]
     assert all(losses.keys() == {"one", "two"} for *_, losses in told)
     assert steps.seen[1::2][:-1] == steps.seen[2::2], "the second step leaves the first number"

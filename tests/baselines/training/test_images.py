@@ -11,13 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 
-from baselines.training.images import (
-    Draws,
-    Opened,
-    channels_first,
-    check_reducible,
-    reduced,
-)
+from baselines.training.data import Opened
+from baselines.training.images import Draws, channels_first, check_reducible, reduced
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 
