@@ -112,8 +112,8 @@ def train(
         network.seen.load_state_dict(seen.state_dict())
 
     return training.train(
-        METHOD, lessons_of, True, data, run_folder, settings, machine,
-        begin=begin, resume=resume, progress=progress,
+        METHOD, lessons_of, True, begin, data, run_folder, settings, machine,
+        resume=resume, progress=progress,
     )  # fmt: skip
 
 

@@ -72,12 +72,12 @@ def train(
     method: Method[Card, Any],
     teach: Teach,
     with_depth: bool,
+    begin: Callable[[Any], Any],
     data: TrainingFiles,
     run_folder: str | Path,
     settings: Settings = Settings(),  # noqa: B008 (it is frozen)
     machine: Machine | None = None,
     *,
-    begin: Callable[[Any], Any] = lambda network: None,
     resume: bool = False,
     progress: Progress = lambda done, total, losses: None,
 ) -> Path:
@@ -121,6 +121,10 @@ def train(
 
         fit(folder, method, state, losses, learning_rate, machine, progress=progress)
     return folder / WEIGHTS
+
+
+def as_it_is(_network: Any) -> None:
+    """Begin with the first weights."""
 
 
 def learning_rate(settings: Settings, iteration: int) -> float:

@@ -101,8 +101,7 @@ def fit(
     if state.card.iteration == state.card.settings.iterations and is_first():
         save()  # the run may have ended between its last checkpoint and its weights
     state.network.train()
-    on_gpu = next(state.network.parameters()).device.type != "cpu"
-    reported = _Reported(FETCHED if on_gpu else 1)
+    reported = _Reported(fetch_interval(next(state.network.parameters()).device))
     while state.card.iteration < state.card.settings.iterations:
         number = state.card.iteration
         for optimiser in state.optimisers.values():
@@ -126,6 +125,11 @@ def fit(
             save()
         if is_first():
             progress(done, last, reported.numbers)
+
+
+def fetch_interval(device: torch.device) -> int:
+    """Return after how many iterations losses are fetched from a device: 1 for every step's."""
+    return 1 if device.type == "cpu" else FETCHED
 
 
 class _Plan:

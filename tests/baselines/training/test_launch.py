@@ -18,9 +18,12 @@ from baselines.training.checkpoint import load_checkpoint, moments_of, new_state
 from baselines.training.launch import torchrun_counts
 from scenegen.common.errors import SpecError
 
-ALL = {"seed": 2, "critic_steps": 2, "questions": 0.01, "contrast": 1.0, "question_batch": 8}
+ALL = {
+    "seed": 2, "critic_steps": 2, "questions": 0.01, "contrast": 1.0, "question_batch": 8,
+    "labelled_batch": 2,
+}  # fmt: skip
 MORE = {
-    "labelled_batch": 2, "turned": True, "hard_negatives": 0.5, "encoder": "polar", "spherical": True, "camera": False,
+    "turned": True, "hard_negatives": 0.5, "encoder": "polar", "spherical": True, "camera": False,
     "adversarial": 0.0, "code_reconstruction": 0.0,
 }  # fmt: skip
 VIEWS = {
