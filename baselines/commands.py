@@ -16,13 +16,15 @@ import click
 
 from baselines.pix2shape.commands import (
     ALLOW_TEST_SET,
+    DEVICE,
+    MINUTES,
     SUBMISSION,
     WEIGHTS_PATH,
     Setting,
+    how_to_score,
     named_once,
     needs_torch,
     predict_to,
-    score_hint,
     shown_rows,
     shown_training,
 )
@@ -140,9 +142,11 @@ def baseline(
 ) -> None:
     """Write the submission of a baseline for rooms or questions."""
     from baselines.training.test_sets import refuse_test_set
+    from scenegen.files.sets.shards import OpenFile
 
-    if train is not None:
-        refuse_test_set(train, allow_test_set)
+    if train is not None and not allow_test_set:
+        with OpenFile(train, "rooms or question file") as opened:
+            refuse_test_set(opened)
     _check_task(name, data)
     _check_options(name, weights, train, labels, features)
     if train_features is not None and name != "features":
@@ -177,7 +181,7 @@ def baseline(
                 from baselines.trivial import write_room_baseline
 
                 write_room_baseline(name, data, out, train=train, **how)
-    print_line(f"{out}: {method} on {data}; {score_hint(out, data)}")
+    print_line(f"{out}: {method} on {data}; {how_to_score(out, data)}")
 
 
 def _check_options(
@@ -238,7 +242,15 @@ def _answer_by_outline(
     epilog=f"{_listed(TRAINED)}{EXAMPLE}bench train cnn --data iqtt-split/iqtt-train.h5 --out run",
 )
 @click.argument("name", type=click.Choice(list(TRAINED)), metavar="NAME")
-@click.option("--data", type=InputPath(), required=True, help="Rooms or questions to train on.")
+@click.argument("more", type=InputPath(), nargs=-1, metavar="")
+@click.option(
+    "--data",
+    type=InputPath(),
+    multiple=True,
+    required=True,
+    metavar="FILE...",
+    help="Rooms or questions to train on; networks of depth learn from several files.",
+)
 @click.option("--out", type=OutputFolder(), required=True, help="Folder of the run.")
 @click.option(
     "--labels",
@@ -259,16 +271,21 @@ def _answer_by_outline(
     help="Change another setting of the baseline, such as depth=50; docs/baselines.md lists them.",
 )
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
+@MINUTES
+@DEVICE
 @ALLOW_TEST_SET
 def train_baseline(
     name: str,
-    data: str,
+    more: tuple[str, ...],
+    data: tuple[str, ...],
     out: str,
     labels: int | None,
     seed: int | None,
     iterations: int | None,
     settings: tuple[tuple[str, Any], ...],
     resume: bool,
+    minutes: float | None,
+    device: str,
     allow_test_set: bool,
 ) -> None:
     """Train a baseline; weights and checkpoint are written to a folder."""
@@ -277,11 +294,15 @@ def train_baseline(
     if resume and (chosen or settings):
         message = "--resume goes on with the run's own --labels, --seed, --iterations and --set"
         raise click.UsageError(f"{message}; leave them out")
+    if minutes is not None and iterations is not None:
+        raise click.UsageError("--minutes decides --iterations; leave one of them out")
     module = _module(name)
+    from baselines.training.data import TrainingFiles
+    from baselines.training.machine import Machine
     from baselines.training.test_sets import refuse_test_set
     from scenegen.common.records import check, from_json
 
-    refuse_test_set(data, allow_test_set)
+    machine = Machine(device, minutes=minutes)
     parameters = inspect.signature(module.train).parameters.values()
     arguments = {p.name for p in parameters if p.kind is p.KEYWORD_ONLY} - {"resume", "progress"}
     names = {field.name for field in fields(module.Settings)}
@@ -297,17 +318,20 @@ def train_baseline(
     how = {key: chosen.pop(key) for key in arguments & chosen.keys()}
     made = from_json(module.Settings, json.dumps(chosen), "settings")
     text = ""
-    with shown_training(out, every=100) as show:
+    with TrainingFiles(*data, *more) as files, shown_training(out, machine.every) as show:
+        if not allow_test_set:
+            for opened in files.opened:
+                refuse_test_set(opened)
 
         def remember(done: int, total: int, numbers: Mapping[str, float]) -> None:
             nonlocal text
             text = ", ".join(f"{key} {value:.3g}" for key, value in numbers.items())
             show(done, total, numbers)
 
-        weights = module.train(data, out, made, **how, resume=resume, progress=remember)
-    more = f" ({text})" if text else ""
+        weights = module.train(files, out, made, machine, **how, resume=resume, progress=remember)
+    reached = f" ({text})" if text else ""
     use = f"bench baseline {name} --weights {shlex.quote(str(weights))} --data ..."
-    print_line(f"{weights}: {name} trained on {data}{more}; now `{use}`")
+    print_line(f"{weights}: {name} trained on {files.where}{reached}; now `{use}`")
 
 
 def _module(name: str) -> Any:

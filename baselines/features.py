@@ -54,7 +54,7 @@ def write_features(
         name, given = ("train_features", train) if train else ("train", train_features)
         check(given is None, name, "none", f"one that belongs to {given}")
         check(labels is None, "labels", labels, "none, as nothing is learned without --train")
-        scores, notes = nearest(seen), "cosine of features; no labels"
+        scores, notes = cosines_with_reference(seen), "cosine of features; no labels"
     else:
         with open_labelled(train) as labelled:
             count = check_training(questions, labelled, labels, least=2 * FOLDS)
@@ -63,7 +63,7 @@ def write_features(
                 found, expected = (f"{one.shape[2]} numbers a picture" for one in (learned, seen))
                 raise FileFormatError(train_features, found, f"{expected}, as {features} has")
             right = labelled.read("answers", slice(0, count)).astype(int)
-        scores, notes = probed(learned, right, seen), f"a probe of {count} labels of {train}"
+        scores, notes = probe_scores(learned, right, seen), f"a probe of {count} labels of {train}"
     write_answers(out, data, method="features", scores=scores, notes=notes, overwrite=overwrite)
 
 
@@ -90,13 +90,13 @@ def read_features(path: str | Path, count: int, questions: QuestionsFile) -> Arr
     return read
 
 
-def nearest(features: Array) -> Array:
+def cosines_with_reference(features: Array) -> Array:
     """Return the cosine of each answer with the reference, (Q, K)."""
     cosines: Array = np.einsum("qd,qkd->qk", features[:, 0], features[:, 1:])
     return cosines
 
 
-def probed(learned: Array, right: Array, seen: Array) -> Array:
+def probe_scores(learned: Array, right: Array, seen: Array) -> Array:
     """Return scores of answers, (Q, K), by weights of dimensions that labelled questions teach.
 
     Args:

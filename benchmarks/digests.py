@@ -96,7 +96,7 @@ def commands(folder: Path) -> Iterator[str]:
     yield "bench baseline mean-depth --data truth.h5 --train train-5.h5 --out mean-depth.h5"
     for name in ("empty-room", "oracle"):
         yield f"bench baseline {name} --data truth.h5 --out {name}.h5"
-    yield "pix2shape predict --weights shapes --data truth.h5 --out pix2shape.h5"
+    yield "pix2shape predict --weights shapes-rays --data truth.h5 --out pix2shape.h5"
     questions = "iqtt-mixed-chain/iqtt-test"
     yield f"pix2shape predict --weights iqtt --data {questions}.h5 --out answers.h5"
     yield f"bench baseline chance --data {questions}.h5 --out chance.h5"

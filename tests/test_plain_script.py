@@ -15,7 +15,8 @@ multiprocessing.set_start_method("spawn")  # as a script may have it for its own
 import h5py
 import metrics
 from baselines.pix2shape.training.run import train_run
-from baselines.training.launch import Machine
+from baselines.training.data import TrainingFiles
+from baselines.training.machine import Machine
 from baselines.trivial import write_room_baseline
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
@@ -33,7 +34,7 @@ with h5py.File("empty.h5") as file:
 assert scored == evaluated
 few = {"train": 3, "labeled": 1, "val": 1, "test": 1, "cubes": (6, 7), "min_cube_pixels": 1}
 make_split("split", SplitSpec(seed=5, height=24, width=24, **few), workers=2)
-train_run("run", "rooms.h5", tiny(iterations=1), Machine("cpu", workers=1))
+train_run("run", TrainingFiles("rooms.h5"), tiny(iterations=1), Machine("cpu", workers=1))
 print("end")
 """
 

@@ -2,8 +2,7 @@
 
     network.py   depth of a shape from one picture
     training.py  how it learns, from `iqtt make-split --with-depth`
-    matching.py  surfaces of two pictures, turned until neither denies the other
-    answers.py   submissions
+    answers.py   surfaces of two pictures, turned until neither denies the other; submissions
 
 docs/baselines.md says what it reaches and what it is told.
 """

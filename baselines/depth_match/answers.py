@@ -1,14 +1,21 @@
-"""Answers to questions, from their pictures and the field of view alone."""
+"""Answers to questions, from their pictures and the field of view alone.
 
+Surfaces are turned until neither picture denies the other. Two pictures of one shape show surfaces
+that differ by a rotation about the shape's centre. A picture denies a turned surface where it sees
+past it: where a point lies before the surface that the picture shows at the point's pixel, or
+beside the outline. What lies behind is hidden, and may be there.
+"""
+
+import math
 from pathlib import Path
 
 import torch
 from torch import Tensor
 
-from baselines.depth_match.matching import least_denials
 from baselines.depth_match.network import METHOD, seen_depth
-from baselines.training.checkpoint import load_weights
+from baselines.training.checkpoint import bundled, load_weights
 from baselines.training.questions import Progress, each_question, open_test
+from baselines.training.rotations import finer, rotation_grid
 from iqtt import SplitSpec
 from metrics.prediction_writer import write_answers
 from scenegen.files.new_file import check_writable
@@ -18,6 +25,12 @@ NOTES = (
     "told: in training, true depth and camera distances; the field of view, and that pictures of a"
     " question have one camera distance and the shape's centre on their axis"
 )
+
+POINTS = 300  # of each surface
+GRID = 4608  # rotations that are tried first
+KEPT, TURNS = 12, 24  # how many of the best are turned further, and in how many ways each
+FINER = (0.12, 0.07, 0.04, 0.02)  # radians of these turns, in each round
+MOST = 0.2  # camera distances; a point is denied by no more
 
 
 @torch.inference_mode()
@@ -31,7 +44,7 @@ def write_submission(
 ) -> None:
     """Write answers to the questions of a file, and their scores, as `baselines.training` says."""
     check_writable(Path(out), overwrite)
-    network, card = load_weights(weights or FILES / "depth-match.safetensors", METHOD)
+    network, card = load_weights(weights or bundled(FILES, METHOD), METHOD)
     with open_test(data, card.settings.size) as questions:
         fov = (questions.spec or SplitSpec()).fov_y_degrees
 
@@ -42,3 +55,63 @@ def write_submission(
         values = each_question(questions, card.settings.size, scores, 1, progress=progress)
     numbers = values.double().numpy()
     write_answers(out, data, method="depth-match", scores=numbers, notes=NOTES, overwrite=overwrite)
+
+
+@torch.inference_mode()
+def least_denials(depth: Tensor, fov_y_degrees: float) -> Tensor:
+    """Return how much the reference and each answer deny each other, (K,), under the best turn.
+
+    Args:
+        depth: planar, (1 + K, S, S), camera distances, infinite where nothing is; the reference
+            first.
+    """
+    half = math.tan(math.radians(fov_y_degrees) / 2)
+    points = [surface_points(one, half) for one in depth]
+    start, least = torch.from_numpy(rotation_grid(GRID)), []
+    for answer, shown in zip(points[1:], depth[1:], strict=True):
+
+        def denied(turns: Tensor, answer: Tensor = answer, shown: Tensor = shown) -> Tensor:
+            forth = denials(points[0], turns, shown, half)
+            return forth + denials(answer, turns.transpose(1, 2), depth[0], half)
+
+        turns, costs = start, denied(start)
+        for angle in FINER:
+            turns = finer(turns, -costs, KEPT, TURNS, angle)
+            costs = denied(turns)
+        least.append(costs.amin())
+    return torch.stack(least)
+
+
+def surface_points(depth: Tensor, half: float) -> Tensor:
+    """Return points of what is seen, (POINTS, 3), about the shape's centre, the camera on +z.
+
+    They are spread evenly over the pixels that show the shape, and repeat where there are fewer.
+    Where nothing is shown, they are the centre.
+
+    Args:
+        half: tangent of half the field of view.
+    """
+    rows, columns = depth.isfinite().nonzero(as_tuple=True)
+    if not len(rows):
+        return depth.new_zeros(POINTS, 3)
+    chosen = torch.linspace(0, len(rows) - 1, POINTS).round().long()
+    rows, columns = rows[chosen], columns[chosen]
+    along = depth[rows, columns]
+    x, y = ((2 * place + 1) / len(depth) - 1 for place in (columns, rows))
+    return torch.stack([half * x * along, -half * y * along, 1 - along], dim=1)
+
+
+def denials(points: Tensor, turns: Tensor, shown: Tensor, half: float) -> Tensor:
+    """Return by how much a picture denies turned points, (R,), the mean over the points.
+
+    Args:
+        points: (P, 3); turns: (R, 3, 3).
+        shown: planar depth of the picture, (S, S), infinite where nothing is.
+    """
+    size = len(shown)
+    turned = points @ turns.transpose(1, 2)
+    away = (1 - turned[..., 2]).clamp(min=0.1)  # nothing comes so near to the camera
+    column = ((turned[..., 0] / (away * half) + 1) * size / 2).long().clamp(0, size - 1)
+    row = ((1 - turned[..., 1] / (away * half)) * size / 2).long().clamp(0, size - 1)
+    before = shown.flatten()[row * size + column] - away
+    return before.clamp(0, MOST).mean(dim=1)

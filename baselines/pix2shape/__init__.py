@@ -3,10 +3,10 @@
     network/      the networks, the surfel renderer, and the configuration of both
     batch.py      images, and what the model is told about them; made by rooms.py and questions.py
     weights.py    the card of weights, and the weights that come with the package
-    pictures.py   sheets of images, depths and normals; animations
+    pictures.py   pictures of training, samples, interpolations and rotations
     matching/     relief by search, which training may take for the truth
     training/     losses, steps, and a run
-    use/          submissions, samples, interpolations, rotations
+    predict.py    submissions
     commands.py   the command line `pix2shape`, with drawing_commands.py
 
 Each may import those above it. Start reading in `network/model.py`, then `training/steps.py`.

@@ -76,6 +76,11 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
     return chosen
 
 
+MINUTES = click.option(
+    "--minutes",
+    type=click.FloatRange(0, 1e6, min_open=True),
+    help="End training so many minutes from now, with a schedule of as many iterations as fit.",
+)
 ALLOW_TEST_SET = click.option(
     "--allow-test-set", is_flag=True, help="Learn from a named test set, or from its scenes."
 )
@@ -89,11 +94,11 @@ ALLOW_TEST_SET = click.option(
 @click.option("--out", type=OutputFolder(), required=True, help="Folder of the run.")
 @click.option(
     "--config",
-    type=click.Choice(["compact", "rays", "views", "paper"]),
-    help="compact trains rooms in 40 minutes on a CPU: 64 pixels, an eighth of the paper's width,"
-    " no adversarial loss. rays is as small; it is told floor and walls and learns from rooms of"
-    " several views. views is for questions alone: an encoder of its own, and codes that are"
-    " compared. paper has the paper's size and losses and needs a GPU  [compact].",
+    type=click.Choice(["rays", "views", "paper"]),
+    help="rays trains rooms of several views in 40 minutes on a CPU: 64 pixels, an eighth of the"
+    " paper's width; it is told floor and walls. views is for questions alone: an encoder of its"
+    " own, and codes that are compared. paper has the paper's size and losses and needs a GPU"
+    "  [rays for rooms, views for questions].",
 )
 @click.option(
     "--set",
@@ -118,6 +123,7 @@ ALLOW_TEST_SET = click.option(
 @click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
 @number("--workers", least=0, most=MOST_PROCESSES, default=1, text="Processes that read the data.")
 @number("--every", least=1, default=500, text="Iterations between checkpoints.")
+@MINUTES
 @DEVICE
 @click.option(
     "--devices",
@@ -148,6 +154,7 @@ def train(
     resume: bool,
     workers: int,
     every: int,
+    minutes: float | None,
     device: str,
     devices: int | None,
     nodes: int | None,
@@ -162,21 +169,25 @@ def train(
     from baselines.pix2shape.network.config import model_config
     from baselines.pix2shape.training.run import train_run
     from baselines.training import launch
+    from baselines.training.data import TrainingFiles
+    from baselines.training.machine import Machine
     from baselines.training.test_sets import refuse_test_set
 
-    refuse_test_set(data, allow_test_set)
     chosen = named_once(settings, **({} if seed is None else {"seed": seed}))
     if resume and (config or chosen or labels or conditional or start):
         options = "--config, --set, --seed, --labels, --conditional and --start"
         raise click.UsageError(f"--resume goes on with the run's own {options}; leave them out")
-    here, machines = launch.started_elsewhere()
-    machine = launch.Machine(device, devices or here, nodes or machines, workers, every)
+    here, machines = launch.torchrun_counts()
+    machine = Machine(device, devices or here, nodes or machines, workers, every, minutes)
     try:
-        with shown_training(out, every) as show:
+        with TrainingFiles(data) as files, shown_training(out, every) as show:
+            if not allow_test_set:
+                refuse_test_set(files.opened[0])
+            name = config or ("views" if files.hold_questions else "rays")
             weights = train_run(
                 out,
-                data,
-                None if resume else model_config(config or "compact", **chosen),
+                files,
+                None if resume else model_config(name, **chosen),
                 machine,
                 labels=labels,
                 conditional=conditional,
@@ -214,6 +225,7 @@ def shown_training(
         if bar is None:  # the first iteration, of a resumed run too; only the first process shows
             bar = progress_bar(total, "it")
             bar.initial = bar.n = max(0, done - 1)
+        bar.total = total
         bar.set_postfix_str(text, refresh=False)
         bar.update(done - bar.n)  # none while images are matched
         if bar.disable and done and (done % every == 0 or done == total):
@@ -226,7 +238,10 @@ def shown_training(
 
         if is_first_here():
             click.echo()
-            print_line(f"Stopped; `--resume` goes on from {out}'s last checkpoint, if it got one.")
+            where = f" after {bar.n} of {bar.total} iterations of its schedule" if bar else ""
+            print_line(
+                f"Stopped{where}; `--resume` goes on from {out}'s last checkpoint, if it got one."
+            )
         raise
     finally:
         if bar is not None:
@@ -248,7 +263,7 @@ def predict(
     Every view of a room is predicted from one image, the room's view 0, and the cameras.
     """
     weights = predict_to(out, weights, data, run=run, device=device, overwrite=overwrite)
-    print_line(f"{out}: {weights} on {data}; {score_hint(out, data)}")
+    print_line(f"{out}: {weights} on {data}; {how_to_score(out, data)}")
 
 
 def predict_to(
@@ -261,7 +276,7 @@ def predict_to(
         method: as `bundled.suited`; the name that the submission must have.
     """
     needs_torch()
-    from baselines.pix2shape.use.predict import predict_file
+    from baselines.pix2shape.predict import predict_file
     from baselines.pix2shape.weights import suited
 
     weights = weights or suited(data, method)
@@ -282,7 +297,7 @@ def shown_rows() -> Iterator[Callable[[int, int], None]]:
         yield show
 
 
-def score_hint(out: str, data: str) -> str:
+def how_to_score(out: str, data: str) -> str:
     """Return what is said after a submission was written."""
     return f"score it with `{shlex.join(['bench', 'score', out, '--truth', data])}`"
 

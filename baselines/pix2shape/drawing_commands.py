@@ -37,8 +37,7 @@ def sample(
 ) -> None:
     """Draw samples of the model's prior, as images, depths and normals."""
     needs_torch()
-    from baselines.pix2shape.pictures import check_picture, save_pictures
-    from baselines.pix2shape.use.explore import sample_sheet
+    from baselines.pix2shape.pictures import check_picture, sample_sheet, save_pictures
     from baselines.pix2shape.weights import open_weights
 
     check_picture(out, False, overwrite)
@@ -65,8 +64,7 @@ def interpolate(
     if len(items) != 2:
         raise click.UsageError(f"--items: found {len(items)} rows, expected two such as 0,1")
     model, rooms, items = _model_and_rooms(weights, data, items, out, overwrite)
-    from baselines.pix2shape.pictures import save_pictures
-    from baselines.pix2shape.use.explore import interpolation_sheet
+    from baselines.pix2shape.pictures import interpolation_sheet, save_pictures
 
     save_pictures([interpolation_sheet(model, rooms, items[0], items[1], steps)], out, overwrite)
     print_line(f"{out}: from row {items[0]} to row {items[1]} of {data}")
@@ -93,8 +91,7 @@ def rotate(
 ) -> None:
     """Draw an animation in which the camera turns around rooms that the model saw in one image."""
     model, rooms, items = _model_and_rooms(weights, data, items, out, overwrite, animated=True)
-    from baselines.pix2shape.pictures import save_pictures
-    from baselines.pix2shape.use.explore import rotation_frames
+    from baselines.pix2shape.pictures import rotation_frames, save_pictures
 
     angles = [degrees * i / (frames - 1) for i in range(frames)]
     save_pictures(rotation_frames(model, rooms, items, angles), out, overwrite)
@@ -111,14 +108,13 @@ def _model_and_rooms(
 ) -> tuple[Any, Any, list[int]]:
     """Check the picture's name; return model, rooms and the rows, which are checked, too."""
     needs_torch()
-    from baselines.pix2shape.pictures import check_picture
-    from baselines.pix2shape.use.explore import known_rooms
+    from baselines.pix2shape.pictures import check_picture, open_known_rooms
     from baselines.pix2shape.weights import open_weights, suited
     from scenegen.files.pictures import pick_rows
 
     check_picture(out, animated, overwrite)
     model, card = open_weights(weights or suited(data))
-    rooms = known_rooms(data, card)
+    rooms = open_known_rooms(data, card)
     return model, rooms, pick_rows(len(rooms), items)
 
 

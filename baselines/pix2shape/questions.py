@@ -10,7 +10,8 @@ from torch.utils.data import Dataset
 from baselines.pix2shape.batch import Batch, as_batch
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.polar import BRIGHT
-from baselines.training.images import Opened, check_reducible
+from baselines.training.data import Opened
+from baselines.training.images import check_reducible
 from baselines.training.questions import check_truth, question_images, question_lights
 from iqtt import QuestionsFile
 from scenegen.common.errors import SpecError
@@ -100,4 +101,4 @@ def for_questions(config: ModelConfig, questions: QuestionsFile) -> ModelConfig:
     spec = replace(spec, z_scene=spec.z - Z_VIEW, z_view=Z_VIEW)
     reach = min(0.9, questions.spec.max_radius / distance)
     config = replace(config, networks=spec, depth_middle=distance, depth_reach=reach)
-    return replace(config, opacity=True, consistency=0.0)
+    return replace(config, opacity=True)

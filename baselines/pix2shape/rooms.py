@@ -12,7 +12,8 @@ from torch.utils.data import Dataset
 
 from baselines.pix2shape.batch import Batch, as_batch
 from baselines.pix2shape.network.config import ModelConfig
-from baselines.training.images import Array, Opened, check_reducible, reduced
+from baselines.training.data import Opened
+from baselines.training.images import Array, check_reducible, reduced
 from baselines.training.rooms import bounded, camera_poses, refuse_rows, room_image
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check

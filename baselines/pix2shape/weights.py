@@ -66,7 +66,14 @@ def _network(card: Card) -> Pix2Shape:
     return Pix2Shape(card.settings)
 
 
-METHOD = Method("pix2shape", Card, _network, _optimisers, kept=("encoder.", "decoder.", "prior."))
+METHOD = Method(
+    "pix2shape",
+    Card,
+    _network,
+    _optimisers,
+    kept=("encoder.", "decoder.", "prior."),
+    gone=('"compared_information":false,', '"consistency":0.0,', '"swap":0.0,'),
+)
 
 
 def names() -> list[str]:
@@ -88,12 +95,8 @@ def suited(data: str | Path, method: str | None = None) -> str:
         task, other, unfit = "questions", "rooms", "pix2shape-rays"
     else:
         with open_rooms(data) as rooms:
-            shapes, single = rooms.spec.source == "shapes", rooms.spec.objects[1] == 1
-        kind = "shapes" if shapes else "shapenet"
-        suiting = {
-            "pix2shape-rays": f"{kind}-rays",
-            "pix2shape-compact": f"{kind}-single" if shapes and single else kind,
-        }
+            shapes = rooms.spec.source == "shapes"
+        suiting = {"pix2shape-rays": "shapes-rays" if shapes else "shapenet-rays"}
         if shapes:
             suiting["pix2shape"] = "shapes-paper"
         task, other, unfit = "rooms", "questions", "pix2shape-views"

@@ -121,7 +121,7 @@ class Ptn(nn.Module):
     @property
     def box(self) -> Tensor:
         """Corners of the volume, (2, 3)."""
-        return torch.tensor(self._box)
+        return next(self.parameters()).new_tensor(self._box)
 
     def encode(self, image: Tensor, camera: Tensor) -> Tensor:
         """Return codes, (B, 8 width), of images, (B, 3, S, S), and cameras, (B, 3 or 0)."""

@@ -16,7 +16,7 @@ from baselines.ptn.matching import features
 from baselines.ptn.network import METHOD, Ptn
 from baselines.ptn.projection import first_hit, outward
 from baselines.ptn.rooms import SWAPPED, RoomImages
-from baselines.training.checkpoint import load_weights
+from baselines.training.checkpoint import bundled, load_weights
 from baselines.training.images import Array
 from baselines.training.questions import Progress, each_question, is_question_file, open_test
 from metrics.measures.empty_room import empty_room
@@ -44,7 +44,7 @@ def write_submission(
     Answers are scored by what the labels of training weigh, or by volumes where there were none.
     """
     task = "questions" if is_question_file(data) else "rooms"
-    model, card = load_weights(weights or FILES / f"ptn-{task}.safetensors", METHOD)
+    model, card = load_weights(weights or bundled(FILES, METHOD, f"ptn-{task}"), METHOD)
     if card.task != task:
         raise SpecError(weights, f"weights for {card.task}", f"some for {task}")
     check_writable(Path(out), overwrite)

@@ -11,15 +11,16 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from baselines.pix2shape.matching.reprojection import reprojected
-from baselines.pix2shape.matching.search import STEPS, reliefs
+from baselines.pix2shape.matching.search import STEPS, reliefs, reprojected
 from baselines.pix2shape.network.architecture import RAY_PLANES
 from baselines.pix2shape.network.empty_rooms import NEAREST, Cameras, empty_rooms, planes_of
 from baselines.relief import depth_supervised, predict, training
 from baselines.relief.network import Card, Relief, Settings, UNet, predicted_depth
 from baselines.relief.training import Lessons
-from baselines.training.checkpoint import Method, load_weights
+from baselines.training.checkpoint import Method, bundled, load_weights
+from baselines.training.data import TrainingFiles
 from baselines.training.fit import Progress
+from baselines.training.machine import Machine
 from baselines.training.rooms import Rooms
 from scenegen.common.records import check
 
@@ -85,15 +86,16 @@ def views_of_scenes(rooms: Rooms) -> list[Tensor]:
 
 
 def train(
-    data: str | Path,
+    data: TrainingFiles,
     run_folder: str | Path,
     settings: Settings = Settings(),  # noqa: B008 (it is frozen)
+    machine: Machine | None = None,
     *,
     start: str | None = None,
     resume: bool = False,
     progress: Progress = lambda done, total, losses: None,
 ) -> Path:
-    """Train the network that completes on a file of rooms, as `baselines.training` says.
+    """Train the network that completes on files of rooms, as `baselines.training` says.
 
     Args:
         start: weights of `depth-supervised`, whose network sees; those of the package by default.
@@ -103,15 +105,15 @@ def train(
     check(start is None or not resume, "start", start, "none, as --resume goes on with a run")
 
     def begin(network: Completion) -> None:
-        path = start or predict.bundled(depth_supervised.METHOD)
+        path = start or bundled(predict.FILES, depth_supervised.METHOD)
         seen, card = load_weights(path, depth_supervised.METHOD)
         sizes = [(s.size, s.width) for s in (card.settings, settings)]
         check(sizes[0] == sizes[1], "start", f"size and width {sizes[0]}", f"{sizes[1]}")
         network.seen.load_state_dict(seen.state_dict())
 
     return training.train(
-        METHOD, lessons_of, True, data, run_folder, settings,
-        begin=begin, resume=resume, progress=progress,
+        METHOD, lessons_of, True, begin, data, run_folder, settings, machine,
+        resume=resume, progress=progress,
     )  # fmt: skip
 
 

@@ -33,5 +33,5 @@ def lessons_of(rooms: Rooms, settings: Settings, _folder: Path, _progress: Any) 
     return Lessons(torch.arange(len(rooms)), target, inside=rooms.inside)
 
 
-train = partial(training.train, METHOD, lessons_of, True)
+train = partial(training.train, METHOD, lessons_of, True, training.as_it_is)
 write_submission = partial(predict.write_submission, METHOD, told_in_training=TOLD)

@@ -8,9 +8,9 @@ import torch
 from torch import Tensor
 
 from baselines.pix2shape.network.empty_rooms import Cameras
-from baselines.pix2shape.use.predict import Progress, write_depths
+from baselines.pix2shape.predict import Progress, write_depths
 from baselines.relief.network import Card, predicted_depth
-from baselines.training.checkpoint import Method, load_weights
+from baselines.training.checkpoint import Method, bundled, load_weights
 from baselines.training.images import Array, check_reducible
 from baselines.training.rooms import camera_poses, input_views, room_images
 from scenegen import open_rooms
@@ -20,11 +20,6 @@ FILES = Path(__file__).with_name("files")
 TOLD = "told: the camera, and where the empty room's floor and walls are"
 FROM = "each view is predicted from its own image"
 FROM_FIRST = "each view is predicted from the image of the scene's first one"
-
-
-def bundled(method: Method[Card, Any]) -> Path:
-    """Return the weights that come with the package."""
-    return FILES / f"{method.name}.safetensors"
 
 
 @torch.inference_mode()
@@ -44,7 +39,7 @@ def write_submission(
     or the first that the file holds. The submission's notes say it, too.
     """
     check_writable(Path(out), overwrite)
-    network, card = load_weights(weights or bundled(method), method)
+    network, card = load_weights(weights or bundled(FILES, method), method)
     size, from_first = card.settings.size, network.from_first_view
     with open_rooms(data) as rooms:
         check_reducible(data, rooms.spec.height, rooms.spec.width, size)

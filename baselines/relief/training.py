@@ -7,22 +7,21 @@ from pathlib import Path
 from typing import Any
 
 import torch
-from numpy.random import Generator
 from torch import Tensor
 
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.relief.network import Card, Relief, Settings
-from baselines.relief.shape_loss import shape_loss
 from baselines.training.checkpoint import WEIGHTS, Method
+from baselines.training.data import TrainingFiles, requests
 from baselines.training.fit import Loss, Progress, fit
-from baselines.training.images import Draws
+from baselines.training.images import Draws, read_ahead
+from baselines.training.machine import Machine, chosen_device
 from baselines.training.rooms import Rooms, read_rooms
 from baselines.training.run_folder import alone_in, begun, earlier_state
-from scenegen import open_rooms
 from scenegen.common.random.seeding import Purpose, item_rng
 
-EVERY = 100  # iterations between checkpoints
 WARM_UP = 200  # iterations
+SLOPE = 2.0  # weight of differences between neighbours, in the loss of shape
 WHOLE = 0.2  # of training, its end: whole images are shown; before that, windows around objects
 
 
@@ -47,19 +46,42 @@ class Lessons:
 Teach = Callable[[Rooms, Settings, Path, Callable[[int, int], None]], Lessons]
 
 
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """B images, and what is to be learned of each.
+
+    Attributes:
+        image: linear radiance, (B, 3, S, S), float16.
+        pose, target_pose: of the image's camera and, if it is another one, of that asked for,
+            (B, 4, 4).
+        target, weight: relief, and how much each pixel counts, (B, S, S).
+        inside: the object that each pixel lies inside, or 0, (B, S, S); None to learn relief alone.
+        place: where windows lie, from 0 to 1, among the pixels that are inside objects, (B,).
+    """
+
+    image: Tensor
+    pose: Tensor
+    target_pose: Tensor | None
+    target: Tensor
+    weight: Tensor
+    inside: Tensor | None
+    place: Tensor
+
+
 def train(
     method: Method[Card, Any],
     teach: Teach,
     with_depth: bool,
-    data: str | Path,
+    begin: Callable[[Any], Any],
+    data: TrainingFiles,
     run_folder: str | Path,
     settings: Settings = Settings(),  # noqa: B008 (it is frozen)
+    machine: Machine | None = None,
     *,
-    begin: Callable[[Any], Any] = lambda network: None,
     resume: bool = False,
     progress: Progress = lambda done, total, losses: None,
 ) -> Path:
-    """Train a relief network on a file of rooms, as `baselines.training` says.
+    """Train a relief network on files of rooms, as `baselines.training` says.
 
     The loss is the mean absolute difference of relief: in contrast to the squared one it lets a
     pixel be either floor or object, rather than something between them. `shape_loss` is added
@@ -71,13 +93,15 @@ def train(
         with_depth: whether the rooms' depth and objects are read.
         begin: is given the network of a new run.
     """
-    folder = Path(run_folder)
-    with alone_in(folder), open_rooms(data) as file:
+    folder, machine = Path(run_folder), machine or Machine()
+    device = chosen_device(machine.device)
+    with alone_in(folder):
         earlier = earlier_state(folder, method, resume)
         settings = settings if earlier is None else earlier.card.settings
-        rooms = read_rooms(file, settings.size, depth=with_depth)
-        card = Card(method.name, settings, data=rooms.data, fingerprint=rooms.fingerprint)
-        state = begun(method, card, earlier, data)
+        files = data.rooms()
+        rooms = read_rooms(files, settings.size, depth=with_depth)
+        card = Card(method.name, settings, **requests(files))
+        state = begun(method, card, earlier, data.where, device)
         if earlier is None:
             begin(state.network)
         at, last = state.card.iteration, settings.iterations
@@ -88,15 +112,19 @@ def train(
             lambda done, total: progress(at, last, {"share of images matched": done / total}),
         )
         state.network.to(memory_format=torch.channels_last)  # faster
-        draws = iter(Draws(len(lessons.rows), settings.batch, settings.seed, at))
+        batches = read_ahead(batches_of(rooms, lessons, settings, at), device)
 
         def losses(number: int) -> Iterator[Loss]:
-            rows = lessons.rows[torch.tensor(next(draws))]
-            loss = _loss(state.network, rooms, rows, lessons, settings, number)
+            windows_only = number < (1 - WHOLE) * state.card.settings.iterations
+            loss = _loss(state.network, rooms.fov_y_degrees, next(batches), windows_only)
             yield Loss(loss, {"loss": loss})
 
-        fit(folder, method, state, losses, learning_rate, every=EVERY, progress=progress)
+        fit(folder, method, state, losses, learning_rate, machine, progress=progress)
     return folder / WEIGHTS
+
+
+def as_it_is(_network: Any) -> None:
+    """Begin with the first weights."""
 
 
 def learning_rate(settings: Settings, iteration: int) -> float:
@@ -105,42 +133,96 @@ def learning_rate(settings: Settings, iteration: int) -> float:
     return settings.learning_rate * min(1.0, (iteration + 1) / WARM_UP) * falling
 
 
-def _loss(
-    network: Relief, rooms: Rooms, rows: Tensor, lessons: Lessons, settings: Settings, number: int
-) -> Tensor:
-    fov, image = rooms.fov_y_degrees, rooms.image[rows].float()
-    cameras = target_cameras = Cameras(rooms.world_from_camera[rows], fov)
-    rng = item_rng(settings.seed, number, Purpose.TRAINING)
-    if lessons.views is not None:
-        share = rng.random(len(rows))
-        views = [lessons.views[row] for row in rows.tolist()]
-        chosen = zip(views, share, strict=True)
-        rows = torch.stack([others[int(place * len(others))] for others, place in chosen])
-        target_cameras = Cameras(rooms.world_from_camera[rows], fov)
-    channels = network.channels(image, cameras, target_cameras)
-    target, weight = lessons.target(rows)
-    inside = None if lessons.inside is None else lessons.inside[rows]
-    if inside is not None and number < (1 - WHOLE) * settings.iterations:
+def batches_of(rooms: Rooms, lessons: Lessons, settings: Settings, first: int) -> Iterator[Batch]:
+    """Yield the batches of iteration `first` and of those after it, without end."""
+    draws = Draws(len(lessons.rows), settings.batch, settings.seed, first)
+    for number, drawn in enumerate(draws, first):
+        rows = seen = lessons.rows[torch.tensor(drawn)]
+        rng = item_rng(settings.seed, number, Purpose.TRAINING)
+        if lessons.views is not None:
+            share = rng.random(len(rows))
+            views = [lessons.views[row] for row in rows.tolist()]
+            chosen = zip(views, share, strict=True)
+            seen = torch.stack([others[int(place * len(others))] for others, place in chosen])
+        target, weight = lessons.target(seen)
+        yield Batch(
+            rooms.image[rows],
+            rooms.world_from_camera[rows],
+            None if lessons.views is None else rooms.world_from_camera[seen],
+            target,
+            weight,
+            None if lessons.inside is None else lessons.inside[seen],
+            torch.from_numpy(rng.random(len(rows))),
+        )
+
+
+def _loss(network: Relief, fov: float, batch: Batch, windows_only: bool) -> Tensor:
+    """Return the loss of a batch; where objects are told, of windows around them or of all."""
+    cameras = target_cameras = Cameras(batch.pose, fov)
+    if batch.target_pose is not None:
+        target_cameras = Cameras(batch.target_pose, fov)
+    channels = network.channels(batch.image.float(), cameras, target_cameras)
+    target, weight, inside = batch.target, batch.weight, batch.inside
+    if inside is not None and windows_only:
         maps = (channels, target, weight, inside)
-        channels, target, weight, inside = windows(maps, inside > 0, settings.size // 2, rng)
+        side = channels.shape[-1] // 2
+        channels, target, weight, inside = windows(maps, inside > 0, side, batch.place)
     errors = (network.relief(channels) - target) * weight
     loss = errors.abs().sum() / weight.sum().clamp(min=1)
     return loss if inside is None else loss + shape_loss(errors, inside)
 
 
-def windows(maps: Sequence[Tensor], shown: Tensor, side: int, rng: Generator) -> list[Tensor]:
+def shape_loss(errors: Tensor, inside: Tensor) -> Tensor:
+    """Return mean |e - its object's mean e| + SLOPE * mean |e - its neighbour's e|.
+
+    These are errors of relief inside objects that no shift of a whole object explains.
+
+    The first is what `shape_error` scores (with medians); the second teaches normals. Neighbours
+    are the pixels below and to the right, where they lie inside the same object.
+
+    Args:
+        errors: of relief, scene units, (B, S, S).
+        inside: the object that each pixel lies inside, (B, S, S), int; 0 for none.
+    """
+    image = torch.arange(len(inside), device=inside.device)[:, None, None]
+    place = inside > 0
+    own = errors[place]
+    objects = (inside + image * (1 + int(inside.max())))[place]
+    objects = torch.unique(objects, return_inverse=True)[1]
+    pixels = torch.bincount(objects)
+    means = own.new_zeros(len(pixels)).index_add(0, objects, own) / pixels
+    slopes = []
+    for axis in (1, 2):
+        first, second = (inside.narrow(axis, i, inside.shape[axis] - 1) for i in (0, 1))
+        slopes.append(errors.diff(dim=axis)[(first == second) & (first > 0)])
+    return _mean_size(own - means[objects]) + SLOPE * _mean_size(torch.cat(slopes))
+
+
+def _mean_size(values: Tensor) -> Tensor:
+    return values.abs().sum() / max(1, len(values))
+
+
+def windows(maps: Sequence[Tensor], shown: Tensor, side: int, place: Tensor) -> list[Tensor]:
     """Return of each image the same window of all maps (B, ..., S, S), (B, ..., side, side).
 
-    Each lies around a random pixel of those that are to be `shown`, (B, S, S), where there are any.
+    Args:
+        shown: the pixels that a window may lie around, (B, S, S); where an image has none, all.
+        place: which of them each lies around, from 0 for the first to 1 for the last, (B,) float64.
     """
-    corners = []
-    for image in shown:
-        pixels = image.nonzero() if image.any() else torch.ones_like(image).nonzero()
-        middle = pixels[int(rng.random() * len(pixels))]
-        corners.append((middle - side // 2).clamp(0, image.shape[0] - side).tolist())
-    return [
-        torch.stack(
-            [m[..., i : i + side, j : j + side] for m, (i, j) in zip(all_of, corners, strict=True)]
-        )
-        for all_of in maps
-    ]
+    size = shown.shape[-1]
+    flat = (shown | ~shown.flatten(1).any(dim=1)[:, None, None]).flatten(1)
+    order = flat.cumsum(dim=1)
+    drawn = (place * order[:, -1]).long() + 1  # the first pixel that completes so many
+    middle = torch.searchsorted(order, drawn[:, None])
+    offsets = torch.arange(side, device=shown.device)
+    row, column = (
+        (axis - side // 2).clamp(0, size - side) + offsets
+        for axis in (middle // size, middle % size)
+    )
+    images = torch.arange(len(shown), device=shown.device)[:, None, None]
+    found = []
+    for each in maps:
+        channels_last = each.movedim(1, -1) if each.dim() == 4 else each
+        window = channels_last[images, row[:, :, None], column[:, None]]
+        found.append(window.movedim(-1, 1) if each.dim() == 4 else window)
+    return found

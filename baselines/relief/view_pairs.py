@@ -13,7 +13,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from baselines.pix2shape.matching.labels import labels, matched_rows
+from baselines.pix2shape.matching.relief import matched_rows, relief_of_rows
 from baselines.relief import predict, training
 from baselines.relief.network import Card, Settings, relief_network
 from baselines.relief.training import Lessons
@@ -28,7 +28,7 @@ def lessons_of(
     rooms: Rooms, _settings: Settings, folder: Path, progress: Callable[[int, int], Any]
 ) -> Lessons:
     """Return the relief that matching finds, of the rows that have a partner."""
-    relief = labels(rooms, folder, progress)
+    relief = relief_of_rows(rooms, folder, progress)
 
     def target(rows: Tensor) -> tuple[Tensor, Tensor]:
         goal = relief[rows].float()
@@ -37,5 +37,5 @@ def lessons_of(
     return Lessons(matched_rows(rooms), target)
 
 
-train = partial(training.train, METHOD, lessons_of, False)
+train = partial(training.train, METHOD, lessons_of, False, training.as_it_is)
 write_submission = partial(predict.write_submission, METHOD)

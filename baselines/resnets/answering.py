@@ -5,8 +5,8 @@ from pathlib import Path
 from torch import Tensor, nn
 
 from baselines.resnets.card import Answerer
-from baselines.training.checkpoint import load_weights
-from baselines.training.launch import chosen_device
+from baselines.training.checkpoint import bundled, load_weights
+from baselines.training.machine import chosen_device
 from baselines.training.questions import Progress, each_question, open_test
 from iqtt import QuestionsFile, open_questions
 from metrics.prediction_writer import write_answers
@@ -33,7 +33,7 @@ def write_submission(
         device: "auto", "cpu" or "cuda".
     """
     name = kind.method.name
-    network, card = load_weights(weights or FILES / f"{name}.safetensors", kind.method)
+    network, card = load_weights(weights or bundled(FILES, kind.method), kind.method)
     check_writable(Path(out), overwrite)
     with open_test(data, card.settings.size) as questions:
         count = questions.answers

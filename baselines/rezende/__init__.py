@@ -6,8 +6,7 @@
     network.py      settings, card, encoder and decoder, and the head that labels train
     images.py       what it learns from: the images of question files
     primitives.py   single basic shapes, rendered by scenegen, on which it works or fails
-    head.py         training on labels
-    training.py     training on images; start reading here
+    training.py     training on images, and of the head on labels; start reading here
     reconstruct.py  meshes and pictures of trained weights
     answers.py      answers to questions
 

@@ -7,10 +7,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from baselines.rezende.head import codes_of
-from baselines.rezende.network import METHOD, Model
+from baselines.rezende.network import METHOD, Model, codes_of
 from baselines.rezende.reconstruct import meshes_of
-from baselines.training.checkpoint import load_weights
+from baselines.training.checkpoint import bundled, load_weights
 from baselines.training.images import Array
 from baselines.training.questions import Progress, each_question, is_question_file, open_test
 from baselines.training.rotations import rotation_grid
@@ -18,7 +17,7 @@ from metrics.prediction_writer import write_answers
 from scenegen.common.errors import SpecError
 from scenegen.files.new_file import check_writable
 
-WEIGHTS = Path(__file__).with_name("files") / "rezende.safetensors"
+FILES = Path(__file__).with_name("files")
 ROTATIONS = 512  # tried for each answer; any rotation is within about 20 degrees of one
 FINE, STEPS = 8, 8  # rotations that are refined, and steps of that
 COARSE = 42  # vertices of the reference that are turned: those of the icosphere before the last cut
@@ -40,7 +39,7 @@ def write_submission(
     if not is_question_file(data):
         hint = "it reconstructs single objects without background; docs/baselines.md says why"
         raise SpecError(data, "rooms", "questions, the only data that rezende answers", hint)
-    model, card = load_weights(weights or WEIGHTS, METHOD)
+    model, card = load_weights(weights or bundled(FILES, METHOD), METHOD)
     check_writable(Path(out), overwrite)
 
     def scores(images: Tensor) -> Tensor:

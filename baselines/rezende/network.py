@@ -138,6 +138,12 @@ class Head(nn.Module):
         return self.layers(pairs).squeeze(2)
 
 
+@torch.no_grad()
+def codes_of(model: Model, images: Tensor) -> Tensor:
+    """Return the codes' means, (1, 1 + A, code), of the images of one question."""
+    return model.encode(images.flatten(0, 1))[0][None]
+
+
 def divergence(mean: Tensor, log_variance: Tensor) -> Tensor:
     """Return KL(q || N(0, 1)) of Gaussians with means and log variances (B, D), in nats, (B,)."""
     return 0.5 * (mean**2 + log_variance.exp() - 1 - log_variance).sum(dim=1)

@@ -21,21 +21,23 @@ from pathlib import Path
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn import functional
+from torch.optim import AdamW
 
 from baselines.rezende.estimator import sampled_gradient, with_gradient
-from baselines.rezende.head import codes_of, train_head
 from baselines.rezende.images import Pictures, read_question_pictures
-from baselines.rezende.network import METHOD, Card, Model, Settings, divergence
+from baselines.rezende.network import METHOD, Card, Head, Model, Settings, codes_of, divergence
 from baselines.rezende.rasteriser import project, rasterise
 from baselines.training.checkpoint import WEIGHTS, State, load_weights, save_weights
+from baselines.training.data import TrainingFiles, only
 from baselines.training.fit import Loss, Progress, falling_late, fit
 from baselines.training.images import Array, check_reducible
+from baselines.training.machine import Machine
 from baselines.training.questions import (
     LABELED,
     UNLABELED,
     check_labels,
     each_question,
-    open_training,
     training_answers,
 )
 from baselines.training.run_folder import alone_in, begun, check_new, earlier_state
@@ -43,14 +45,16 @@ from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import check
 
 WINDOW = 0.16  # half the side of the window of pixels around a vertex, as a share of the picture
-EVERY = 200  # iterations between checkpoints
 LARGEST_SLOPE = 1000.0  # norm of all gradients
+# Of the head.
+STEPS, LEARNING_RATE, WEIGHT_DECAY = 300, 0.002, 0.3
 
 
 def train(
-    data: str | Path,
+    data: TrainingFiles,
     run_folder: str | Path,
     settings: Settings = Settings(),  # noqa: B008 (it is frozen)
+    machine: Machine | None = None,
     *,
     labels: int = 0,
     start: str | None = None,
@@ -59,16 +63,18 @@ def train(
 ) -> Path:
     """Train on the images of a question file, as `baselines.training` says, then the head.
 
-    The unlabelled questions give the images.
+    The unlabelled questions give the images. The renderer is in numpy, so training is on the CPU.
 
     Args:
         labels: how many of the labelled questions' answers the head is trained on, the first ones.
         start: weights of an earlier run, whose encoder and decoder are kept as they are; only the
             head is trained. So runs with different labels can share them.
     """
-    folder = Path(run_folder)
+    folder, machine = Path(run_folder), machine or Machine()
+    check(machine.device != "cuda", "device", "cuda", "cpu, where the renderer of rezende computes")
     check(start is None or not resume, "start", start, "none, as --resume goes on with a run")
-    with alone_in(folder), open_training(data, LABELED) as labelled:
+    with alone_in(folder):
+        labelled = only(data.questions(LABELED), "rezende")
         if start is not None:
             check_new(folder)
             model, card = load_weights(start, METHOD)
@@ -79,13 +85,13 @@ def train(
                 settings, labels = earlier.card.settings, earlier.card.labels
             card = Card("rezende", settings, labels=labels)
         check_labels(labelled, labels)  # before hours of training
-        check_reducible(data, labelled.height, labelled.width, card.settings.size)
+        check_reducible(data.where, labelled.height, labelled.width, card.settings.size)
         if start is None:
-            with open_training(data, UNLABELED) as questions:
-                pictures = read_question_pictures(questions, settings.size)
+            unlabelled = only(data.questions(UNLABELED), "rezende")
+            pictures = read_question_pictures(unlabelled, settings.size)
             card = replace(card, fingerprint=pictures.fingerprint)
-            state = begun(METHOD, card, earlier, data)
-            train_pictures(pictures, folder, state, progress)
+            state = begun(METHOD, card, earlier, data.where)
+            train_pictures(pictures, folder, state, machine, progress)
             model, card = state.network, state.card
         if labels:
             codes = each_question(
@@ -96,10 +102,35 @@ def train(
     return folder / WEIGHTS
 
 
+def train_head(model: Model, codes: Tensor, right: Tensor, seed: int) -> list[float]:
+    """Train the model's head on labelled questions, all in each step; return the losses.
+
+    Args:
+        codes: of the questions, (Q, 1 + A, code).
+        right: which answer is right, (Q,).
+    """
+    flat = codes.flatten(0, 1)
+    losses = []
+    with torch.random.fork_rng(devices=[]):
+        torch.manual_seed(item_seed(seed, 1, Purpose.WEIGHTS))
+        model.head = head = Head(codes.shape[2])
+    head.shift.copy_(flat.mean(dim=0))
+    head.scale.copy_(flat.std(dim=0, correction=0).clamp(min=1e-4))
+    optimiser = AdamW(head.parameters(), lr=LEARNING_RATE, weight_decay=WEIGHT_DECAY)
+    for _ in range(STEPS):
+        loss = functional.cross_entropy(head(codes), right)
+        optimiser.zero_grad()
+        torch.autograd.backward(loss)
+        optimiser.step()
+        losses.append(float(loss.detach()))
+    return losses
+
+
 def train_pictures(
     pictures: Pictures,
     folder: Path,
     state: State[Card, Model],
+    machine: Machine,
     progress: Progress = lambda done, total, numbers: None,
 ) -> None:
     """Train encoder and decoder of a state on pictures. Raises as `fit`."""
@@ -109,8 +140,7 @@ def train_pictures(
         yield bound(model, pictures, settings, number)
 
     fit(
-        folder, METHOD, state, losses, falling_late, every=EVERY, clip=LARGEST_SLOPE,
-        progress=progress,
+        folder, METHOD, state, losses, falling_late, machine, clip=LARGEST_SLOPE, progress=progress
     )  # fmt: skip
 
 

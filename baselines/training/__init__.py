@@ -4,8 +4,10 @@
     run_folder.py   the folder of a run, which one run has at a time
     processes.py    a batch that several processes share
     launch.py       how Lightning Fabric starts these processes
+    machine.py      where and how long a run trains
     fit.py          the training loop; start reading here
-    images.py       images as networks take them, and the order of rows
+    data.py         files to learn from
+    images.py       images as networks take them, and batches of them
     rooms.py        images and cameras of rooms
     questions.py    images and answers of questions
     rotations.py    rotations spread evenly
@@ -14,13 +16,14 @@
 A baseline adds its networks, its batches and its losses. Its module has a dataclass `Settings` and
 two functions:
 
-`train(data, run_folder, settings, *, resume, progress, ...)` trains on a file of rooms or questions
-and returns the path of the weights. The folder gets checkpoint and weights. `resume` goes on from
-the checkpoint, with the run's own settings. `progress` is called after each iteration with its
-number, how many there will be, and losses by name. The same arguments give the same weights on one
-machine, however often a run is resumed. It raises SpecError where settings and data do not fit;
-FileExistsError where a new run finds files of another; `fit.TrainingError`; FileFormatError;
-OSError.
+`train(data, run_folder, settings, machine, *, resume, progress, ...)` trains on open files of rooms
+or questions, `data.TrainingFiles`, and returns the path of the weights. The folder gets checkpoint
+and weights. `machine` says where and how long: a `machine.Machine`, by default on a GPU if there is
+one. `resume` goes on from the checkpoint, with the run's own settings. `progress` is called after
+each iteration with its number, how many there will be, and losses by name. The same arguments
+without a limit of time give the same weights on one machine, however often a run is resumed. It
+raises SpecError where settings and data do not fit, or there is no such device; FileExistsError
+where a new run finds files of another; `fit.TrainingError`; FileFormatError; OSError.
 
 `write_submission(data, out, weights, *, overwrite, progress)` predicts rooms or answers questions.
 `weights` is a file that `train` wrote; None for those of the package. `progress` is called with the

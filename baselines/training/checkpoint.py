@@ -81,6 +81,8 @@ class Method(Generic[CardT, NetworkT]):
         network: makes the untrained network of a card.
         optimisers: makes the optimisers, by name, of a card's network.
         kept: beginnings of the names that files of weights hold; all by default.
+        gone: settings that cards of earlier versions hold and that are no more, as JSON, at the
+            values that switched them off; with other values a card is refused.
     """
 
     name: str
@@ -88,6 +90,7 @@ class Method(Generic[CardT, NetworkT]):
     network: Callable[[CardT], NetworkT]
     optimisers: Callable[[CardT, NetworkT], dict[str, Adam]] = one_adam
     kept: tuple[str, ...] = ("",)
+    gone: tuple[str, ...] = ()
 
 
 @dataclass(eq=False)
@@ -144,6 +147,21 @@ def load_weights(path: str | Path, method: Method[CardT, NetworkT]) -> tuple[Net
     network = method.network(card)
     network.load_state_dict(tensors, strict=False)
     return network.eval(), card
+
+
+def bundled(folder: Path, method: Method[Any, Any], name: str = "") -> Path:
+    """Return the weights of a method that come with the package.
+
+    Args:
+        name: of the file; by default that of the method.
+
+    Raises SpecError where there are none.
+    """
+    path = folder / f"{name or method.name}.safetensors"
+    if not path.is_file():
+        hint = f"train some with `bench train {method.name}`, and name them with --weights"
+        raise SpecError("weights", f"none of {method.name} in this package", "a file", hint)
+    return path
 
 
 def save_checkpoint(folder: Path, state: State[CardT, NetworkT]) -> None:
@@ -251,8 +269,11 @@ def _load(
         hint = f"name {WEIGHTS} beside it" if CONTENTS[1] in notes else ""
         stored = ", ".join(notes) or "no card"
         raise FileFormatError(path, f"{stored:.40}", f"{content} of {method.name}", hint)
+    text = notes[content]
+    for setting in method.gone:
+        text = text.replace(setting, "")
     try:
-        card = from_json(method.card, notes[content], "card")
+        card = from_json(method.card, text, "card")
         check(card.method == method.name, "method", f"{card.method:.40}", method.name)
     except SpecError as error:
         wrong = error.inside(path)

@@ -3,8 +3,12 @@
 Everything random in an iteration derives from the seed and the iteration's number, so that training
 goes on after a kill as if it had never stopped. Where several processes train, each computes the
 losses of its share of every batch, and all learn what one process would, up to rounding.
+
+A GPU works on while the next steps are prepared. Asking for a number would wait for it, so losses
+are fetched once in a while, and looked at then.
 """
 
+import math
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -17,6 +21,7 @@ from torch.optim import Adam
 
 from baselines.training.checkpoint import (
     WEIGHTS,
+    Card,
     CardT,
     Method,
     NetworkT,
@@ -24,15 +29,20 @@ from baselines.training.checkpoint import (
     save_checkpoint,
     save_weights,
 )
-from baselines.training.processes import average, is_first
+from baselines.training.machine import Machine
+from baselines.training.processes import average, is_first, processes
 from scenegen.common.errors import SceneGenError
+from scenegen.common.records import check
 
 Progress = Callable[[int, int, Mapping[str, float]], Any]  # iterations done, in all, losses
 DIVERGED = "begin again with a smaller learning rate or other weights of the losses"
+FETCHED = 20  # iterations after which losses come from a GPU
+PLANS = 50  # how often a run with a limit of time plans the rest of its schedule
+UNPLANNED = 10**7  # iterations of its schedule before it knows its pace
 
 
 class TrainingError(SceneGenError):
-    """Training cannot go on, as a loss, a gradient or a weight is not finite."""
+    """Training cannot go on: a loss is not finite, or memory is short."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,32 +60,36 @@ def fit(
     state: State[CardT, NetworkT],
     losses: Callable[[int], Iterator[Loss]],
     rate: Callable[[Any, int], float],
+    machine: Machine,
     *,
-    every: int,
     clip: float | None = None,
     prepare: Callable[[], Any] = lambda: None,
     progress: Progress = lambda done, total, losses: None,
 ) -> None:
     """Train from the state's iteration to its last one; this changes the state.
 
+    With a limit of time, the iterations of the state's settings become as many as fit into it.
+
     Args:
         folder: gets checkpoint and weights, from the first of several processes.
         losses: yields the losses of an iteration, by its number. After each a step is taken, so
             that what is computed next sees the new weights.
         rate: the learning rate of a card's settings in an iteration.
-        every: iterations between checkpoints.
+        machine: says how often checkpoints are written, and how long training may take.
         clip: largest norm of the gradients of a step; None for any.
         prepare: called before a checkpoint is written.
         progress: called after each iteration, by the first process alone.
 
     Raises:
-        TrainingError: a loss, a gradient or a weight is not finite. The files are those of the last
-            checkpoint.
+        TrainingError: a loss, a gradient or a weight is not finite, or the GPU has too little
+            memory. The files are those of the last checkpoint.
         LostProcessError: another process that trains with this one ended.
         OSError.
     """
-    settings, last = state.card.settings, state.card.settings.iterations
     before, started = state.card.seconds, time.monotonic()
+    plan = _Plan(machine, state.card) if machine.minutes is not None else None
+    if plan is not None:
+        state.card = plan.planned(state.card)
 
     def save() -> None:
         _require_finite(state)
@@ -84,22 +98,98 @@ def fit(
         save_checkpoint(folder, state)
         save_weights(folder / WEIGHTS, method, state.network, state.card)
 
-    if state.card.iteration == last and is_first():
+    if state.card.iteration == state.card.settings.iterations and is_first():
         save()  # the run may have ended between its last checkpoint and its weights
     state.network.train()
-    for number in range(state.card.iteration, last):
-        numbers: dict[str, float] = {}
+    reported = _Reported(fetch_interval(next(state.network.parameters()).device))
+    while state.card.iteration < state.card.settings.iterations:
+        number = state.card.iteration
         for optimiser in state.optimisers.values():
             for group in optimiser.param_groups:
-                group["lr"] = rate(settings, number)
-        for loss in losses(number):
-            _step(state.optimisers[loss.optimiser], loss, clip, f"iteration {number}", numbers)
+                group["lr"] = rate(state.card.settings, number)
+        try:
+            for loss in losses(number):
+                _step(state.optimisers[loss.optimiser], loss, clip, reported, number)
+        except torch.OutOfMemoryError as error:
+            message = f"no memory left on the GPU for a batch of {state.card.settings.batch}"
+            raise TrainingError("training", message, hint="--set batch=N asks for less") from error
         done, seconds = number + 1, round(before + time.monotonic() - started, 1)
         state.card = replace(state.card, iteration=done, seconds=seconds)
+        if plan is not None:
+            state.card = plan.planned(state.card)
+        last = state.card.settings.iterations
+        saves = done % machine.every == 0 or done == last
+        if saves or done % reported.every == 0:
+            reported.fetch()
+        if saves and is_first():
+            save()
         if is_first():
-            if done % every == 0 or done == last:
-                save()
-            progress(done, last, numbers)
+            progress(done, last, reported.numbers)
+
+
+def fetch_interval(device: torch.device) -> int:
+    """Return after how many iterations losses are fetched from a device: 1 for every step's."""
+    return 1 if device.type == "cpu" else FETCHED
+
+
+class _Plan:
+    """How many iterations fit into a limit of time, by the pace of the last ones."""
+
+    def __init__(self, machine: Machine, card: Card) -> None:
+        """Begin. Raises SpecError where several processes train, whose clocks differ."""
+        check(
+            processes() == 1, "minutes", machine.minutes, "no limit where several processes train"
+        )
+        self._machine, self._done, self._left = machine, card.iteration, machine.seconds_left()
+        self._iterations = card.settings.iterations if card.iteration else UNPLANNED
+        self._share = self._left / PLANS
+
+    def planned(self, card: CardT) -> CardT:
+        """Return the card with as many iterations as there will be."""
+        done, left = card.iteration, self._machine.seconds_left()
+        if done > self._done and (self._left - left >= self._share or left <= 0):
+            pace = (self._left - left) / (done - self._done)
+            self._iterations = done + (int(left / pace) if left > 0 else 0)
+            self._done, self._left = done, left
+        if card.settings.iterations == self._iterations:
+            return card
+        return replace(card, settings=replace(card.settings, iterations=self._iterations))
+
+
+class _Reported:
+    """The losses of the last iteration that was fetched from the device.
+
+    Attributes:
+        every: iterations after which they are fetched; 1 fetches the numbers of every step at once.
+        numbers: losses by name.
+    """
+
+    def __init__(self, every: int) -> None:
+        self.every, self.numbers = every, dict[str, float]()
+        self._number, self._waiting = -1, list[tuple[int, list[str], Tensor]]()
+
+    def add(self, number: int, names: list[str], values: Tensor) -> None:
+        """Take numbers of an iteration, (1 + N,); the first has no name and has to be finite.
+
+        Raises TrainingError where it is not, now or when the numbers are fetched.
+        """
+        self._waiting.append((number, names, values))
+        if self.every == 1:
+            self.fetch()
+
+    def fetch(self) -> None:
+        """Wait for the numbers. Raises as `add`."""
+        waiting, self._waiting = self._waiting, []
+        fetched = iter(torch.cat([v for *_, v in waiting]).tolist() if waiting else [])
+        for number, names, _ in waiting:
+            if number != self._number:
+                self._number, self.numbers = number, {}
+            first = next(fetched)
+            self.numbers |= {name: next(fetched) for name in names}
+            if not math.isfinite(first):
+                shown = ", ".join(f"{name} {value:.3g}" for name, value in self.numbers.items())
+                problem = f"a loss or gradient that is not finite ({shown})"
+                raise TrainingError(f"iteration {number}", problem, hint=DIVERGED)
 
 
 def falling_late(settings: Any, iteration: int) -> float:
@@ -109,24 +199,19 @@ def falling_late(settings: Any, iteration: int) -> float:
 
 
 def _step(
-    optimiser: Adam, loss: Loss, clip: float | None, where: str, numbers: dict[str, float]
+    optimiser: Adam, loss: Loss, clip: float | None, reported: _Reported, number: int
 ) -> None:
-    """Take one step, unless the loss or a gradient is not finite; add to the reported numbers."""
+    """Take one step. Raises as `_Reported.add` where the loss or a gradient is not finite."""
     optimiser.zero_grad()
     values = torch.stack([loss.total.detach(), *(n.detach() for n in loss.numbers.values())])
     average([values])
-    numbers |= dict(zip(loss.numbers, values[1:].tolist(), strict=True))
-    shown = ", ".join(f"{name} {value:.3g}" for name, value in numbers.items())
-    problem = f"a loss or gradient that is not finite ({shown})"
-    if not values[0].isfinite():  # torch's slopes of such a loss can crash
-        raise TrainingError(where, problem, hint=DIVERGED)
+    reported.add(number, [*loss.numbers], values)  # before torch's slopes, which may crash on a CPU
     torch.autograd.backward(loss.total)
     parameters = optimiser.param_groups[0]["params"]
     gradients = [parameter.grad for parameter in parameters if parameter.grad is not None]
     average(gradients)  # DDP allows neither several backward passes nor second gradients
     norm = torch.nn.utils.get_total_norm(gradients)
-    if not norm.isfinite():
-        raise TrainingError(where, problem, hint=DIVERGED)
+    reported.add(number, [], norm[None])
     if clip is not None:
         torch.nn.utils.clip_grads_with_norm_(parameters, clip, norm)
     optimiser.step()

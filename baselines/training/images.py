@@ -4,39 +4,24 @@ Radiance is linear and images are square, of a multiple of the networks' size.
 """
 
 import itertools
-import os
 from collections.abc import Callable, Iterator
-from typing import Any, Generic, TypeVar
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
+import torch
 from numpy.typing import NDArray
+from torch import Tensor
 from torch.utils.data import Sampler
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
 
 Array = NDArray[Any]
-FileT = TypeVar("FileT")
+T = TypeVar("T")
+AHEAD = 3  # batches that are read while a GPU learns from another one
 BRIGHTEST = 65504.0  # radiance; the largest finite number of float16, in which images may be stored
-
-
-class Opened(Generic[FileT]):
-    """A file that is open, and that other processes may read, too: each opens it for itself."""
-
-    def __init__(self, opener: Callable[[], FileT]) -> None:
-        """Open the file. `opener` can be pickled."""
-        self._opener = opener
-        self._files = {os.getpid(): opener()}
-
-    @property
-    def file(self) -> FileT:
-        """The file as this process has it open."""
-        if os.getpid() not in self._files:  # in a fork, HDF5 must not use its parent's file
-            self._files[os.getpid()] = self._opener()
-        return self._files[os.getpid()]
-
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_files": {}}
 
 
 def check_reducible(where: object, height: int, width: int, size: int) -> None:
@@ -95,3 +80,35 @@ class Draws(Sampler[list[int]]):
                     order = item_rng(self._seed, epoch, Purpose.ORDER).permutation(self._rows)
                 rows.append(int(order[place % self._rows]))
             yield rows[self._share]
+
+
+def mapped(record: T, function: Callable[[Tensor], Tensor]) -> T:
+    """Return a dataclass with a function applied to its tensors, nested dataclasses included."""
+    changed: dict[str, Any] = {}
+    for field in fields(record):  # type: ignore[arg-type]
+        value = getattr(record, field.name)
+        if isinstance(value, Tensor):
+            changed[field.name] = function(value)
+        elif is_dataclass(value):
+            changed[field.name] = mapped(value, function)
+    return replace(record, **changed)  # type: ignore[type-var]
+
+
+def read_ahead(batches: Iterator[T], device: torch.device) -> Iterator[T]:
+    """Yield batches, which are dataclasses, on a device.
+
+    A thread reads and moves the next ones while a GPU learns. A CPU has no time to spare for that.
+    """
+    if device.type == "cpu":
+        yield from batches
+        return
+
+    def read() -> T | None:
+        batch = next(batches, None)
+        return None if batch is None else mapped(batch, lambda values: values.to(device))
+
+    with ThreadPoolExecutor(1) as reader:
+        waiting = [reader.submit(read) for _ in range(AHEAD)]
+        while (batch := waiting.pop(0).result()) is not None:
+            waiting.append(reader.submit(read))
+            yield batch

@@ -1,12 +1,12 @@
-"""The processes that train together: how many there are, and how Lightning Fabric starts them."""
+"""How Lightning Fabric starts the processes that train together."""
 
 import os
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import torch
 
 from baselines.training.fit import TrainingError
+from baselines.training.machine import Machine, chosen_device
 from baselines.training.processes import LostProcessError, processes
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check
@@ -18,39 +18,7 @@ PRECISIONS = {"32": "32-true", "bf16": "bf16-mixed"}  # of networks; as Lightnin
 STARTED = "LOCAL_WORLD_SIZE"  # set by torchrun, and so by `fabric run`, which calls it
 
 
-@dataclass(frozen=True)
-class Machine:
-    """Where and how training runs; none of this changes what is learned, up to rounding.
-
-    Attributes:
-        device: "auto", "cpu" or "cuda".
-        devices: processes on each machine, which share every batch; each GPU has its own.
-        nodes: machines, on each of which somebody starts the training.
-        workers: processes that read the data, for each process that trains.
-        every: iterations between checkpoints, and between pictures.
-    """
-
-    device: str = "auto"
-    devices: int = 1
-    nodes: int = 1
-    workers: int = 1
-    every: int = 500
-
-
-def chosen_device(name: str, count: int = 1) -> torch.device:
-    """Return a device by name; "auto" is a GPU if there is one.
-
-    Raises SpecError where there are fewer than `count`.
-    """
-    if name == "cuda" and not torch.cuda.is_available():
-        raise SpecError("device", "no GPU that this torch can use", hint="say --device cpu")
-    if name == "cpu" or not torch.cuda.is_available():
-        return torch.device("cpu")
-    check(count <= torch.cuda.device_count(), "devices", count, str(torch.cuda.device_count()))
-    return torch.device("cuda")
-
-
-def started_elsewhere() -> tuple[int, int]:
+def torchrun_counts() -> tuple[int, int]:
     """Return the processes on each machine and the machines that torchrun started; else (1, 1).
 
     Raises SpecError where the environment does not tell them.

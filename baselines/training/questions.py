@@ -25,18 +25,6 @@ def is_question_file(path: str | Path) -> bool:
         return holds_questions(opened)
 
 
-def open_training(path: str | Path, part: str) -> QuestionsFile:
-    """Open the labelled or the unlabelled questions of a training file.
-
-    Raises as `open_questions`, and SpecError for another file.
-    """
-    try:
-        return open_questions(path, part)
-    except SpecError as error:
-        expected = "a training file such as iqtt-train.h5"
-        raise SpecError(path, "no training questions", expected) from error
-
-
 def open_test(path: str | Path, size: int) -> QuestionsFile:
     """Open questions to answer, whose images can be reduced to a size.
 

@@ -1,7 +1,8 @@
 """Images and cameras of rooms, read from an open file and checked."""
 
 import warnings
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from torch import Tensor
 from baselines.training.images import Array, channels_first, check_reducible, reduced
 from metrics.measures.shape import inside_objects
 from scenegen.common.errors import FileFormatError
+from scenegen.common.records import check
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
@@ -20,18 +22,18 @@ UPRIGHT = 1e-3  # of products of a pose's axes, by which they may differ from th
 
 @dataclass(frozen=True, eq=False)
 class Rooms:
-    """The rows of a file of rooms in memory, N of them.
+    """The rows of one file of rooms or several in memory, N of them.
 
     Attributes:
         image: linear radiance, (N, 3, S, S), float16.
         world_from_camera: (N, 4, 4).
-        scene: number of the scene, (N,).
+        scene: number of the scene, (N,); scenes of different files have different ones.
         angle: of the view, about the vertical axis from the scene's first one, degrees, (N,).
         rounded: whether radiance was stored in 8 bits.
         depth: planar, scene units, (N, S, S), NaN where there is no surface; None if not asked for.
         inside: the object that each pixel lies inside, (N, S, S) int32, as `shape.inside_objects`;
             0 at other pixels. None if depth is not asked for.
-        data, fingerprint: request and fingerprint of the file.
+        fingerprint: of the files.
     """
 
     image: Tensor
@@ -42,22 +44,42 @@ class Rooms:
     rounded: bool
     depth: Tensor | None
     inside: Tensor | None
-    data: str
     fingerprint: str
 
     def __len__(self) -> int:
         return len(self.image)
 
 
-def read_rooms(rooms: RoomsFile, size: int, *, depth: bool = False) -> Rooms:
-    """Read all rooms of a file, their images reduced to size x size pixels.
+def read_rooms(files: Sequence[RoomsFile], size: int, *, depth: bool = False) -> Rooms:
+    """Read all rooms of files, their images reduced to size x size pixels.
 
     Args:
         depth: whether depth and object ids are read, too.
 
     Raises FileFormatError where a camera or an image is not known or, if depth is asked for, an
-    image has none; SpecError where images cannot be reduced.
+    image has none; SpecError where images cannot be reduced, or files have different fields of
+    view.
     """
+    parts, scenes = [], 0
+    for file in files:
+        fov, first = file.spec.fov_y_degrees, files[0].spec.fov_y_degrees
+        expected = f"{first:g}, as {files[0].path} has"
+        check(fov == first, f"{file.path}: field of view", f"{fov:g} degrees", expected)
+        part = _read_file(file, size, depth)
+        parts.append(replace(part, scene=part.scene + scenes))
+        scenes += int(part.scene.max()) + 1 if len(part) else 0
+    if len(parts) == 1:
+        return parts[0]
+    names = [f.name for f in fields(Rooms) if isinstance(getattr(parts[0], f.name), Tensor)]
+    together: dict[str, Any] = {
+        name: torch.cat([getattr(part, name) for part in parts]) for name in names
+    }
+    mark = " ".join(part.fingerprint for part in parts)
+    rounded = any(part.rounded for part in parts)
+    return replace(parts[0], **together, rounded=rounded, fingerprint=mark)
+
+
+def _read_file(rooms: RoomsFile, size: int, depth: bool) -> Rooms:
     check_reducible(rooms.path, rooms.spec.height, rooms.spec.width, size)
     poses = camera_poses(rooms).astype(np.float32)
     images = np.empty((len(rooms), 3, size, size), np.float16)
@@ -80,7 +102,6 @@ def read_rooms(rooms: RoomsFile, size: int, *, depth: bool = False) -> Rooms:
         rooms.spec.image_dtype == "uint8",
         None if depths is None else torch.from_numpy(depths),
         None if inside is None else torch.from_numpy(inside),
-        rooms.spec.to_json(),
         rooms.fingerprint,
     )
 

@@ -5,6 +5,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import torch
+
 from baselines.training.checkpoint import (
     CHECKPOINT,
     WEIGHTS,
@@ -65,19 +67,22 @@ def begun(
     card: CardT,
     earlier: State[CardT, NetworkT] | None,
     where: object,
+    device: torch.device | None = None,
 ) -> State[CardT, NetworkT]:
     """Return the state from which a run goes on: that of its checkpoint, or a new one.
 
     Args:
         card: of a new run on these data.
         where: the data, for messages.
+        device: to which the state is moved; by default it stays on the CPU.
 
     Raises SpecError where the earlier state saw other data.
     """
-    if earlier is None:
-        return new_state(method, card)
-    trained_on, mark = earlier.card.fingerprint, card.fingerprint
+    state = new_state(method, card) if earlier is None else earlier
+    trained_on, mark = state.card.fingerprint, card.fingerprint
     if mark != trained_on:
         expected = f"{trained_on[:12]}, on which the run was trained"
         raise SpecError(where, f"fingerprint {mark[:12]}", expected, "resume with the same data")
-    return earlier
+    if device is not None:
+        state.to(device)
+    return state

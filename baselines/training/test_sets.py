@@ -5,32 +5,29 @@ import json
 import shlex
 from typing import Any
 
-import h5py
-
 from metrics.scoring.known_tests import KNOWN_TESTS, KnownTest, known_test
 from scenegen.common.errors import SpecError
+from scenegen.files.sets.shards import OpenFile
 
 SAME = ("seed", "source", "shapes", "object_split")  # settings that make the same scenes
 
 
-def refuse_test_set(data: str, allowed: bool = False) -> None:
+def refuse_test_set(opened: OpenFile) -> None:
     """Refuse a file to learn from that is a named test set, or rooms of its seed and objects.
 
     Of questions the pictures alone tell the set, as files without answers have no truth.
 
-    Raises SpecError. Other files, and those that are no HDF5, pass.
+    Raises SpecError. Other files pass.
     """
-    if allowed or not h5py.is_hdf5(data):
-        return
-    with h5py.File(data) as file:
-        texts = {name: str(value) for name, value in file.attrs.items()}
-        pictures = str(file["questions"].attrs.get("sha256", "")) if "questions" in file else ""
+    file = opened.file
+    texts = {name: str(value) for name, value in file.attrs.items()}
+    pictures = str(file["questions"].attrs.get("sha256", "")) if "questions" in file else ""
     test = known_test(texts.get("truth_digest", "")) or _like(texts.get("spec", ""))
     test = test or next((t for t in KNOWN_TESTS if pictures and t.pictures == pictures), None)
     if test:
         hint = "take another --seed for training, or say --allow-test-set"
         found = f"the seed and the objects of the test set {test.name}"
-        raise SpecError(data, found, "training data", hint)
+        raise SpecError(opened.path, found, "training data", hint)
 
 
 def _like(text: str) -> KnownTest | None:

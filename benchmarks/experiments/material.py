@@ -28,7 +28,8 @@ from baselines.pix2shape.network.surfels import render
 from baselines.pix2shape.pictures import image_tiles, sheet
 from baselines.pix2shape.rooms import RoomImages
 from baselines.pix2shape.weights import open_weights
-from baselines.training.images import Opened, reduced
+from baselines.training.data import Opened
+from baselines.training.images import reduced
 from baselines.training.rooms import input_views
 from benchmarks.markdown import table
 from metrics.measures.statistics import bootstrap_interval

@@ -24,8 +24,7 @@ from scipy import ndimage, stats
 from tqdm import tqdm
 
 from baselines.cubes.answer import answer_scores
-from baselines.depth_match.answers import FILES
-from baselines.depth_match.matching import least_denials
+from baselines.depth_match.answers import FILES, least_denials
 from baselines.depth_match.network import METHOD, seen_depth
 from baselines.training.checkpoint import load_weights
 from baselines.training.images import channels_first

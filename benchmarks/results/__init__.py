@@ -5,7 +5,7 @@
     questions.py  Table 3: the accuracy of every method on every kind of question
     rooms.py      scores of rooms, as in Tables 1 and 2
     perturbations.py  what each score sees: the truth spoilt in one way at a time, as a picture
-    studies.py    the ablations of the paper: losses, depth supervision, mutual information
+    studies.py    which parts of the paper's objective matter
 
 Everything is kept in one folder. A product is not made again if the same commands made it from the
 same files, so `make results` can be stopped and started again.

@@ -27,7 +27,6 @@ TRAINED = {
     "siamese": ((200, 1000), MIXED, "bench train siamese", ""),
     "ptn": ((0, 200, 1000), MIXED, "bench train ptn", """--set 'networks="{start}"'"""),
     "rezende": ((0, 200, 1000), MIXED, "bench train rezende", """--set 'start="{start}"'"""),
-    "pix2shape-compact": ((0, 200, 1000), MIXED, "pix2shape train --set iterations=1500", ""),
     "pix2shape-views": (
         (0, 200, 1000),
         OTHER,
@@ -40,7 +39,6 @@ PAPER = {
     "siamese": "Siamese CNN",
     "ptn": "Persp. Transf. Nets",
     "rezende": "Rezende et al.",
-    "pix2shape-compact": "Pix2Shape",
     "people": "Human Evaluation",
 }
 THREE_ANSWERS = ("outline-trees", "cnn")  # methods that choose among three answers only

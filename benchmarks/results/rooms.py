@@ -17,7 +17,7 @@ FILES = {"test": "--n 300 --views 0,5,35,55,80 --seed 1000", "train": "--n 20000
 ANGLES = ("0", "5", "35", "55", "80")
 METHODS = (
     "oracle", "depth-supervised", "depth-completed", "view-pairs", "pix2shape-rays", "pix2shape",
-    "pix2shape-compact", "ptn", "empty-room", "mean-depth", "constant",
+    "ptn", "empty-room", "mean-depth", "constant",
 )  # fmt: skip
 NOT_FOR = {"pix2shape-rays": "shapes-single", "pix2shape": "shapenet"}
 LEARN_MEANS = ("mean-depth", "constant")

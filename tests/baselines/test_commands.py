@@ -32,8 +32,9 @@ def fake(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
         seed: int = 0
         depth: int = 18
 
-    def train(data, run_folder, settings, *, labels=5, device="auto", resume=False, progress=None):
-        asked.update(data=data, labels=labels, device=device, resume=resume, **vars(settings))
+    def train(data, run_folder, settings, machine, *, labels=5, resume=False, progress=None):
+        asked.update(labels=labels, resume=resume, **vars(settings))
+        asked.update(data=data.where, device=machine.device, minutes=machine.minutes)
         progress(1, 1, {"loss": 0.25})
         return Path(run_folder) / "w.safetensors"
 
@@ -75,12 +76,13 @@ def test_two_runs_never_share_a_folder(name, folder):
 
 
 def test_settings_reach_the_baseline(fake, folder):
-    line = f"train cnn {DATA} --out run --set depth=50 --set device=cpu --seed 7"
+    more = "--data iqtt-train.h5 iqtt-train.h5 --device cpu --minutes 5"
+    line = f"train cnn {more} --out run --set depth=50 --seed 7"
     done = bench(*line.split())
     assert done.exit_code == 0, done.output
     assert fake == {
-        "data": "iqtt-train.h5", "labels": 5, "seed": 7, "depth": 50, "device": "cpu",
-        "resume": False,
+        "data": "iqtt-train.h5, iqtt-train.h5", "labels": 5, "seed": 7, "depth": 50,
+        "device": "cpu", "minutes": 5.0, "resume": False,
     }  # fmt: skip
     assert "loss 0.25" in done.stdout
     assert "run/w.safetensors" in done.stdout
@@ -92,7 +94,10 @@ def test_settings_reach_the_baseline(fake, folder):
     ("line", "words"),
     [
         ("--iterations 5", ("iterations",)),
-        ("--set device=3", ("device", "3")),
+        ("--set device=cpu", ("--set", "'device'")),
+        ("--set machine=1", ("--set", "'machine'")),
+        ("--minutes 5 --seed 1 --device gpu", ("--device", "'gpu'")),
+        ("--minutes 0", ("--minutes", "0")),
         ("--set colour=1", ("--set", "'colour'", "depth")),
         ('--set depth="deep"', ("depth", "'deep'")),
         ("--set depth=3 --set depth=3", ("--set", "'depth'")),
@@ -119,6 +124,9 @@ MISTAKES = [
     (f"train cnn {DATA} --out run", ("iqtt-train.h5", "32x32", "64")),
     (f"train cnn {DATA} --out run --resume", ("run: ", "checkpoint")),
     (f"train ptm {DATA} --out run", ("ptm",)),
+    ("train cnn --data iqtt-train.h5 rooms.h5 --out run", ("rooms.h5", "questions")),
+    (f"train cnn {DATA} --out run --minutes 5 --iterations 3", ("--minutes", "--iterations")),
+    ("baseline cnn --data iqtt-test.h5", ("weights", "bench train cnn")),
     ("baseline cnn --data iqtt-test.h5 --train rooms.h5", ("--train", "bench train cnn")),
     ("baseline cnn --data iqtt-test.h5 --weights text.safetensors", ("text.safetensors",)),
     ("baseline cnn --data iqtt-test.h5 --weights rooms.safetensors", ("rooms.safetensors",)),
@@ -133,6 +141,16 @@ def test_a_mistake_is_one_line_and_leaves_nothing(line, words, folder, check_ref
     result = bench(*line.split())
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
     assert files_in(folder) == before
+
+
+@pytest.mark.parametrize("name", commands.TRAINED)
+def test_no_gpu_is_one_line(name, folder, check_refusal):
+    if pytest.importorskip("torch").cuda.is_available():
+        pytest.skip("there is one")
+    data = "rooms.h5" if commands.TRAINED[name].startswith("rooms:") else "iqtt-train.h5"
+    result = bench(*f"train {name} --data {data} --out run --device cuda".split())
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("device", "cpu"))
+    assert not (folder / "run").exists()
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 from refusals import refused
 
-from baselines.features import nearest, probed, read_features, write_features
+from baselines.features import cosines_with_reference, probe_scores, read_features, write_features
 from cli import bench
 from iqtt import open_questions
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
@@ -23,18 +23,18 @@ def told_by_one(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
     return features, right
 
 
-def test_the_greatest_cosine_is_the_nearest():
+def test_the_greatest_cosine_is_the_cosines_with_reference():
     rng = np.random.default_rng(0)
     features, right = rng.normal(size=(20, 4, 6)), rng.integers(0, 3, 20)
     features[np.arange(20), 1 + right] = features[:, 0] * rng.uniform(0.1, 9, (20, 1))
     unit = features / np.linalg.norm(features, axis=2, keepdims=True)
-    assert (nearest(unit).argmax(axis=1) == right).all()
+    assert (cosines_with_reference(unit).argmax(axis=1) == right).all()
 
 
 def test_labels_teach_which_dimension_counts():
     (learned, answers), (seen, right) = told_by_one(300, 1), told_by_one(200, 2)
-    assert (nearest(seen).argmax(axis=1) == right).mean() < 0.6
-    assert (probed(learned, answers, seen).argmax(axis=1) == right).mean() > 0.85
+    assert (cosines_with_reference(seen).argmax(axis=1) == right).mean() < 0.6
+    assert (probe_scores(learned, answers, seen).argmax(axis=1) == right).mean() > 0.85
 
 
 def test_a_submission_holds_the_answers_of_the_features(truths, train_questions, tmp_path):
@@ -46,7 +46,7 @@ def test_a_submission_holds_the_answers_of_the_features(truths, train_questions,
     arguments += ["--features", tmp_path / "f.npy"]
     assert CliRunner().invoke(bench, list(map(str, arguments))).exit_code == 0
     with h5py.File(tmp_path / "a.h5") as file, open_questions(truths.iqtt) as questions:
-        expected = nearest(read_features(tmp_path / "f.npy", count, questions))
+        expected = cosines_with_reference(read_features(tmp_path / "f.npy", count, questions))
         np.testing.assert_allclose(file["scores"][()], expected)
     assert CliRunner().invoke(bench, list(map(str, arguments[:-2]))).exit_code == 2
     with refused(SpecError, "labels", "3"):

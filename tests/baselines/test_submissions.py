@@ -51,7 +51,7 @@ def writers(tmp_path_factory: pytest.TempPathFactory, train_questions: Path) -> 
 @pytest.fixture(autouse=True)
 def few_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
     """9 rows take three batches, and do not fill the last one."""
-    monkeypatch.setattr("baselines.pix2shape.use.predict.BATCH", 4)
+    monkeypatch.setattr("baselines.pix2shape.predict.BATCH", 4)
 
 
 def submitted(write: Write, data: Path, out: Path) -> Fields:

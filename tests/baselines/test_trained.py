@@ -20,6 +20,8 @@ from refusals import refused
 from baselines.commands import HOMES
 from baselines.relief import depth_supervised
 from baselines.training.checkpoint import CHECKPOINT, WEIGHTS, load_tensors
+from baselines.training.data import TrainingFiles
+from baselines.training.machine import Machine
 from scenegen.common.errors import SceneGenError, SpecError
 
 RELIEF = {"size": 32, "width": 0.25, "batch": 4}
@@ -54,18 +56,17 @@ def data(turned_path: Path, truths: Any) -> dict[str, Path]:
 @pytest.fixture(scope="session")
 def unet(data: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     settings = depth_supervised.Settings(**RELIEF, iterations=1)
-    return depth_supervised.train(data["rooms"], tmp_path_factory.mktemp("unet"), settings)
+    folder = tmp_path_factory.mktemp("unet")
+    return depth_supervised.train(TrainingFiles(data["rooms"]), folder, settings)
 
 
 @pytest.fixture
-def train(case: str, data: dict[str, Path], unet: Path, tmp_path: Path, monkeypatch: Any) -> Train:
+def train(case: str, data: dict[str, Path], unet: Path, tmp_path: Path) -> Train:
     """Train a case into a folder; settings are those of the case unless it goes on."""
     name, kind, settings, how = CASES[case]
     if case == "completed":
         how = {"start": str(unet)}
     module = import_module(f"baselines.{HOMES[name][0]}")
-    package = HOMES[name][0].partition(".")[0]
-    monkeypatch.setattr(f"baselines.{package}.training.EVERY", 2)
 
     def run(folder: str, path: Path | None = None, **more: Any) -> Path:
         changed = {
@@ -73,8 +74,10 @@ def train(case: str, data: dict[str, Path], unet: Path, tmp_path: Path, monkeypa
         }
         goes_on = more.get("resume", False)
         made = module.Settings(**{"iterations": 5, **settings, **changed})
-        arguments = [path or data[kind], tmp_path / folder, *[made] * (not goes_on)]
-        return module.train(*arguments, **{**({} if goes_on else how), **more})
+        given = {} if goes_on else {"settings": made, **how}
+        with TrainingFiles(path or data[kind]) as files:
+            machine = Machine("cpu", every=2)
+            return module.train(files, tmp_path / folder, machine=machine, **{**given, **more})
 
     return run
 
@@ -174,7 +177,7 @@ def test_labels_alone_are_learned_from_weights_of_another_run(
     name, settings, keyword, data, tmp_path
 ):
     """The networks stay as they are stored, and the card says what is new."""
-    module, path = import_module(f"baselines.{HOMES[name][0]}"), data["questions"]
+    module, path = import_module(f"baselines.{HOMES[name][0]}"), TrainingFiles(data["questions"])
     plain = module.train(path, tmp_path / "plain", module.Settings(**settings, iterations=2))
     later = module.train(path, tmp_path / "later", labels=3, **{keyword: str(plain)})
     (_, before), (tensors, card) = content(plain), content(later)

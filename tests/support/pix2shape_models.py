@@ -6,7 +6,6 @@ torch is imported when one is made: the commands are tested without it, too.
 import shutil
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,25 +33,25 @@ def in_memory(path: Path, size: int, **how: Any) -> Any:
     from scenegen import open_rooms
 
     with open_rooms(path) as rooms:
-        return read_rooms(rooms, size, **how)
+        return read_rooms([rooms], size, **how)
 
 
 def room_source(path: Path, config: Any) -> Any:
     """Return the images of a rooms file as a model of this configuration is shown them."""
     from baselines.pix2shape.rooms import RoomImages
-    from baselines.training.images import Opened
+    from baselines.training.data import shared_rooms
     from scenegen import open_rooms
 
-    return RoomImages(Opened(partial(open_rooms, path)), config)
+    return RoomImages(shared_rooms(open_rooms(path)), config)
 
 
 def question_source(path: Path, part: str | None, config: Any) -> Any:
     """Return the images of a question file, as `room_source`."""
     from baselines.pix2shape.questions import QuestionImages
-    from baselines.training.images import Opened
+    from baselines.training.data import shared_questions
     from iqtt import open_questions
 
-    return QuestionImages(Opened(partial(open_questions, path, part)), config)
+    return QuestionImages(shared_questions(open_questions(path, part)), config)
 
 
 def suited(config: Any, path: Path, part: str | None = "unlabeled") -> Any:

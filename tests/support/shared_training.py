@@ -13,7 +13,8 @@ from typing import Any
 
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.training.run import train_run
-from baselines.training.launch import Machine
+from baselines.training.data import TrainingFiles
+from baselines.training.machine import Machine
 
 
 def train_all(runs: list[dict[str, Any]]) -> None:
@@ -34,7 +35,7 @@ def train(run: dict[str, Any], folder: Path) -> None:
     config = run["config"] and ModelConfig.from_json(run["config"])
     machine = Machine("cpu", run["processes"], workers=0, every=2)
     how = {"labels": run["labels"], "progress": progress}
-    if train_run(folder, run["data"], config, machine, **how) is not None:
+    if train_run(folder, TrainingFiles(run["data"]), config, machine, **how) is not None:
         (folder / "losses.json").write_text(json.dumps(reported))
 
 

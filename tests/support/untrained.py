@@ -13,7 +13,7 @@ from ptn_models import card_of
 from baselines import depth_match, ptn, rezende
 from baselines.depth_match.network import METHOD as DEPTH
 from baselines.depth_match.network import Card as DepthCard
-from baselines.pix2shape.use.predict import predict_file
+from baselines.pix2shape.predict import predict_file
 from baselines.pix2shape.weights import METHOD as REFERENCE
 from baselines.ptn.network import METHOD as PTN
 from baselines.relief import depth_completed, depth_supervised

@@ -4,15 +4,21 @@ For each pixel of an image every relief of a list is tried (Collins 1996): the p
 into another image of the scene, and the colours are compared. So the photometric loss is minimised
 by search and not by gradients, which end in the nearest local minimum: a flat room. Nothing is
 learned here, and neither depth, normals nor ids are read.
+
+If the depth is right, and the point not hidden from the other camera, both images show the same
+colour there: matte surfaces under fixed lights look the same from everywhere. That is what learning
+depth from several views rests on (Zhou et al. 2017; Godard et al. 2019).
 """
+
+import math
 
 import torch
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.pix2shape.matching.reprojection import reprojected
-from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
+from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms, rays
 
+NEAR = 0.05  # scene units; points nearer to the other camera than this, or behind it, are not seen
 STEPS, STEP = 32, 0.02  # reliefs that are tried: 0, STEP, ..., scene units
 NOISE, ROUNDED_NOISE = 0.001, 0.003  # radiance; differences expected everywhere; of 8 bits
 SHIFT = 0.25  # pixels; error of place that is expected, as pixels are samples
@@ -21,6 +27,36 @@ UNSEEN = 0.3  # cost where the other image does not show the point
 RISE = 0.15  # cost of the largest relief beside that of none, so that doubt decides for the room
 WINDOW = 3  # pixels a side; costs are averaged over it
 SMALL, LARGE = 0.05, 0.3  # costs of a change by one step, and by more, from pixel to pixel
+
+
+def reprojected(
+    values: Tensor, others: Cameras, depth: Tensor, cameras: Cameras
+) -> tuple[Tensor, Tensor, Tensor]:
+    """Return other images' values at surface points, the points' depths there, and which are shown.
+
+    Args:
+        values: of the other cameras' images, (B, C, S, S).
+        depth: D depths for each pixel of the images of `cameras`, planar, scene units,
+            (B, D, S, S).
+
+    Returns:
+        Bilinear values, (B, C, D, S, S), planar depths, (B, D, S, S), and a mask of the points that
+        lie within these images, (B, D, S, S). Whether something stands between
+        a point and the other camera is not asked.
+    """
+    batch, count, size, _ = depth.shape
+    other_from_camera = torch.linalg.solve(others.world_from_camera, cameras.world_from_camera)
+    toward = other_from_camera[:, :3, :3] @ rays(size, cameras.fov_y_degrees, depth).flatten(1)
+    points = (
+        toward[:, :, None] * depth.flatten(2)[:, None] + other_from_camera[:, :3, 3, None, None]
+    )
+    away = -points[:, 2]
+    edge = math.tan(math.radians(others.fov_y_degrees) / 2) * away.clamp(min=NEAR)
+    place = torch.stack([points[:, 0], -points[:, 1]], dim=3) / edge[..., None]
+    shown = functional.grid_sample(values, place, padding_mode="border", align_corners=False)
+    seen = (place.abs() < 1).all(dim=3) & (away > NEAR)
+    shape = (batch, count, size, size)
+    return shown.view(batch, -1, count, size, size), away.view(shape), seen.view(shape)
 
 
 def reliefs(like: Tensor) -> Tensor:

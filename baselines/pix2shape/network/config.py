@@ -12,22 +12,6 @@ from scenegen.common.records import LARGEST, check, from_json, to_json
 PAPER_NETWORKS = NetworkSpec()
 CONFIGS: dict[str, dict[str, Any]] = {
     "paper": {},
-    "compact": {
-        "networks": NetworkSpec(size=64, width=0.125),
-        "batch": 16,
-        "iterations": 12_000,
-        "learning_rate": 1e-3,
-        "betas": (0.9, 0.99),
-        "decay": True,
-        "critic_steps": 1,
-        "adversarial": 0.0,
-        "code_reconstruction": 0.0,
-        "absolute_differences": True,
-        "consistency": 30.0,
-        "questions": 0.01,
-        "contrast": 10.0,
-        "question_batch": 32,
-    },
     "rays": {
         "networks": NetworkSpec(size=64, width=0.125, rays=True),
         "batch": 32,
@@ -41,28 +25,33 @@ CONFIGS: dict[str, dict[str, Any]] = {
         "code_reconstruction": 0.0,
         "matching": 1.0,
     },
-}
-CONFIGS["views"] = {
-    **CONFIGS["compact"],
-    "networks": NetworkSpec(size=64, width=0.0625, camera=False, spherical=True, encoder="polar"),
-    "iterations": 26_000,
-    "learning_rate": 3e-3,
-    "reconstruction": 0.0,
-    "mutual_information": 0.0,
-    "questions": 0.0,
-    "consistency": 0.0,
-    "contrast": 1.0,
-    "temperature": 0.6,
-    "hard_negatives": 1.0,
-    "easy_negatives": 0.0,
-    "turned": True,
-    "question_batch": 64,
-    "labelled_batch": 8,
-    "batch": 4,
+    "views": {
+        "networks": NetworkSpec(
+            size=64, width=0.0625, camera=False, spherical=True, encoder="polar"
+        ),
+        "batch": 4,
+        "question_batch": 64,
+        "labelled_batch": 8,
+        "turned": True,
+        "temperature": 0.6,
+        "hard_negatives": 1.0,
+        "easy_negatives": 0.0,
+        "iterations": 26_000,
+        "learning_rate": 3e-3,
+        "betas": (0.9, 0.99),
+        "decay": True,
+        "critic_steps": 1,
+        "adversarial": 0.0,
+        "reconstruction": 0.0,
+        "code_reconstruction": 0.0,
+        "mutual_information": 0.0,
+        "questions": 0.0,
+        "contrast": 1.0,
+    },
 }
 LOSSES = (
-    "adversarial", "reconstruction", "code_reconstruction", "consistency", "mutual_information",
-    "questions", "contrast", "depth", "matching", "swap",
+    "adversarial", "reconstruction", "code_reconstruction", "mutual_information", "questions",
+    "contrast", "depth", "matching",
 )  # fmt: skip
 
 METHOD = "pix2shape"
@@ -87,29 +76,25 @@ class ModelConfig:
         lights: how many lights, as many as rooms of the training file have at most, whose positions
             are read from the code and not told; 0 tells them. Their colours are told.
         iterations, batch: length of training, and images in each batch.
-        question_batch: questions whose codes L_theta and `contrast` compare in each iteration.
-        labelled_batch: labelled questions that are compared besides; 0 lets some of
-            `question_batch` be labelled ones.
+        question_batch: questions whose codes are compared in each iteration: labelled ones by
+            L_theta or, with `contrast`, those without a label.
+        labelled_batch: labelled questions that are compared besides, with `contrast`.
         turned: whether the images of compared questions are turned about the viewing axis, each by
             an angle of its own, and each question mirrored with probability 1/2.
         temperature: of `contrast`; divides mean squared differences of codes, about 2 at first.
         hard_negatives: weight in `contrast` of the pairs among a question's own answers, which
             show different shapes of as many cubes.
         easy_negatives: weight in `contrast` of the answers of other questions.
-        compared_information: whether mutual information is taken over the codes of the compared
-            questions, four each, and not over those of a batch of images.
         learning_rate, betas: of Adam.
         decay: whether the learning rate falls linearly to 0 over the second half of training.
         critic_steps: steps of the critic for each step of encoder and decoder.
         absolute_differences: whether images are compared by absolute differences, not by the
             paper's norm.
-        adversarial, reconstruction, code_reconstruction, consistency, mutual_information,
-        questions, contrast, depth, matching, swap:
+        adversarial, reconstruction, code_reconstruction, mutual_information, questions, contrast,
+        depth, matching:
             weights of the losses of `training/losses.py`; 0 switches one off. `questions` is the
-            paper's L_theta, `depth` the supervision of its ablation, `matching` compares with the
-            relief that a search finds from several images of a scene (networks of rays only), and
-            `swap` is the reconstruction of a reference from the right answer's z_scene and its own
-            z_view.
+            paper's L_theta, `depth` the supervision of its ablation, and `matching` compares with
+            the relief that a search finds from several images of a scene (networks of rays only).
         seed: of the first weights and of every random choice of training.
     """
 
@@ -127,7 +112,6 @@ class ModelConfig:
     temperature: float = 0.2
     hard_negatives: float = 0.0
     easy_negatives: float = 1.0
-    compared_information: bool = False
     learning_rate: float = 1e-4
     betas: tuple[float, float] = (0.5, 0.9)
     decay: bool = False
@@ -136,21 +120,18 @@ class ModelConfig:
     adversarial: float = 1.0
     reconstruction: float = 1.0
     code_reconstruction: float = 1.0
-    consistency: float = 0.0
     mutual_information: float = 1.0
     questions: float = 1.0
     contrast: float = 0.0
     depth: float = 0.0
     matching: float = 0.0
-    swap: float = 0.0
     seed: int = 0
 
     def __post_init__(self) -> None:
-        least = 8 if self.contrast else 2  # a quarter of them may be labelled
         ranges: dict[str, tuple[float, float]] = {
             "depth_reach": (TINY, 1 - TINY), "depth_middle": (TINY, LARGEST),
             "iterations": (1, LARGEST), "batch": (2, MOST_ITEMS),
-            "question_batch": (least, MOST_ITEMS), "labelled_batch": (0, MOST_ITEMS),
+            "question_batch": (2, MOST_ITEMS), "labelled_batch": (0, MOST_ITEMS),
             "temperature": (TINY, LARGEST), "hard_negatives": (0, LARGEST),
             "easy_negatives": (0, LARGEST), "critic_steps": (1, MOST_ITEMS),
             "learning_rate": (TINY, LARGEST), "lights": (0, MOST_LIGHTS), "seed": (0, 2**63),
@@ -181,7 +162,7 @@ class ModelConfig:
         if self.networks.rays:
             return f"{METHOD}-rays"
         both = self.reconstruction and self.code_reconstruction and not self.absolute_differences
-        ours = (self.consistency, self.contrast, self.matching, self.swap)
+        ours = (self.contrast, self.matching)
         view = self.networks.camera or self.disentangles
         others = self.networks.spherical or self.turned
         faithful = self.adversarial and both and view and not (any(ours) or others)
@@ -196,8 +177,7 @@ class ModelConfig:
     def uses_images(self) -> bool:
         """Whether any loss is of a batch of images, not of questions that are compared."""
         image = (self.adversarial, self.reconstruction, self.code_reconstruction)
-        information = self.disentangles and not self.compared_information
-        return bool(any((*image, self.consistency, self.depth, self.matching)) or information)
+        return bool(any((*image, self.depth, self.matching)) or self.disentangles)
 
     @property
     def disentangles(self) -> bool:
@@ -228,10 +208,9 @@ def model_config(name: str, /, **settings: Any) -> ModelConfig:
     """Return a named configuration, with some settings changed.
 
     Args:
-        name: "paper" (128 pixels, full width, all losses of the paper), "compact" (64 pixels, an
-            eighth of the width, no adversarial loss), "rays" (the same size; told the empty room,
-            and trained on what matching finds in several images of a scene) or "views" (questions
-            alone: the polar encoder and `contrast`).
+        name: "paper" (128 pixels, full width, all losses of the paper), "rays" (64 pixels, an
+            eighth of the width; told the empty room, and trained on what matching finds in several
+            images of a scene) or "views" (questions alone: the polar encoder and `contrast`).
         settings: values as in JSON by name; a setting of the networks as "networks.width".
 
     Raises SpecError for unknown names and impossible values.

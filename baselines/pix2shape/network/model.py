@@ -1,8 +1,6 @@
 """The whole model: image -> code -> depth map and opacity -> image."""
 
-from collections.abc import Callable
-from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, TypeVar
+from dataclasses import dataclass, replace
 
 import torch
 from torch import Tensor, nn
@@ -13,23 +11,10 @@ from baselines.pix2shape.network.empty_rooms import FLAT, Cameras, empty_rooms, 
 from baselines.pix2shape.network.polar import PolarEncoder
 from baselines.pix2shape.network.surfels import Scene, render
 
-T = TypeVar("T")
 MATERIAL = 5  # numbers of a surfel's material: albedo, k_s, exponent
 SHINIEST = 128.0
 HIGHEST = 0.6  # scene units; in rooms of one view 0.6% of the object pixels stand out more
 LOW = -3.0  # added to the decoder's numbers, so that a bounded relief begins near FLAT
-
-
-def mapped(record: T, function: Callable[[Tensor], Tensor]) -> T:
-    """Return a dataclass with a function applied to its tensors, nested dataclasses included."""
-    changed: dict[str, Any] = {}
-    for field in fields(record):  # type: ignore[arg-type]
-        value = getattr(record, field.name)
-        if isinstance(value, Tensor):
-            changed[field.name] = function(value)
-        elif is_dataclass(value):
-            changed[field.name] = mapped(value, function)
-    return replace(record, **changed)  # type: ignore[type-var]
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,8 +23,6 @@ from baselines.training.images import Draws
 from baselines.training.processes import LostProcessError, share
 from scenegen.common.errors import SceneGenError
 
-LABELS_PER_PLACE = 100  # labels for each labelled question among those compared
-
 
 @dataclass(frozen=True, eq=False)
 class Sources:
@@ -52,17 +50,12 @@ class Sources:
 
     def question_sizes(self, config: ModelConfig) -> tuple[int, int]:
         """Return how many questions with and without a label are compared in each iteration."""
-        compared = config.contrast or config.questions or config.swap
+        compared = config.contrast or config.questions
         if not isinstance(self.images, QuestionImages) or not compared:
             return 0, 0
-        if config.labelled_batch:
-            labelled = config.labelled_batch if self.labels else 0
-            return labelled, config.question_batch if config.contrast else 0
         if not config.contrast:
             return (config.question_batch if self.labels else 0), 0
-        few = -(-self.labels // LABELS_PER_PLACE)  # more would repeat few labels too often
-        labelled = min(few, config.question_batch // 4)
-        return labelled, config.question_batch - labelled
+        return (config.labelled_batch if self.labels else 0), config.question_batch
 
 
 class _Catching(Dataset[Any]):

@@ -4,7 +4,6 @@ import functools
 import json
 from collections.abc import Collection
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,17 +15,10 @@ from baselines.pix2shape.rooms import RoomImages
 from baselines.pix2shape.training.batches import Sources
 from baselines.pix2shape.weights import METHOD, Card, open_weights
 from baselines.training.checkpoint import State, load_checkpoint
-from baselines.training.images import Opened
-from baselines.training.questions import (
-    LABELED,
-    UNLABELED,
-    check_labels,
-    is_question_file,
-    open_training,
-)
+from baselines.training.data import TrainingFiles, only, shared_questions, shared_rooms
+from baselines.training.questions import LABELED, UNLABELED, check_labels
 from baselines.training.run_folder import begun
 from iqtt import QuestionsFile
-from scenegen import open_rooms
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check, to_json
 from scenegen.description.specs import DatasetSpec
@@ -34,15 +26,14 @@ from scenegen.rooms.reader import RoomsFile
 
 OF_NETWORKS = ("networks", "opacity", "material", "lights", "depth_middle", "depth_reach")
 OF_QUESTIONS = (
-    "question_batch", "labelled_batch", "turned", "temperature", "hard_negatives",
-    "easy_negatives", "compared_information",
+    "question_batch", "labelled_batch", "turned", "temperature", "hard_negatives", "easy_negatives",
 )  # fmt: skip
 ModelState = State[Card, Pix2Shape]
-Files = Opened[RoomsFile] | tuple[Opened[QuestionsFile], Opened[QuestionsFile]]
+Files = RoomsFile | tuple[QuestionsFile, QuestionsFile]  # questions: unlabelled, labelled
 
 
 def new_run(
-    data: str | Path,
+    data: TrainingFiles,
     config: ModelConfig,
     *,
     labels: int = 0,
@@ -56,12 +47,12 @@ def new_run(
     The arguments are those of `train_run`. Raises SpecError where they and the data do not fit;
     as `open_weights`, and as the readers of the data.
     """
-    files = _opened(data)
+    files = _tables(data)
     suited = _suited(config, files, labels, conditional)
     for name in chosen:
         value, needed = (functools.reduce(getattr, name.split("."), c) for c in (config, suited))
         if value != needed:
-            hint = f"leave it out: {data}, with {labels} labels, decides it or does not use it"
+            hint = f"leave it out: {data.where}, with {labels} labels, decides it or has no use"
             raise SpecError(name, value, "nothing", hint)
     sources = _sources(files, suited, labels)
     card = Card(
@@ -73,14 +64,14 @@ def new_run(
         precision=precision,
         classes=sources.images.classes if suited.networks.classes else (),
     )
-    state = begun(METHOD, card, None, data)
+    state = begun(METHOD, card, None, data.where)
     if start is not None:
         _begin_from(start, state)
     return state, sources
 
 
 def resumed_run(
-    folder: Path, data: str | Path, precision: str | None
+    folder: Path, data: TrainingFiles, precision: str | None
 ) -> tuple[ModelState, Sources]:
     """Return the state of a folder's checkpoint, and what it learns from.
 
@@ -91,40 +82,40 @@ def resumed_run(
     card = earlier.card
     expected = f"{card.precision}, as the run began with"
     check(precision in (None, card.precision), "precision", precision, expected)
-    sources = _sources(_opened(data), card.settings, card.labels)
-    return begun(METHOD, replace(card, fingerprint=sources.fingerprint), earlier, data), sources
+    sources = _sources(_tables(data), card.settings, card.labels)
+    told = replace(card, fingerprint=sources.fingerprint)
+    return begun(METHOD, told, earlier, data.where), sources
 
 
-def _opened(data: str | Path) -> Files:
-    """Open rooms, or the unlabelled and the labelled questions of a training file."""
-    if not is_question_file(data):
-        return Opened(partial(open_rooms, data))
+def _tables(data: TrainingFiles) -> Files:
+    if not data.hold_questions:
+        return only(data.rooms(), "pix2shape")
     unlabelled, labelled = (
-        Opened(partial(open_training, data, part)) for part in (UNLABELED, LABELED)
+        only(data.questions(part), "pix2shape") for part in (UNLABELED, LABELED)
     )
     return unlabelled, labelled
 
 
 def _sources(files: Files, config: ModelConfig, labels: int) -> Sources:
     """Return what a run learns from; the labelled questions if some of their answers are used."""
-    if isinstance(files, Opened):
-        return Sources(RoomImages(files, config))
+    if isinstance(files, RoomsFile):
+        return Sources(RoomImages(shared_rooms(files), config))
     unlabelled, labelled = files
-    check_labels(labelled.file, labels)
-    answered = QuestionImages(labelled, config) if labels else None
-    return Sources(QuestionImages(unlabelled, config), answered, labels)
+    check_labels(labelled, labels)
+    answered = QuestionImages(shared_questions(labelled), config) if labels else None
+    return Sources(QuestionImages(shared_questions(unlabelled), config), answered, labels)
 
 
 def _suited(config: ModelConfig, files: Files, labels: int, conditional: bool) -> ModelConfig:
     """Return the configuration as the data needs it. Raises SpecError where they do not fit."""
-    if isinstance(files, Opened):
-        return _for_rooms(config, files.file.spec, labels, conditional)
-    unlabelled = files[0].file
+    if isinstance(files, RoomsFile):
+        return _for_rooms(config, files.spec, labels, conditional)
+    unlabelled = files[0]
     if conditional:
         message = "questions, which have no classes"
         raise SpecError(unlabelled.path, message, "rooms for --conditional")
     config = for_questions(config, unlabelled)
-    return config if labels else replace(config, questions=0.0, swap=0.0)
+    return config if labels else replace(config, questions=0.0)
 
 
 def _for_rooms(
@@ -140,7 +131,7 @@ def _for_rooms(
         check(single, "conditional", f"objects {spec.objects}", "one object in every room")
         networks = replace(networks, classes=len(spec.shapes))
     unused: dict[str, Any] = {name: getattr(ModelConfig, name) for name in OF_QUESTIONS}
-    off = dict.fromkeys(("mutual_information", "questions", "contrast", "swap"), 0.0)
+    off = dict.fromkeys(("mutual_information", "questions", "contrast"), 0.0)
     return replace(config, networks=networks, **unused | off)
 
 

@@ -9,12 +9,11 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 from torch import nn
 
-from baselines.pix2shape.batch import Batch
+from baselines.pix2shape.batch import Batch, turned
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.questions import QuestionImages
 from baselines.pix2shape.training.batches import Sources, image_batches, question_batches
 from baselines.pix2shape.training.steps import critic_step, draw, generator_step
-from baselines.pix2shape.training.turning import turned
 from baselines.training.fit import Loss
 from baselines.training.processes import processes
 from scenegen.common.errors import SpecError
@@ -71,7 +70,7 @@ class Iterations:
                 compared = turned(questions[0], noise.turn, noise.mirror), questions[1]
             if config.has_critic:
                 with self._autocast():
-                    total, numbers = critic_step(model, batch, noise, compared)
+                    total, numbers = critic_step(model, batch, noise)
                 yield Loss(total, numbers, "critic")
         with self._autocast(), _frozen(model.critic, model.statistics):
             total, numbers = generator_step(model, batch, noise, compared)
@@ -85,20 +84,14 @@ def check_request(model: Pix2Shape, sources: Sources, count: int) -> None:
     share a batch evenly.
     """
     config, questions = model.config, isinstance(sources.images, QuestionImages)
-    if questions and config.consistency:
-        expected = "0 for questions, whose cameras are not told"
-        raise SpecError("consistency", config.consistency, expected)
     compared = sum(sources.question_sizes(config))
     images = sources.batch_size(config) if config.uses_images else 0
     for size in (images, compared):
         items = "questions" if questions else "images"
         expected = f"a number of processes that divides a batch of {size} {items}"
         check(size % count == 0, "devices", count, expected)
-    if config.disentangles and config.compared_information and not compared:
-        expected = "questions that are compared, as contrast or labels ask for"
-        raise SpecError("compared information", "nothing that is compared", expected)
     weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
-    if not any((*weights, config.consistency, config.depth, config.matching, compared)):
+    if not any((*weights, config.depth, config.matching, compared)):
         raise SpecError("losses", "every weight at 0", "one above 0")
     for name in ("material", "lights"):
         if getattr(config, name) and not any(weights):

@@ -1,12 +1,12 @@
 """The losses, each a function of batches of tensors that returns a number.
 
 Most are the paper's: Pix2Shape (IJCV 2020), sections "Bi-Directional Adversarial Training",
-"Unsupervised Training" and "Semi-supervised Training for Classification". Three are our own,
-`absolute_loss`, `disagreement` and `contrast_loss`; docs/pix2shape.md says why.
+"Unsupervised Training" and "Semi-supervised Training for Classification". Two are our own,
+`absolute_loss` and `contrast_loss`; docs/pix2shape.md says why.
 
 Where several processes share a batch, the average of what they return is the loss of the whole
-batch. Means over images are given each process's own images. `disagreement` asks the others itself,
-and `mutual_information`, `question_loss` and `contrast_loss` need the codes of the whole batch.
+batch. Means over images are given each process's own images. `mutual_information`, `question_loss`
+and `contrast_loss` need the codes of the whole batch.
 """
 
 import math
@@ -14,13 +14,7 @@ from collections.abc import Callable
 
 import torch
 from torch import Tensor
-from torch.nn import functional
 
-from baselines.pix2shape.network.surfels import back_project
-from baselines.training.processes import summed
-
-HIDDEN = 0.1  # scene units behind another surface at which a surfel counts as hidden by it
-NEAR = 0.05  # scene units; surfels nearer to the other camera than this, or behind it, are left out
 PENALTY = 10.0  # weight lambda of the gradient penalty
 
 
@@ -73,36 +67,6 @@ def absolute_loss(values: Tensor, again: Tensor) -> Tensor:
     """
     differences = (values - again).flatten(1)
     return differences.abs().mean() * math.sqrt(differences.shape[1])
-
-
-def disagreement(
-    depth: Tensor, other_depth: Tensor, other_from_camera: Tensor, fov_y_degrees: float
-) -> Tensor:
-    """Return the mean distance between one view's surfels and another view's, scene units.
-
-    Each surfel's depth in the other camera is compared with the depth that the other view has in
-    its place. Surfels out of the other view's sight, or hidden by more than HIDDEN, are left out.
-    This is the geometric consistency of learning depth from video (Zhou et al. 2017; Bian et al.
-    2019), here between two decoded views of one code.
-
-    Args:
-        depth, other_depth: (B, S, S), scene units.
-        other_from_camera: (B, 4, 4).
-    """
-    with torch.autocast(depth.device.type, enabled=False):  # differences of near numbers
-        points = back_project(depth, fov_y_degrees).flatten(2)
-        points = other_from_camera[:, :3, :3] @ points + other_from_camera[:, :3, 3:]
-        its_depth = -points[:, 2]
-        edge = math.tan(math.radians(fov_y_degrees) / 2) * its_depth.clamp(min=NEAR)
-        place = torch.stack([points[:, 0], -points[:, 1]], dim=2) / edge[..., None]
-        place = torch.nan_to_num(place)  # at NaN torch's gradient reads outside of memory
-        inverse = functional.grid_sample(  # inverse depth is affine on planes
-            1 / other_depth[:, None], place[:, None], padding_mode="border", align_corners=False
-        )
-    behind = its_depth - 1 / inverse[:, 0, 0]
-    between_centres = (place.abs() < 1 - 1 / depth.shape[1]).all(dim=2)
-    counted = between_centres & (its_depth > NEAR) & (behind < HIDDEN)
-    return summed((behind.abs() * counted).sum()) / summed(counted.sum()).clamp(min=1)
 
 
 def mutual_information(

@@ -8,7 +8,7 @@ import torch
 from lightning_fabric import Fabric
 from torch.utils.data import DataLoader
 
-from baselines.pix2shape.matching import labels as matching
+from baselines.pix2shape.matching.relief import matched_rows, relief_of_rows
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.pictures import training_sheet
@@ -19,8 +19,10 @@ from baselines.pix2shape.training.iterations import Iterations, check_request
 from baselines.pix2shape.training.logs import Logs, opened_logs
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import CHECKPOINT, WEIGHTS
+from baselines.training.data import TrainingFiles
 from baselines.training.fit import Progress, falling_late, fit
-from baselines.training.launch import Machine, check_agreement, launched
+from baselines.training.launch import check_agreement, launched
+from baselines.training.machine import Machine
 from baselines.training.processes import summed
 from baselines.training.rooms import read_rooms
 from baselines.training.run_folder import alone_in, check_new
@@ -35,7 +37,7 @@ PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch si
 
 def train_run(
     folder: str | Path,
-    data: str | Path,
+    data: TrainingFiles,
     config: ModelConfig | None,
     machine: Machine,
     *,
@@ -107,7 +109,7 @@ def train_run(
                 state,
                 iterations,
                 learning_rate,
-                every=machine.every,
+                machine,
                 prepare=lambda: settings.adversarial or fit_prior(model, sources),
                 progress=show,
             )
@@ -146,8 +148,8 @@ def _match(
     Raises SpecError, before the search, where the views of the rooms do not suit.
     """
     card = state.card
-    rooms = read_rooms(source.opened.file, card.settings.networks.size)
-    source.pick_views(matching.matched_rows(rooms).numpy())
+    rooms = read_rooms([source.opened.file], card.settings.networks.size)
+    source.pick_views(matched_rows(rooms).numpy())
 
     def show(done: int, total: int) -> None:
         share = {"share of images matched": done / total}
@@ -155,7 +157,7 @@ def _match(
 
     for turn in (True, False):  # the first process finds what the others then read
         if turn is fabric.is_global_zero:
-            relief = matching.labels(rooms, folder, show)
+            relief = relief_of_rows(rooms, folder, show)
         summed(torch.zeros(1, device=fabric.device))
     source.learn_from(relief.numpy())
 

@@ -16,9 +16,9 @@ from torch import Tensor
 from baselines.pix2shape.batch import Batch
 from baselines.pix2shape.network.architecture import CAMERA
 from baselines.pix2shape.network.config import ModelConfig
-from baselines.pix2shape.network.empty_rooms import Cameras
-from baselines.pix2shape.network.model import Pix2Shape, mapped, shaded
+from baselines.pix2shape.network.model import Pix2Shape, shaded
 from baselines.pix2shape.training import losses
+from baselines.training.images import mapped
 from baselines.training.processes import gathered, share, summed
 
 Numbers = dict[str, Tensor]
@@ -36,7 +36,6 @@ class Noise:
         turn: of the compared questions' images, of which there are C, the angles by which they are
             turned, radians, (C / N,).
         mirror: which of them are mirrored first, (C / N,), all of a question or none.
-        compared_order: a permutation of the compared images, (C,).
     """
 
     code: Tensor
@@ -44,7 +43,6 @@ class Noise:
     order: Tensor
     turn: Tensor
     mirror: Tensor
-    compared_order: Tensor
 
     def to(self, device: torch.device) -> "Noise":
         """Return the noise on another device."""
@@ -68,24 +66,16 @@ def draw(images: int, z: int, seed: int, questions: int = 0, each: int = 0) -> N
         torch.randperm(images, generator=source),
         2 * torch.pi * torch.rand(questions * each, generator=source)[compared],
         (torch.rand(questions, generator=source) < 0.5).repeat_interleave(each)[compared],
-        torch.randperm(questions * each, generator=source),
     )
 
 
-def critic_step(
-    model: Pix2Shape, batch: Batch, noise: Noise, questions: Questions | None = None
-) -> tuple[Tensor, Numbers]:
-    """Return what critic and statistics network minimise, and the parts to report by name.
-
-    Args:
-        questions: as for `generator_step`.
-    """
+def critic_step(model: Pix2Shape, batch: Batch, noise: Noise) -> tuple[Tensor, Numbers]:
+    """Return what critic and statistics network minimise, and the parts to report by name."""
     config, views = model.config, batch.views
     numbers: Numbers = {}
     total = batch.image.new_zeros(())
-    if config.adversarial or not config.compared_information:
-        with torch.no_grad():
-            code = model.encode(batch.image, views)
+    with torch.no_grad():
+        code = model.encode(batch.image, views)
     if config.adversarial:
         with torch.no_grad():
             made = model.image(noise.code, views)
@@ -99,13 +89,7 @@ def critic_step(
         numbers["distance"], numbers["penalty"] = -loss, penalty
         total = total + loss + penalty
     if config.disentangles:
-        order = noise.order
-        if config.compared_information:
-            assert questions is not None, "check_request sees to it"
-            compared = questions[0]
-            with torch.no_grad():
-                code, order = model.encode(compared.image, compared.views), noise.compared_order
-        total = total - _information(model, code, order)
+        total = total - _information(model, code, noise.order)
     return total, numbers
 
 
@@ -122,7 +106,7 @@ def generator_step(
     numbers: Numbers = {}
     if config.uses_images:
         code = model.encode(batch.image, views)
-    if config.reconstruction or config.depth or config.consistency:
+    if config.reconstruction or config.depth:
         surfels = model.surfels(code, views.condition, views.cameras)
         depth = surfels.depth
         if config.reconstruction:
@@ -145,25 +129,13 @@ def generator_step(
         if config.code_reconstruction:
             again = model.encode(made, views)
             numbers["code_reconstruction"] = losses.reconstruction_loss(noise.code, again)
-    if config.consistency:
-        pose, fov = views.world_from_camera, views.scene.fov_y_degrees
-        assert pose is not None, "for_questions switches consistency off"
-        theirs = noise.order[share(len(noise.order))]
-        others, camera = gathered(pose)[theirs], gathered(views.condition)[theirs, :CAMERA]
-        classes = views.condition[:, CAMERA:]
-        there = torch.cat([camera, classes], dim=1), Cameras(others, fov)
-        elsewhere = model.surfels(code, *there).depth
-        numbers["consistency"] = (
-            losses.disagreement(depth, elsewhere, torch.linalg.solve(others, pose), fov)
-            + losses.disagreement(elsewhere, depth, torch.linalg.solve(pose, others), fov)
-        ) / 2
     if config.matching:
         assert batch.relief is not None, "run.py had it found"
         numbers["matching"] = _matching(model, batch, code, noise)
-    if config.disentangles and not config.compared_information:
+    if config.disentangles:
         numbers["mutual_information"] = _information(model, code, noise.order)
     if questions is not None:
-        numbers |= _question_losses(model, *questions, noise)
+        numbers |= _question_losses(model, *questions)
     weighted = (getattr(config, name) * loss for name, loss in numbers.items())
     return sum(weighted, batch.image.new_zeros(())), numbers
 
@@ -184,12 +156,10 @@ def _matching(model: Pix2Shape, batch: Batch, code: Tensor, noise: Noise) -> Ten
     return (decoded - relief.values[each, drawn].float()).abs().mean()
 
 
-def _question_losses(model: Pix2Shape, images: Batch, answers: Tensor, noise: Noise) -> Numbers:
+def _question_losses(model: Pix2Shape, images: Batch, answers: Tensor) -> Numbers:
     """Return the losses that compare the images of questions, by name."""
     config, numbers = model.config, Numbers()
     code = model.encode(images.image, images.views)
-    if config.disentangles and config.compared_information:
-        numbers["mutual_information"] = _information(model, code, noise.compared_order)
     scene, whole = gathered(code[:, : config.networks.z_scene]), gathered(answers)
     codes, labelled = scene.view(len(whole), -1, scene.shape[1]), whole >= 0
     if config.questions and labelled.any():
@@ -198,8 +168,6 @@ def _question_losses(model: Pix2Shape, images: Batch, answers: Tensor, noise: No
         numbers["contrast"] = losses.contrast_loss(
             codes, whole, config.temperature, config.hard_negatives, config.easy_negatives
         )
-    if config.swap and labelled.any():
-        numbers["swap"] = _swapped(model, images, code, answers)
     return numbers
 
 
@@ -207,25 +175,6 @@ def _compared(config: ModelConfig, image: Tensor, again: Tensor) -> Tensor:
     """Return how much images, (B, 3, S, S), differ."""
     absolute = config.absolute_differences
     return (losses.absolute_loss if absolute else losses.reconstruction_loss)(image, again)
-
-
-def _swapped(model: Pix2Shape, images: Batch, code: Tensor, answers: Tensor) -> Tensor:
-    """Return how well labelled references come from the right answer's scene and their own view.
-
-    Every reference is decoded, so that batch normalisation sees as many images in each process;
-    where no answer is told, its own scene is taken and it counts nothing.
-    """
-    labelled, each = answers >= 0, len(code) // len(answers)
-    first = torch.arange(0, len(code), each, device=code.device)
-    scene = code[first + torch.where(labelled, 1 + answers, 0), : model.config.networks.z_scene]
-    swapped = torch.cat([scene, code[first, model.config.networks.z_scene :]], dim=1)
-    views = mapped(images.views, lambda values: values[first])
-    again = model.image(swapped, views)
-    count = labelled.sum()
-    loss = again.sum() * 0
-    if count:
-        loss = count * _compared(model.config, images.image[first][labelled], again[labelled])
-    return summed(loss) / summed(count)
 
 
 def _information(model: Pix2Shape, code: Tensor, order: Tensor) -> Tensor:

@@ -31,14 +31,15 @@ def folder(pix2shape_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 def test_train_predict_score(folder):
-    small = [f"--set={one}" for one in ("iterations=2", "batch=2", "consistency=0")]
-    made = train(*small, "--set=networks.size=32", "--set=networks.width=0.05", "--seed", 5)
+    small = [f"--set={one}" for one in ("iterations=2", "batch=2", "adversarial=0", "decay=true")]
+    small += ["--config", "paper", "--set=networks.size=32", "--set=networks.width=0.05"]
+    made = train(*small, "--seed", 5)
     assert made.exit_code == 0, made.output
     from baselines.pix2shape.weights import open_weights
 
     settings = vars(open_weights(folder / "run" / "weights.safetensors")[1].settings)
     expected = {"iterations": 2, "batch": 2, "seed": 5, "decay": True}
-    assert expected.items() <= settings.items(), "the others are compact's"
+    assert expected.items() <= settings.items()
     on = ("--data", "large.h5", "--weights", "run/weights.safetensors")
     done = pix2shape("predict", *on, "--run", "one")
     assert done.exit_code == 0, done.output
@@ -128,7 +129,7 @@ def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
     check_refusal(result.exit_code, result.stdout, result.stderr, ("rooms.h5", "pix2shape train"))
     assert "are bundled" not in result.stderr
     (folder / "none").mkdir()
-    for name in ("shapes-paper", "shapes-single"):
+    for name in ("shapes-paper", "shapes-rays"):
         shutil.copy("rooms.safetensors", f"none/{name}.safetensors")
     made = bench("baseline", "pix2shape", "--data", "rooms.h5")
     assert "weights shapes-paper, on rooms.h5" in made.stdout, made.output
@@ -137,9 +138,9 @@ def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
     check_refusal(
         result.exit_code, result.stdout, result.stderr, ("--weights", "pix2shape-compact")
     )
-    assert pix2shape("sample", "--weights", "shapes-single", "--n", 1).exit_code == 0
+    assert pix2shape("sample", "--weights", "shapes-rays", "--n", 1).exit_code == 0
     result = pix2shape("sample", "--weights", "chairs", "--overwrite")
-    words = ("'chairs'", "shapes-paper, shapes-single")
+    words = ("'chairs'", "shapes-paper, shapes-rays")
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
 
@@ -152,7 +153,7 @@ MISTAKES = [
     (f"predict {WITH} {ROOMS} --out rooms.h5 --overwrite", ("rooms.h5", "not an input")),
     (f"predict {WITH} --data damaged.h5", ("damaged.h5", "image, row 5")),
     (f"train {ROOMS} --out run --devices {2**200}", ("--devices", "1<=x<=1024")),
-    (f"train {LARGE} --device cpu --devices 3", ("--devices", "16 images")),
+    (f"train {LARGE} --device cpu --devices 3", ("--devices", "32 images")),
     (f"sample {WITH} --class mug", ("class", "'mug'")),
     ("sample --weights classes.safetensors --class sofa", ("'sofa'", "mug, bowl")),
     ("sample --weights questions.safetensors", ("weights",)),
@@ -171,7 +172,7 @@ MISTAKES = [
     (f"train {LARGE} --set seed=2 --seed 2", ("--set", "'seed'")),
     (f"train {LARGE} --set batch={'[' * 100_000}", ("--set",)),
     (f"train {LARGE} --set turned=true", ("turned", "True")),
-    ("train --data iqtt-train.h5 --out run --set consistency=2", ("consistency", "2.0")),
+    ("train --data iqtt-train.h5 --out run --set depth=2", ("depth", "2.0")),
     (f"train {LARGE} --start rooms.safetensors", ("start", "networks.size", "64")),
     (f"train {LARGE} --set batch=1000000000", ("batch", "1000000000")),
     (f"train {LARGE} --set networks.sise=32", ("sise",)),

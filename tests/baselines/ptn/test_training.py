@@ -9,6 +9,7 @@ from refusals import refused
 from baselines.ptn.network import Settings
 from baselines.ptn.rooms import TrainingRooms
 from baselines.ptn.training import projection_loss, train
+from baselines.training.data import TrainingFiles
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
 
@@ -42,10 +43,10 @@ def test_a_few_rooms_are_learnt_by_heart(rooms):
 
 def test_what_does_not_fit_is_refused_before_training(rooms, train_questions, tmp_path):
     with refused(SpecError, "labels", "5", "rooms"):
-        train(rooms, tmp_path / "run", Settings(**TINY), labels=5)
+        train(TrainingFiles(rooms), tmp_path / "run", Settings(**TINY), labels=5)
     assert not (tmp_path / "run").exists()
-    weights = train(rooms, tmp_path / "rooms", Settings(**TINY, iterations=1))
+    weights = train(TrainingFiles(rooms), tmp_path / "rooms", Settings(**TINY, iterations=1))
     with refused(SpecError, "data", "questions", "rooms"):
-        train(train_questions, tmp_path / "other", networks=str(weights))
+        train(TrainingFiles(train_questions), tmp_path / "other", networks=str(weights))
     with refused(SpecError, "data", "questions", "rooms"):
-        train(train_questions, tmp_path / "rooms", resume=True)
+        train(TrainingFiles(train_questions), tmp_path / "rooms", resume=True)

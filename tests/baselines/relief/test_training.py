@@ -4,19 +4,21 @@ from dataclasses import replace
 
 import h5py
 import numpy as np
+import pytest
 import torch
 from h5_edits import put, values
 from pix2shape_models import edited, in_memory
 from refusals import refused
 from safetensors.torch import load_file
 
-from baselines.pix2shape.matching.labels import FOLDER
+from baselines.pix2shape.matching.relief import FOLDER
 from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
 from baselines.relief import depth_supervised, training, view_pairs
 from baselines.relief.depth_completed import views_of_scenes
 from baselines.relief.network import Settings, predicted_depth
-from baselines.relief.training import learning_rate, windows
+from baselines.relief.training import SLOPE, learning_rate, shape_loss, windows
 from baselines.training.checkpoint import load_weights
+from baselines.training.data import TrainingFiles
 from scenegen.common.errors import FileFormatError, SpecError
 
 SMALL = Settings(size=32, width=0.25, iterations=2, batch=4)
@@ -36,7 +38,7 @@ def test_a_unet_learns_nine_images_by_heart(turned_path, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "WARM_UP", 10)
     monkeypatch.setattr(training, "WHOLE", 0.5)
     settings = replace(SMALL, iterations=320, batch=9, learning_rate=0.01)
-    path = depth_supervised.train(turned_path, tmp_path, settings)
+    path = depth_supervised.train(TrainingFiles(turned_path), tmp_path, settings)
     network, card = load_weights(path, depth_supervised.METHOD)
     rooms = in_memory(turned_path, 32, depth=True)
     cameras = Cameras(rooms.world_from_camera, rooms.fov_y_degrees)
@@ -55,7 +57,10 @@ def test_pixels_without_a_surface_teach_nothing(turned_path, tmp_path):
         depth[:, :16] = np.nan
         file["depth"][...] = depth
 
-    train = depth_supervised.train
+    def train(path, folder, settings):
+        with TrainingFiles(path) as data:
+            return depth_supervised.train(data, folder, settings)
+
     holes = edited(turned_path, tmp_path / "holes.h5", blank)
     found = train(holes, tmp_path / "holes", SMALL)
     assert all(torch.isfinite(value).all() for value in load_file(found).values())
@@ -71,11 +76,11 @@ def test_view_pairs_reads_nothing_but_images_and_cameras(near_path, tmp_path):
     edits = [values(name, np.zeros_like) for name in UNSEEN]
     edits.append(values("scene", lambda old: np.full_like(old, b"{}")))
     blank = edited(near_path, tmp_path / "blank.h5", *edits)
-    expected = view_pairs.train(near_path, tmp_path / "one", SMALL)
+    expected = view_pairs.train(TrainingFiles(near_path), tmp_path / "one", SMALL)
     assert len(list((tmp_path / "one" / FOLDER).iterdir())) == 1
-    assert same(view_pairs.train(blank, tmp_path / "two", SMALL), expected)
+    assert same(view_pairs.train(TrainingFiles(blank), tmp_path / "two", SMALL), expected)
     other = edited(near_path, tmp_path / "other.h5", put("image", 1, np.float16(0.5)))
-    assert not same(view_pairs.train(other, tmp_path / "three", SMALL), expected)
+    assert not same(view_pairs.train(TrainingFiles(other), tmp_path / "three", SMALL), expected)
 
 
 def test_each_row_is_seen_from_the_cameras_of_its_own_scene(turned_path):
@@ -103,7 +108,25 @@ def test_a_window_is_the_same_of_all_maps_and_shows_an_object():
     shown = torch.zeros(2, 8, 8, dtype=torch.bool)
     shown[0, 7, 0] = True  # in a corner; the second image shows nothing
     for _ in range(20):
-        one, other, seen = windows((places, places[:, 0], shown), shown, 4, rng)
+        place = torch.from_numpy(rng.random(2))
+        one, other, seen = windows((places, places[:, 0], shown), shown, 4, place)
         assert torch.equal(one[:, 0], other)
         assert (one[..., 1:] - one[..., :-1] == 1).all()
         assert seen.flatten(1).any(dim=1).tolist() == [True, False]
+
+
+INSIDE = torch.tensor([[[1, 1, 0, 2], [1, 1, 0, 2]], [[1, 1, 0, 0], [0, 0, 0, 0]]])
+
+
+def test_a_shift_of_each_object_costs_nothing():
+    """Object 1 of the second image is another one than that of the first."""
+    errors = torch.tensor([[[3.0, 3, 9, 5], [3, 3, 7, 5]], [[-1, -1, 8, 2], [6, 4, 0, 0]]])
+    assert float(shape_loss(errors, INSIDE)) == 0
+    assert float(shape_loss(errors, torch.zeros_like(INSIDE))) == 0
+
+
+def test_the_rest_and_the_slopes_are_counted():
+    errors = torch.zeros(2, 2, 4)
+    errors[0, 0, 0] = 4  # mean 1; two of the six pairs of neighbours differ by 4
+    expected = (3 + 3 * 1) / 8 + SLOPE * 2 * 4 / 6
+    assert float(shape_loss(errors, INSIDE)) == pytest.approx(expected)

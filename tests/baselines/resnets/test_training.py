@@ -7,6 +7,8 @@ import torch
 from baselines.resnets import cnn, siamese
 from baselines.resnets.training import permuted
 from baselines.training.checkpoint import load_weights
+from baselines.training.data import TrainingFiles
+from baselines.training.machine import Machine
 
 
 def test_permuted_answers_stay_with_their_questions():
@@ -29,8 +31,9 @@ def test_permuted_answers_stay_with_their_questions():
 def test_it_learns_the_questions_that_it_sees(module, train_questions, tmp_path):
     told = []
     settings = module.Settings(size=16, width=8, batch=3, learning_rate=0.003, iterations=60)
-    how = {"device": "cpu", "progress": lambda *now: told.append(now)}
-    path = module.train(train_questions, tmp_path, settings, **how)
+    how = {"progress": lambda *now: told.append(now)}
+    with TrainingFiles(train_questions) as data:
+        path = module.train(data, tmp_path, settings, Machine("cpu"), **how)
     losses = [numbers["loss"] for *_, numbers in told[:-1]]
     assert np.mean(losses[-5:]) < 0.3 * np.mean(losses[:5])
     assert [done for done, *_ in told] == [*range(1, 61), 60]

@@ -3,8 +3,8 @@
 import numpy as np
 import torch
 
-from baselines.rezende.head import codes_of, train_head
-from baselines.rezende.network import METHOD, Card, Settings
+from baselines.rezende.network import METHOD, Card, Settings, codes_of
+from baselines.rezende.training import train_head
 from baselines.training.checkpoint import new_state
 
 

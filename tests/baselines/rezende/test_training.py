@@ -10,6 +10,7 @@ from baselines.rezende.network import METHOD, Card, Settings
 from baselines.rezende.reconstruct import errors, reconstruct, untrained
 from baselines.rezende.training import bound, near_vertices, pixel_errors, train_pictures, windows
 from baselines.training.checkpoint import new_state
+from baselines.training.machine import Machine
 
 TINY = Settings(size=16, code=4, iterations=80, batch=8, pairs=4, learning_rate=0.003)
 
@@ -20,7 +21,9 @@ def state_of(settings=TINY):
 
 def test_one_view_of_a_box_is_learned(one_box, tmp_path):
     misfits, state = [], state_of()
-    train_pictures(one_box, tmp_path, state, lambda *now: misfits.append(now[2]["misfit"]))
+    train_pictures(
+        one_box, tmp_path, state, Machine(), lambda *now: misfits.append(now[2]["misfit"])
+    )
     assert np.mean(misfits[-5:]) < 0.4 * np.mean(misfits[:5])
     before = errors(untrained(one_box), one_box)
     after = errors(reconstruct(state.network, one_box), one_box)

@@ -10,7 +10,8 @@ import torch
 from refusals import refused
 from torch.optim import Adam
 
-from baselines.training import checkpoint
+from baselines.training import checkpoint, machine
+from baselines.training import fit as module
 from baselines.training.checkpoint import (
     WEIGHTS,
     Method,
@@ -20,6 +21,7 @@ from baselines.training.checkpoint import (
     new_state,
 )
 from baselines.training.fit import Loss, TrainingError, falling_late, fit
+from baselines.training.machine import Machine
 from scenegen.common.random.seeding import Purpose, item_rng
 
 
@@ -28,6 +30,7 @@ class Settings:
     seed: int = 1
     iterations: int = 5
     learning_rate: float = 0.1
+    batch: int = 7
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ def run(folder: Path, state: Any, spoil: Spoil | None = None, **how: Any) -> lis
     folder.mkdir(exist_ok=True)
     told: list[Any] = []
     steps = Steps(state.network, *[spoil] * (spoil is not None))
-    how = {"every": 2, "progress": lambda *now: told.append(now), **how}
+    how = {"progress": lambda *now: told.append(now), "machine": Machine(every=2), **how}
     fit(folder, METHOD, state, steps, falling_late, **how)
     return told
 
@@ -93,8 +96,10 @@ def assert_same(one: dict[str, Any], other: dict[str, Any]) -> None:
 def test_each_step_sees_what_the_one_before_it_changed(tmp_path):
     state, told = begun(), []
     steps = Steps(state.network.eval())
-    how = {"every": 2, "progress": lambda *now: told.append(now)}
-    fit(tmp_path, METHOD, state, steps, falling_late, **how)
+    fit(
+        tmp_path, METHOD, state, steps, falling_late, Machine(every=2),
+        progress=lambda *now: told.append(now),
+    )  # fmt: skip
     assert [now[:2] for now in told] == [(done, 5) for done in range(1, 6)]
     assert all(losses.keys() == {"one", "two"} for *_, losses in told)
     assert steps.seen[1::2][:-1] == steps.seen[2::2], "the second step leaves the first number"
@@ -211,3 +216,61 @@ def test_slopes_are_clipped_to_a_norm(tmp_path):
         slopes.append(float(state.network.first.grad.abs()))
     assert slopes[0] > 0.01
     assert slopes[1] == pytest.approx(1e-3, rel=1e-3)
+
+
+@pytest.mark.parametrize("later", [1.0, 3.0])
+def test_a_limit_of_time_sets_the_schedule(later, tmp_path, monkeypatch):
+    """Also where iterations become slower on the way; the learning rate has fallen at the end."""
+    state, now, rates = begun(), [100.0], []
+    monkeypatch.setattr(machine.time, "monotonic", lambda: now[0])
+
+    def pass_time(done: int, *_: Any) -> None:
+        rates.append(state.optimisers["one"].param_groups[0]["lr"])
+        now[0] += 1.0 if done < 60 else later
+
+    limited = Machine(every=1000, minutes=2, started=100.0)
+    now[0] += 20  # for the reading of data
+    run(tmp_path / "run", state, machine=limited, progress=pass_time)
+    assert 120 <= now[0] - 100 <= 120 + later
+    done = 100 if later == 1 else 60 + 40 // 3
+    assert abs(state.card.iteration - done) <= 2
+    assert state.card.settings.iterations == state.card.iteration
+    assert rates[0] == 0.1
+    assert rates[-1] < 0.01
+    assert load_weights(tmp_path / "run" / WEIGHTS, METHOD)[1] == state.card
+
+
+def test_a_run_that_goes_on_gets_its_own_limit(tmp_path, monkeypatch):
+    state, now = begun(), [0.0]
+    monkeypatch.setattr(machine.time, "monotonic", lambda: now[0])
+    state.card = replace(state.card, iteration=30, settings=Settings(iterations=1000))
+
+    def pass_time(*_: Any) -> None:
+        now[0] += 1
+
+    run(tmp_path / "run", state, machine=Machine(minutes=1, started=0.0), progress=pass_time)
+    assert abs(state.card.iteration - 90) <= 1
+
+
+def test_losses_are_fetched_from_a_gpu_once_in_a_while(tmp_path, monkeypatch):
+    """Those that are not finite end the run then, and name their own iteration."""
+    expected = run(tmp_path / "cpu", begun())
+    monkeypatch.setattr(module, "fetch_interval", lambda device: 3)
+    found = run(tmp_path / "gpu", begun(), machine=Machine(every=5))
+    assert [losses for *_, losses in found[:2]] == [{}, {}]
+    assert [losses for *_, losses in found[2:]] == [expected[k][2] for k in (2, 2, 4)]
+
+    def spoil(number: int, weight: Any, loss: Any) -> Any:
+        return loss * torch.nan if number == 1 else loss
+
+    with refused(TrainingError, "iteration 1"):
+        run(tmp_path / "spoilt", begun(), spoil)
+    assert not list((tmp_path / "spoilt").iterdir())
+
+
+def test_a_gpu_without_memory_names_the_batch(tmp_path):
+    def spoil(number: int, weight: Any, loss: Any) -> Any:
+        raise torch.OutOfMemoryError
+
+    with refused(TrainingError, "training", "batch of 7"):
+        run(tmp_path / "run", begun(), spoil)

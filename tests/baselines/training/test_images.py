@@ -2,22 +2,20 @@
 
 import os
 import pickle
+import time
+from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 
 import numpy as np
 import pytest
+import torch
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 
-from baselines.training.images import (
-    Draws,
-    Opened,
-    channels_first,
-    check_reducible,
-    reduced,
-)
+from baselines.training.data import Opened
+from baselines.training.images import Draws, channels_first, check_reducible, read_ahead, reduced
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 
@@ -74,3 +72,40 @@ def test_processes_share_each_batch(world):
     for whole, *parts in islice(zip(Draws(11, 5, 3), *shares, strict=True), 9):
         assert sorted(row for part in parts for row in part) == sorted(whole)
         assert max(map(len, parts)) - min(map(len, parts)) <= 1
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    image: torch.Tensor
+
+
+@pytest.mark.parametrize(("device", "ahead"), [("cpu", 0), ("meta", 3)])
+def test_batches_for_a_gpu_are_read_ahead_in_their_order(device, ahead):
+    read: list[int] = []
+
+    def batches():
+        for number in range(6):
+            read.append(number)
+            yield Batch(torch.zeros(number))
+
+    found = read_ahead(batches(), torch.device(device))
+    assert (len(next(found).image), read[:1]) == (0, [0])
+    for _ in range(100):
+        if len(read) == 1 + ahead:
+            break
+        time.sleep(0.01)
+    assert read == list(range(1 + ahead))
+    rest = list(found)
+    assert [len(batch.image) for batch in rest] == [1, 2, 3, 4, 5]
+    assert {batch.image.device.type for batch in rest} == {device}
+
+
+def test_what_goes_wrong_while_reading_ahead_is_raised():
+    def batches():
+        yield Batch(torch.zeros(1))
+        raise FileFormatError("rooms.h5", "damage", "none")
+
+    found = read_ahead(batches(), torch.device("meta"))
+    next(found)
+    with pytest.raises(FileFormatError):
+        next(found)

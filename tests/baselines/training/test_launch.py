@@ -15,14 +15,15 @@ from pix2shape_models import tiny
 
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, moments_of, new_state
-from baselines.training.launch import started_elsewhere
+from baselines.training.launch import torchrun_counts
 from scenegen.common.errors import SpecError
 
-# Seed 2 pairs no image with itself: `consistency` would then be 0, and its slope but rounding.
-ALL = {"seed": 2, "critic_steps": 2, "questions": 0.01, "contrast": 1.0, "question_batch": 8}
+ALL = {
+    "seed": 2, "critic_steps": 2, "questions": 0.01, "contrast": 1.0, "question_batch": 8,
+    "labelled_batch": 2,
+}  # fmt: skip
 MORE = {
-    "labelled_batch": 2, "turned": True, "hard_negatives": 0.5, "swap": 1.0,
-    "compared_information": True, "encoder": "polar", "spherical": True, "camera": False,
+    "turned": True, "hard_negatives": 0.5, "encoder": "polar", "spherical": True, "camera": False,
     "adversarial": 0.0, "code_reconstruction": 0.0,
 }  # fmt: skip
 VIEWS = {
@@ -31,16 +32,16 @@ VIEWS = {
     "mutual_information": 0.0, "questions": 0.0, "contrast": 1.0, "labelled_batch": 2,
 }  # fmt: skip
 CONFIGS = {
-    "rooms": tiny(**ALL, consistency=1.0, depth=1.0),
+    "rooms": tiny(**ALL, depth=1.0),
     "questions": tiny(**ALL, batch=8),
     "compared": tiny(**ALL, **MORE, batch=8),
     "images unused": tiny(**VIEWS, batch=4),  # one question, which two cannot share
 }
 PAPERS = {"distance", "penalty", "adversarial", "reconstruction", "code_reconstruction"}
 LOSSES = {
-    "rooms": PAPERS | {"consistency", "depth"},
+    "rooms": PAPERS | {"depth"},
     "questions": PAPERS | {"mutual_information", "questions", "contrast"},
-    "compared": {"reconstruction", "mutual_information", "questions", "contrast", "swap"},
+    "compared": {"reconstruction", "mutual_information", "questions", "contrast"},
     "images unused": {"contrast"},
 }
 Folder = Callable[[str, str], Path]
@@ -65,7 +66,7 @@ def folder(
             "folder": str(to),
             "data": str(rooms_path if kind == "rooms" else train_questions),
             "config": None if resumed else CONFIGS[kind].to_json(),
-            "labels": int(kind != "rooms" and not resumed),  # of 8 places, in one process
+            "labels": int(kind != "rooms" and not resumed),  # in one of 2 places
             "processes": int(name[-1]),
         }
         if name[-1] == "1":
@@ -85,7 +86,7 @@ def test_an_environment_that_torchrun_does_not_make_is_refused(here, world, monk
     monkeypatch.setenv("LOCAL_WORLD_SIZE", here)
     monkeypatch.setenv("WORLD_SIZE", world)
     with pytest.raises(SpecError) as error:
-        started_elsewhere()
+        torchrun_counts()
     assert error.value.where in ("LOCAL_WORLD_SIZE", "WORLD_SIZE")
 
 

@@ -9,6 +9,7 @@ import torch
 from pix2shape_models import released
 from refusals import refused
 
+from baselines.training.data import TrainingFiles
 from baselines.training.questions import (
     LABELED,
     UNLABELED,
@@ -17,7 +18,6 @@ from baselines.training.questions import (
     each_question,
     is_question_file,
     open_test,
-    open_training,
     training_answers,
 )
 from iqtt import SplitSpec, make_split, open_questions
@@ -38,10 +38,11 @@ def test_rooms_are_told_from_questions(rooms_path, truths, train_questions, tmp_
 
 def test_training_questions_are_told_from_those_to_answer(truths, train_questions):
     for part in (LABELED, UNLABELED):
-        with open_training(train_questions, part) as questions:
+        with TrainingFiles(train_questions) as files:
+            (questions,) = files.questions(part)
             assert (questions.part, len(questions)) == (part, 3)
-        with refused(SpecError, "iqtt-test.h5", "no training questions"):
-            open_training(truths.iqtt, part)
+        with TrainingFiles(truths.iqtt) as files, refused(SpecError, "iqtt-test.h5", "no training"):
+            files.questions(part)
     with open_test(truths.iqtt, 16) as questions:
         assert len(questions) == 6
     with refused(SpecError, "iqtt-train.h5", "training questions"):
@@ -51,7 +52,7 @@ def test_training_questions_are_told_from_those_to_answer(truths, train_question
 
 
 def test_labels_and_truth_that_are_not_there_are_refused(train_questions, truths, tmp_path):
-    with open_training(train_questions, LABELED) as questions:
+    with open_questions(train_questions, LABELED) as questions:
         check_truth(questions)
         for labels in (0, 3):
             check_labels(questions, labels)
@@ -62,13 +63,13 @@ def test_labels_and_truth_that_are_not_there_are_refused(train_questions, truths
             training_answers(questions, 2).tolist()
             == questions.read("answers", slice(0, 2)).tolist()
         )
-    with open_training(train_questions, UNLABELED) as questions, refused(SpecError, "labels"):
+    with open_questions(train_questions, UNLABELED) as questions, refused(SpecError, "labels"):
         check_labels(questions, 1)
     with open_questions(truths.iqtt) as questions, refused(SpecError, "iqtt-test.h5", "without"):
         check_truth(questions)
     size = {"height": 32, "width": 32, "min_cube_pixels": 0}
     make_split(tmp_path / "split", SplitSpec(train=1, labeled=0, val=0, test=0, **size))
-    with open_training(tmp_path / "split" / "iqtt-train.h5", LABELED) as questions:
+    with open_questions(tmp_path / "split" / "iqtt-train.h5", LABELED) as questions:
         with refused(SpecError, "labels", "0", "1 to 0", "--labeled"):
             check_labels(questions, 0, 1)
         with refused(SpecError, "iqtt-train.h5", "0 questions"):

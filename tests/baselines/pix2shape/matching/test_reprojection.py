@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.pix2shape.matching.reprojection import reprojected
+from baselines.pix2shape.matching.search import reprojected
 from baselines.pix2shape.network.empty_rooms import Cameras
 from scenegen.camera import Camera, pixel_directions
 

@@ -9,7 +9,7 @@ import pytest
 import torch
 from pix2shape_models import in_memory
 
-from baselines.pix2shape.matching.labels import matched_relief, pairs_of
+from baselines.pix2shape.matching.relief import pairs_of, relief_of_row
 from baselines.pix2shape.matching.search import (
     LARGE,
     SMALL,
@@ -44,7 +44,7 @@ def test_objects_are_found_without_depth(bits, many_near_path):
     pairs = pairs_of(rooms)
     rows = [row for row, (one, other) in enumerate(pairs) if one or other]
     assert rows == [row for row in range(48) if row % 4 < 3]
-    found = torch.stack([matched_relief(rooms, row, pairs[row]) for row in rows])
+    found = torch.stack([relief_of_row(rooms, row, pairs[row]) for row in rows])
     wrong, within = (found - true[rows]).abs(), objects[rows]
     assert wrong[within].median() < STEP
     assert (wrong[within] < 2 * STEP).float().mean() > 0.6

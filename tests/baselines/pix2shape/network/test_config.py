@@ -10,12 +10,12 @@ from baselines.pix2shape.network.model import Pix2Shape
 from scenegen.common.errors import SpecError
 
 
-def test_the_paper_and_compact() -> None:
+def test_the_paper_and_rays() -> None:
     paper = model_config("paper")
     assert (paper.iterations, paper.batch, paper.critic_steps) == (60_000, 6, 5)
     assert paper.networks == NetworkSpec()
-    compact = model_config("compact", seed=3)
-    assert (compact.networks.size, compact.networks.width, compact.seed) == (64, 0.125, 3)
+    rays = model_config("rays", seed=3)
+    assert (rays.networks.size, rays.networks.width, rays.seed) == (64, 0.125, 3)
     with pytest.raises(SpecError, match="config"):
         model_config("huge")
 
@@ -63,7 +63,7 @@ def test_depth_stays_within_its_reach_whatever_the_code() -> None:
     [
         ("paper", {"networks.size": 64, "networks.width": 0.125}, "pix2shape"),
         ("paper", {"mutual_information": 0.0, "questions": 0.0}, "pix2shape"),  # as rooms have it
-        ("compact", {}, "pix2shape-compact"),
+        ("paper", {"contrast": 1.0}, "pix2shape-compact"),
         ("paper", {"code_reconstruction": 0.0}, "pix2shape-compact"),
         ("paper", {"adversarial": 0.0}, "pix2shape-compact"),
         ("paper", {"absolute_differences": True}, "pix2shape-compact"),

@@ -10,15 +10,16 @@ import torch
 from pix2shape_models import question_source, room_source, state_of, suited, tiny
 from refusals import refused
 
+from baselines.pix2shape.batch import turned
 from baselines.pix2shape.network.architecture import NetworkSpec
 from baselines.pix2shape.training import iterations
 from baselines.pix2shape.training.batches import Sources
 from baselines.pix2shape.training.iterations import Iterations, check_request
 from baselines.pix2shape.training.run import learning_rate
-from baselines.pix2shape.training.turning import turned
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, moments_of
 from baselines.training.fit import fit
+from baselines.training.machine import Machine
 from scenegen.common.errors import SpecError
 
 TINY = tiny(mutual_information=0.0, questions=0.0)
@@ -62,7 +63,9 @@ def run(
             raise Stop
 
     try:
-        fit(folder, METHOD, state, losses, learning_rate, every=every, progress=progress)
+        fit(
+            folder, METHOD, state, losses, learning_rate, Machine(every=every), progress=progress
+        )  # fmt: skip
     except Stop:
         assert len(reported) == steps
     return reported
@@ -75,10 +78,10 @@ def test_a_stop_in_the_middle_changes_nothing(case, rooms_path, train_questions,
     config = replace(TINY, decay=True)
     workers = 2 if case == "workers" else 0
     if case == "critic steps":
-        config = replace(config, critic_steps=2, consistency=0.1)
+        config = replace(config, critic_steps=2)
     if case == "questions":
-        more = {"questions": 0.1, "contrast": 1.0, "mutual_information": 0.1, "consistency": 1.0}
-        config = suited(replace(config, **more, batch=12, question_batch=8), train_questions)
+        more = {"questions": 0.1, "contrast": 1.0, "mutual_information": 0.1, "labelled_batch": 2}
+        config = suited(replace(config, **more, batch=12, question_batch=6), train_questions)
         parts = (question_source(train_questions, p, config) for p in ("unlabeled", "labeled"))
         sources = Sources(*parts, 2)
     else:
@@ -110,7 +113,7 @@ def test_every_step_has_noise_of_its_own(rooms_path, tmp_path, monkeypatch):
 
 
 def test_some_of_the_contrasted_questions_are_labelled(train_questions, tmp_path, monkeypatch):
-    plain = replace(TINY, questions=1.0, contrast=1.0, batch=8, question_batch=8)
+    plain = replace(TINY, questions=1.0, contrast=1.0, batch=8, question_batch=7, labelled_batch=1)
     config = suited(plain, train_questions)
     source = question_source(train_questions, "unlabeled", config)
     labelled = question_source(train_questions, "labeled", config)
@@ -128,9 +131,9 @@ def test_some_of_the_contrasted_questions_are_labelled(train_questions, tmp_path
         losses = run(state_of(config), Sources(source, labelled, labels), tmp_path, 2)
         assert all(("questions" in one) == (labels > 0) and "contrast" in one for one in losses)
         for images, answers in asked:
-            assert images.image.shape == (32, 3, 32, 32)
-            assert (answers >= 0).tolist() == [True] * known + [False] * (8 - known)
-            rows = images.image.view(8, -1)[:known].numpy()
+            assert images.image.shape == (4 * (known + 7), 3, 32, 32)
+            assert (answers >= 0).tolist() == [True] * known + [False] * 7
+            rows = images.image.view(known + 7, -1)[:known].numpy()
             assert [told[row.tobytes()] for row in rows] == answers[:known].tolist()
         assert len({images.image.numpy().tobytes() for images, _ in asked}) == len(asked)
     losses = run(state_of(config), labelled, tmp_path, 2)  # a file with answers, but no labels
@@ -139,55 +142,43 @@ def test_some_of_the_contrasted_questions_are_labelled(train_questions, tmp_path
     assert asked[-1] is None, "nothing is compared without a label"
 
 
-@pytest.mark.parametrize(
-    ("labels", "expected"), [(0, 0), (1, 1), (100, 1), (101, 2), (200, 2), (1000, 8), (9000, 8)]
-)
-def test_one_place_for_every_hundred_labels_up_to_a_quarter(labels, expected, train_questions):
-    config = replace(TINY, questions=1.0, contrast=1.0, question_batch=32)
+def test_labelled_questions_are_a_batch_of_their_own_where_others_are_compared(train_questions):
+    config = replace(TINY, questions=1.0, contrast=1.0, question_batch=32, labelled_batch=5)
     config = suited(config, train_questions)
     source = question_source(train_questions, "labeled", config)
-    sources = Sources(source, source, labels)
-    assert sources.question_sizes(config) == (expected, 32 - expected)
+    for labels, expected in ((0, 0), (3, 5)):
+        assert Sources(source, source, labels).question_sizes(config) == (expected, 32)
     plain = replace(config, contrast=0.0)
-    assert sources.question_sizes(plain) == (32 if labels else 0, 0)
-    several = replace(config, labelled_batch=5)
-    assert sources.question_sizes(several) == (5 if labels else 0, 32)
-    assert sources.question_sizes(replace(several, contrast=0.0)) == (5 if labels else 0, 0)
+    for labels, expected in ((0, 0), (3, 32)):
+        assert Sources(source, source, labels).question_sizes(plain) == (expected, 0)
 
 
 def test_compared_questions_are_turned_and_may_be_all_that_is_learned_from(
     train_questions, tmp_path, monkeypatch
 ):
-    """The critic sees the same pictures; the encoder sees no others."""
     zero = dict.fromkeys(("adversarial", "reconstruction", "code_reconstruction"), 0.0)
-    on = dict.fromkeys(("contrast", "questions", "mutual_information"), 1.0)
-    own = {**zero, **on, "question_batch": 8, "labelled_batch": 2, "compared_information": True}
+    on = dict.fromkeys(("contrast", "questions"), 1.0)
+    own = {**zero, **on, "question_batch": 8, "labelled_batch": 2}
     config = suited(replace(TINY, **own), train_questions)
     source = question_source(train_questions, "unlabeled", config)
     labelled = question_source(train_questions, "labeled", config)
     seen: list[Any] = []
-    step, critic = iterations.generator_step, iterations.critic_step
+    step = iterations.generator_step
 
-    def spy(name: str, function: Any) -> Any:
-        def spied(model: Any, batch: Any, noise: Any, questions: Any) -> Any:
-            seen.append((name, questions, noise))
-            return function(model, batch, noise, questions)
+    def spy(model: Any, batch: Any, noise: Any, questions: Any) -> Any:
+        seen.append((questions, noise))
+        return step(model, batch, noise, questions)
 
-        return spied
-
-    monkeypatch.setattr(iterations, "generator_step", spy("generator", step))
-    monkeypatch.setattr(iterations, "critic_step", spy("critic", critic))
+    monkeypatch.setattr(iterations, "generator_step", spy)
     pictures = []
     for turn in (False, True):
         seen.clear()
         state = state_of(replace(config, turned=turn))
         losses = run(state, Sources(source, labelled, 3), tmp_path, 2)
-        assert set(losses[0]) == {"mutual_information", "questions", "contrast"}
-        assert [name for name, _, _ in seen] == ["critic", "generator"] * 2
-        assert seen[0][1] is seen[1][1]
-        assert (seen[0][1][1] >= 0).tolist() == [True] * 2 + [False] * 8
+        assert set(losses[0]) == {"questions", "contrast"}
+        assert (seen[0][0][1] >= 0).tolist() == [True] * 2 + [False] * 8
         pictures.append(seen[0])
-    (_, (plain, _), _), (_, (found, _), noise) = pictures
+    ((plain, _), _), ((found, _), noise) = pictures
     expected = turned(plain, noise.turn, noise.mirror)
     assert torch.equal(found.image, expected.image)
     assert not torch.equal(found.image, plain.image)
@@ -196,9 +187,8 @@ def test_compared_questions_are_turned_and_may_be_all_that_is_learned_from(
 @pytest.mark.parametrize(
     ("data", "change", "where"),
     [
-        ("questions", {"consistency": 1.0}, "consistency"),
-        ("rooms", {"material": True, "reconstruction": 0.0, "consistency": 1.0}, "material"),
-        ("rooms", {"lights": 3, "reconstruction": 0.0, "consistency": 1.0}, "lights"),
+        ("rooms", {"material": True, "reconstruction": 0.0, "depth": 1.0}, "material"),
+        ("rooms", {"lights": 3, "reconstruction": 0.0, "depth": 1.0}, "lights"),
         ("rooms", {"reconstruction": 0.0}, "losses"),
         ("rooms", {"batch": 5}, "devices"),
     ],

@@ -2,10 +2,8 @@
 
 import math
 
-import numpy as np
 import pytest
 import torch
-from scipy.spatial.transform import Rotation
 
 from baselines.pix2shape.network.architecture import NetworkSpec, Statistics
 from baselines.pix2shape.training import losses
@@ -94,71 +92,6 @@ def test_absolute_differences_are_as_large_as_the_norm_where_all_are_equal() -> 
     again[:, 0] = 1.0
     found = float(losses.absolute_loss(values, again))
     assert found == pytest.approx((2 * 0.5 + 1) / 3 * math.sqrt(48))
-
-
-FOV = 60.0
-
-
-def ahead(z: float, x: float = 0.0) -> torch.Tensor:
-    """Return other_from_camera of a camera moved by z along -z and by x along x, not turned."""
-    other_from_camera = torch.eye(4)[None].clone()
-    other_from_camera[0, :3, 3] = torch.tensor([-x, 0.0, z])
-    return other_from_camera
-
-
-def test_disagreement_is_the_distance_in_front_and_just_behind() -> None:
-    own = torch.full((1, 16, 16), 3.0, requires_grad=True)
-    for other in (2.5, 2.95, 3.05, 4.0):
-        seen = torch.full((1, 16, 16), other, requires_grad=True)
-        found = losses.disagreement(own, seen, torch.eye(4)[None], FOV)
-        expected = abs(3 - other) if other > 2.9 else 0.0  # hidden from the other camera
-        assert float(found.detach()) == pytest.approx(expected, abs=1e-6)
-        slopes = torch.autograd.grad(found, [own, seen], allow_unused=True)
-        for slope, sign in zip(slopes, (1, -1), strict=True):
-            assert slope is not None
-            side = 0 if other < 2.9 else math.copysign(1, 3 - other)
-            assert float(slope.sum()) == pytest.approx(sign * side, abs=1e-5)
-
-
-def test_disagreement_takes_each_image_with_its_own_camera() -> None:
-    own, other = (
-        torch.tensor(depths).view(2, 1, 1).expand(2, 16, 16) for depths in ((3.0, 4.0), (2.0, 3.5))
-    )
-    poses = torch.cat([ahead(1.0), ahead(0.5)])
-    assert float(losses.disagreement(own, other, poses, FOV)) < 1e-6
-    assert float(losses.disagreement(own, other, poses.flip(0), FOV)) > 0.2
-
-
-def plane_depth(normal: np.ndarray, constant: float, pose: np.ndarray) -> torch.Tensor:
-    """Return the depth (1, 32, 32) of the plane normal . P = constant, seen from a camera."""
-    edge = math.tan(math.radians(FOV) / 2)
-    middle = (np.arange(32) + 0.5 - 16) / 16 * edge
-    rays = np.stack(np.broadcast_arrays(middle, -middle[:, None], -1.0), axis=-1)
-    return torch.tensor((constant - normal @ pose[:3, 3]) / (rays @ pose[:3, :3].T @ normal))[None]
-
-
-def test_any_plane_agrees_with_itself_under_any_two_cameras() -> None:
-    rng = np.random.default_rng(0)
-    for _ in range(5):
-        poses = np.tile(np.eye(4), (2, 1, 1))
-        poses[:, :3, :3] = Rotation.from_rotvec(rng.normal(0, 0.15, (2, 3))).as_matrix()
-        poses[:, :3, 3] = rng.normal(0, 0.3, (2, 3))
-        normal = np.array([*rng.normal(0, 0.3, 2), 1.0])
-        own, other = (plane_depth(normal, -3.0, pose) for pose in poses)
-        other_from_own = torch.tensor(np.linalg.inv(poses[1]) @ poses[0])[None]
-        own.requires_grad_()
-        found = losses.disagreement(own, other, other_from_own, FOV)
-        assert float(found.detach()) < 1e-12
-        assert float(losses.disagreement(own.detach(), 1.02 * other, other_from_own, FOV)) > 0.02
-        assert torch.isfinite(torch.autograd.grad(found, own)[0]).all()
-        wrong = losses.disagreement(own.detach(), other, torch.linalg.inv(other_from_own), FOV)
-        assert float(wrong) > 1e-2
-
-
-def test_disagreement_is_as_exact_where_networks_are_less() -> None:
-    own, other = (plane_depth(np.array([0.5, 0.0, 1.0]), c, np.eye(4)).float() for c in (-3, -2))
-    with torch.autocast("cpu", dtype=torch.bfloat16):
-        assert float(losses.disagreement(own, other, ahead(1.0), FOV)) < 1e-6
 
 
 def test_contrast_of_one_answer_against_the_others() -> None:

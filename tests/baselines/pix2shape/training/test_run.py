@@ -21,10 +21,10 @@ from torch.utils.data import default_collate
 from baselines.pix2shape.network.config import LOSSES
 from baselines.pix2shape.network.model import Prior
 from baselines.pix2shape.training import run as module
-from baselines.pix2shape.training.run import train_run
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, load_weights
-from baselines.training.launch import Machine
+from baselines.training.data import TrainingFiles
+from baselines.training.machine import Machine
 from baselines.training.processes import LostProcessError
 from scenegen.common.errors import SceneGenError, SpecError
 
@@ -45,6 +45,11 @@ def unbroken(rooms_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     folder = tmp_path_factory.mktemp("runs") / "run"
     assert train_run(folder, rooms_path, CONFIG, HERE) == folder / "weights.safetensors"
     return folder
+
+
+def train_run(folder: Path, path: Path, *given: Any, **how: Any) -> Any:
+    with TrainingFiles(path) as data:
+        return module.train_run(folder, data, *given, **how)
 
 
 def names(folder: Path) -> set[str]:

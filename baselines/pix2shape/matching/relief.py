@@ -55,7 +55,7 @@ def pairs_of(rooms: Rooms) -> list[tuple[list[int], list[int]]]:
 
 
 @torch.inference_mode()
-def matched_relief(rooms: Rooms, row: int, sides: tuple[list[int], list[int]]) -> Tensor:
+def relief_of_row(rooms: Rooms, row: int, sides: tuple[list[int], list[int]]) -> Tensor:
     """Return the relief of one row by matching, (S, S), scene units, at most 32 steps of 0.02.
 
     Costs are averaged over the images of one side; the better side counts.
@@ -86,7 +86,7 @@ def _with_partner(pairs: list[tuple[list[int], list[int]]]) -> Tensor:
     return matched
 
 
-def labels(
+def relief_of_rows(
     rooms: Rooms, run_folder: str | Path, progress: Progress = lambda done, total: None
 ) -> Tensor:
     """Return the relief of all rows, (N, S, S) float16; 0 for those that have no partner.
@@ -109,7 +109,7 @@ def labels(
         if path.exists():
             relief[rows] = _read(path, relief[rows], rooms.fingerprint)
         else:
-            maps = [matched_relief(rooms, row, pairs[row]) for row in rows.tolist()]
+            maps = [relief_of_row(rooms, row, pairs[row]) for row in rows.tolist()]
             relief[rows] = torch.stack(maps).half()
             save_tensors(path, {"relief": relief[rows]}, {"fingerprint": rooms.fingerprint})
         done += len(rows)

@@ -8,8 +8,8 @@ import pytest
 import torch
 from pix2shape_models import in_memory
 
-from baselines.pix2shape.matching import labels as module
-from baselines.pix2shape.matching.labels import FOLDER, labels, matched_rows, pairs_of
+from baselines.pix2shape.matching import relief as module
+from baselines.pix2shape.matching.relief import FOLDER, matched_rows, pairs_of, relief_of_rows
 from baselines.training.checkpoint import save_tensors
 from scenegen.common.errors import FileFormatError, SpecError
 
@@ -39,19 +39,19 @@ def quick(monkeypatch: pytest.MonkeyPatch) -> list[int]:
         asked.append(row)
         return torch.full((64, 64), row / 16)
 
-    monkeypatch.setattr(module, "matched_relief", relief)
+    monkeypatch.setattr(module, "relief_of_row", relief)
     monkeypatch.setattr(module, "BLOCK", 1)
     return asked
 
 
 def test_labels_are_found_once(quick, rooms, tmp_path):
     done: list[tuple[int, int]] = []
-    relief = labels(rooms, tmp_path, lambda *now: done.append(now))
+    relief = relief_of_rows(rooms, tmp_path, lambda *now: done.append(now))
     assert matched_rows(rooms).tolist() == quick == [0, 1, 2, 4, 5, 6]
     assert done == [(3, 6), (6, 6)]
     assert relief[:, 0, 0].tolist() == [0, 1 / 16, 2 / 16, 0, 4 / 16, 5 / 16, 6 / 16, 0]
     (tmp_path / FOLDER / "00001.safetensors").unlink()
-    again = labels(rooms, tmp_path)
+    again = relief_of_rows(rooms, tmp_path)
     assert quick == [0, 1, 2, 4, 5, 6, 4, 5, 6], "of the other scene they are read"
     assert torch.equal(again, relief)
 
@@ -68,16 +68,16 @@ def test_labels_are_found_once(quick, rooms, tmp_path):
     ids=["other rooms", "too few", "NaN", "too far", "another tensor"],
 )
 def test_labels_of_something_else_are_refused(tensors, notes, quick, rooms, tmp_path):
-    labels(rooms, tmp_path)
+    relief_of_rows(rooms, tmp_path)
     path = tmp_path / FOLDER / "00000.safetensors"
     save_tensors(path, tensors, {"fingerprint": rooms.fingerprint, **notes})
     with pytest.raises(FileFormatError) as error:
-        labels(rooms, tmp_path)
+        relief_of_rows(rooms, tmp_path)
     assert str(path) in error.value.where
 
 
 @pytest.mark.parametrize("factor", [4, torch.nan])
 def test_rooms_without_neighbouring_views_are_refused(factor, rooms, tmp_path):
     with pytest.raises(SpecError):
-        labels(replace(rooms, angle=factor * rooms.angle), tmp_path)
+        relief_of_rows(replace(rooms, angle=factor * rooms.angle), tmp_path)
     assert not list(tmp_path.iterdir())

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.depth_match.answers import FILES
-from baselines.depth_match.matching import denials, least_denials, surface_points
+from baselines.depth_match.answers import FILES, denials, least_denials, surface_points
 from baselines.depth_match.network import METHOD, seen_depth, symmetric
 from baselines.depth_match.training import read_pictures
 from baselines.training.checkpoint import load_weights
@@ -33,7 +32,7 @@ def questions(request, tmp_path_factory) -> Iterator[QuestionsFile]:
 
 def true_depth(questions: QuestionsFile) -> torch.Tensor:
     """Return the depth of all pictures in camera distances, (Q, 1 + K, S, S)."""
-    height = read_pictures(questions, SIZE).height.float()
+    height = read_pictures([questions], SIZE).height.float()
     depth = torch.where(height.isfinite(), 1 - height, torch.inf)
     return depth.view(len(questions), -1, SIZE, SIZE)
 

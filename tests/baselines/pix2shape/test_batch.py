@@ -6,10 +6,9 @@ from dataclasses import replace
 import pytest
 import torch
 
-from baselines.pix2shape.batch import Batch
+from baselines.pix2shape.batch import Batch, turned
 from baselines.pix2shape.network.model import Surfels, Views, shaded
 from baselines.pix2shape.network.surfels import Scene
-from baselines.pix2shape.training.turning import turned
 
 
 def surface():

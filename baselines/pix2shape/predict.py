@@ -1,4 +1,7 @@
-"""Submissions of a trained model. Of the truth only the cameras of rooms are read."""
+"""Submissions of a trained model: depth and normals of rooms, or answers to questions.
+
+Of the truth only the cameras of rooms are read.
+"""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -13,13 +16,14 @@ from baselines.pix2shape.network.config import TAUGHT_DEPTH
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.surfels import extrapolated, normals_from_depth
-from baselines.pix2shape.use.answers import answer_file
+from baselines.pix2shape.questions import check_background
+from baselines.pix2shape.training.losses import squared_distances
 from baselines.pix2shape.weights import open_weights
 from baselines.training.images import Array, check_reducible, row_batches
-from baselines.training.launch import chosen_device
-from baselines.training.questions import is_question_file
+from baselines.training.machine import chosen_device
+from baselines.training.questions import each_question, is_question_file, open_test
 from baselines.training.rooms import camera_poses, input_views, room_images
-from metrics.prediction_writer import RoomPredictionWriter
+from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
 from scenegen.files.new_file import check_writable
@@ -28,6 +32,7 @@ from scenegen.rooms.reader import RoomsFile
 BATCH = 64  # images at a time
 TOLD = "told: one image of each scene, the cameras, and where the empty room's floor and walls are"
 DEPTH = "told: in training, true depth maps"
+TAUGHT = "told: in training, the lights of its images and the answers of {} questions"
 Progress = Callable[[int, int], Any]  # rows done, rows in all
 
 
@@ -114,6 +119,43 @@ def predict_rooms(
 
         how: dict[str, Any] = {"method": method, "notes": notes, "run": run, "shown": "first_view"}
         write_depths(rooms, out, data, depth, progress, overwrite=overwrite, **how)
+
+
+def answer_file(
+    model: Pix2Shape,
+    data: str | Path,
+    out: str | Path,
+    *,
+    labels: int = 0,
+    run: str = "",
+    overwrite: bool = False,
+    progress: Progress = lambda done, total: None,
+) -> None:
+    """Write answers to the questions of a file, from images alone.
+
+    An answer's score is minus the distance of its z_scene from the reference's, as in the paper.
+
+    Args:
+        labels: answers that training was given; the submission's notes tell this.
+
+    Raises SpecError where the model does not suit questions; else as `iqtt.QuestionsFile`.
+    """
+    spec, device = model.config.networks, next(model.parameters()).device
+    if spec.condition:
+        raise SpecError("weights", "a model that is told the camera", "one for questions")
+
+    def scores(images: Tensor) -> Tensor:
+        flat = images.flatten(0, 1).to(device)
+        codes = model.codes(flat, flat.new_empty(len(flat), 0))[:, : spec.z_scene]
+        return -squared_distances(codes.view(*images.shape[:2], -1)).sqrt()
+
+    with open_test(data, spec.size) as questions:
+        check_background(questions, model.config)
+        batch = BATCH // (1 + questions.answers)
+        values = each_question(questions, spec.size, scores, batch, progress=progress)
+    how: dict[str, Any] = {"method": model.config.method, "run": run, "overwrite": overwrite}
+    notes = TAUGHT.format(labels)
+    write_answers(out, data, scores=values.double().numpy(), notes=notes, **how)
 
 
 def write_depths(

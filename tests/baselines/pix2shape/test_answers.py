@@ -9,8 +9,8 @@ import pytest
 import torch
 from pix2shape_models import made, of_questions, released
 
-from baselines.pix2shape.use import answers as module
-from baselines.pix2shape.use.answers import answer_file
+from baselines.pix2shape import predict as module
+from baselines.pix2shape.predict import answer_file
 from baselines.training.images import channels_first
 from iqtt.files.reader import open_questions
 from metrics.scoring.evaluate import score

@@ -11,10 +11,16 @@ import torch
 from pix2shape_models import card_of, made, room_source, tiny
 from torch.utils.data import default_collate
 
+from baselines.pix2shape import pictures as explore
 from baselines.pix2shape.network.surfels import render
-from baselines.pix2shape.pictures import drawn, image_tiles, sheet
-from baselines.pix2shape.use import explore
-from baselines.pix2shape.use.explore import rotation_frames, sample_sheet, turned
+from baselines.pix2shape.pictures import (
+    drawn,
+    image_tiles,
+    rotation_frames,
+    sample_sheet,
+    sheet,
+    turned_camera,
+)
 from scenegen.camera import look_at
 from scenegen.description.presets import PAPER_VIEWS
 from scenegen.description.specs import DatasetSpec
@@ -54,7 +60,7 @@ def test_turned_by_the_files_angles_is_the_files_views():
     for places in sample_cameras(spec, np.arange(30)):
         poses = look_at(places, np.array(spec.camera_target))
         for pose, degrees in zip(poses, PAPER_VIEWS, strict=True):
-            found = turned(poses[0], spec, degrees)
+            found = turned_camera(poses[0], spec, degrees)
             np.testing.assert_allclose(found.world_from_camera, pose, atol=1e-9)
         sides.append(places[0, 0] > places[0, 2])
     assert 5 < sum(sides) < 25

@@ -10,9 +10,9 @@ import torch
 from pix2shape_models import made, room_source, tiny, written
 from torch.utils.data import default_collate
 
+from baselines.pix2shape import predict
 from baselines.pix2shape.network.empty_rooms import empty_rooms
-from baselines.pix2shape.use import predict
-from baselines.pix2shape.use.predict import enlarged, predict_file, predict_rooms
+from baselines.pix2shape.predict import enlarged, predict_file, predict_rooms
 from metrics.submissions.reader import open_predictions
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import SpecError
