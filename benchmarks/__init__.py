@@ -11,8 +11,8 @@
     gpu         whether a GPU draws what the CPU draws, and how fast
     cluster     images a second of worker processes and of a Dask cluster
     torture     runs that are killed or meet trouble, and then go on
-    results     the tables of docs/results.md, from score files
-    experiments what trained models know: materials, angles between views, kinds of shapes
+    results     the commands behind the tables of docs/results.md and docs/results-rooms.md
+    experiments questions of public generators, and answers to disturbed pictures
     digests     what two checkouts of the code write, compared part by part
 
 `timing` runs functions in processes of their own and prints their table.

@@ -42,7 +42,10 @@ def test_an_example_writes_what_can_be_scored(name, run, truths, tmp_path):
     assert score([tmp_path / "out.h5"], truth).comparable
 
 
-@pytest.mark.parametrize(("name", "kind"), [("numpy", "disparity"), ("torch", "points")])
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("numpy", "disparity"), pytest.param("torch", "points", marks=pytest.mark.slow)],
+)
 def test_a_model_runs_and_can_be_scored(name, kind, truths, tmp_path):
     options = {"batch": 3} if name == "torch" else {}
     with opened_model(EXAMPLES / f"run_{name}.py", options) as model:

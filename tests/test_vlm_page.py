@@ -1,8 +1,10 @@
 """The page on vision-language models, run in an empty folder as a reader runs it."""
 
+import pytest
 from page_blocks import blocks, run_block
 
 
+@pytest.mark.slow
 def test_the_page_runs(tmp_path):
     def smaller(code):
         return code.replace("--size 256", "--size 64").replace("--train 10", "--train 10 --size 64")

@@ -28,12 +28,11 @@ QUESTIONS = (
     "pix2shape", "cnn", "siamese", "depth-match", "ptn", "rezende, 0 labels", "rezende, 5 labels"
 )  # fmt: skip
 of_rooms = pytest.mark.parametrize("name", ROOMS)
-of_questions = pytest.mark.parametrize("name", QUESTIONS)
-VARIANTS = ("pix2shape-rays", "depth-completed", "siamese", "rezende, 5 labels")
+VARIANTS = ("pix2shape-rays", "depth-completed", "siamese", "rezende, 5 labels", "depth-match")
 
 
 def but_variants(names: tuple[str, ...]) -> Any:
-    """Leave methods that read files as another one does to the slow tests."""
+    """Leave to the slow tests what reads files as another method does, or takes seconds."""
     marked = [pytest.param(n, marks=[pytest.mark.slow] * (n in VARIANTS)) for n in names]
     return pytest.mark.parametrize("name", marked)
 
@@ -148,7 +147,7 @@ def test_rooms_that_cannot_be_predicted_leave_what_was_there(
         writers[0][name](turned_path, out)
 
 
-@of_questions
+@but_variants(QUESTIONS)
 def test_answers_are_valid_and_read_no_answers_lights_or_shapes(name, writers, truths, tmp_path):
     write, done = writers[1][name], []
     write(truths.iqtt, tmp_path / "a.h5", progress=lambda *now: done.append(now))
@@ -174,7 +173,7 @@ def test_weights_for_rooms_answer_no_questions(name, writers, truths, tmp_path):
     assert not (tmp_path / "a.h5").exists()
 
 
-@of_questions
+@but_variants(QUESTIONS)
 def test_questions_of_two_answers(name, writers, tmp_path):
     """A softmax has as many outputs as in training; all others compare any two images."""
     spec = SplitSpec(

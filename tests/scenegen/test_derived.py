@@ -72,7 +72,7 @@ def test_occlusion_is_that_of_rays_to_the_other_camera(views):
     import trimesh
 
     wrong = total = hidden = 0
-    for a, b in ((0, 1), (1, 2), (3, 5), (6, 8), (10, 9)):
+    for a, b in ((1, 2), (6, 8), (10, 9)):
         room, other = views[a], views[b]
         mesh = trimesh.util.concatenate([part.mesh for part in scene_parts(room.scene)])
         points = room.points_world.reshape(-1, 3)

@@ -5,13 +5,14 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from metrics.intake import model_file
-from metrics.intake.model_file import ModelError, opened_model
+from metrics.intake.model_file import ModelError, _with_types, opened_model
 from metrics.intake.model_runner import plain
 from metrics.intake.running import Call, run_model
 from metrics.submissions.reader import open_predictions
@@ -25,14 +26,28 @@ WALL = "{'depth_metric': np.full(image.shape[:2], 1.5)}"
 INFER = f"import numpy as np\ndef infer(image, intrinsics=None):\n    return {WALL}\n"
 
 
+class Here:
+    """A model without a process of its own, for what is made of its values."""
+
+    path, sha256, takes_batches, takes_intrinsics = "my_model.py", "", False, False
+
+    def __init__(self, text):
+        exec(text, vars(self))
+
+    def begin(self, function, where, *arguments):
+        value = _with_types(plain(vars(self)[function](*arguments)))
+        return lambda: value
+
+
 @pytest.fixture
 def run(truths, tmp_path):
     """Run the text of a model; return what was said. The submission is at `run.out`."""
 
-    def go(text, data=truths.rooms, load=None, keep=None, timeout=None, **call):
+    def go(text, data=truths.rooms, load=None, keep=None, timeout=None, here=False, **call):
         path = tmp_path / "my_model.py"
         path.write_text(text)
-        with opened_model(path, load, timeout, go.notes.append) as model:
+        process = nullcontext(Here(text)) if here else None
+        with process or opened_model(path, load, timeout, go.notes.append) as model:
             return run_model(
                 model, data, go.out, call=Call(**call), method="m", overwrite=True, keep=keep,
                 options=load,
@@ -87,7 +102,12 @@ def test_images_are_srgb_bytes_and_cameras_are_told_only_on_request(run, truths,
 
 def returning(**keys):
     values = ", ".join(f"{name!r}: {value}" for name, value in keys.items())
-    return f"import numpy as np, torch\ndef infer(image):\n    d = np.full((32, 32), 2.0)\n    return {{{values}}}\n"  # noqa: E501
+    return f"""
+import numpy as np
+def infer(image):
+    d = np.full((32, 32), 2.0)
+    return {{{values}}}
+"""
 
 
 POINTS = "np.dstack([0 * d, 0 * d + 0.5, d])"
@@ -98,7 +118,7 @@ POINTS = "np.dstack([0 * d, 0 * d + 0.5, d])"
     [
         ({"depth_metric": "d.astype('f2')"}, "depth", "none", 2.0),
         ({"depth_scale_invariant": "d[None, ..., None]"}, "depth", "scale", 2.0),
-        ({"depth_affine_invariant": "torch.tensor(d)"}, "depth", "scale_shift", 2.0),
+        ({"depth_affine_invariant": "__import__('torch').tensor(d)"}, "depth", "scale_shift", 2.0),
         ({"disparity_affine_invariant": "d.tolist()"}, "disparity", "scale_shift", 2.0),
         ({"points_metric": POINTS, "depth_affine_invariant": "d"}, "points", "none", -2.0),
         ({"points_affine_invariant": POINTS}, "points", "scale_shift", -2.0),
@@ -107,7 +127,8 @@ POINTS = "np.dstack([0 * d, 0 * d + 0.5, d])"
 )
 def test_the_keys_say_what_is_predicted(keys, kind, alignment, value, run):
     run(returning(**keys, normal="np.dstack([0 * d, 0 * d, -d])",
-                  intrinsics="np.array([[1.2, 0, .5], [0, 1.2, .5], [0, 0, 1]])"))  # fmt: skip
+                  intrinsics="np.array([[1.2, 0, .5], [0, 1.2, .5], [0, 0, 1]])"),
+        here=True)  # fmt: skip
     with open_predictions(run.out) as found:
         view = found.view(3)
     assert (view.kind, view.alignment) == (kind, alignment)
@@ -120,7 +141,8 @@ def test_the_keys_say_what_is_predicted(keys, kind, alignment, value, run):
 
 
 def test_another_key_may_be_taken(run):
-    run(returning(points_metric=POINTS, depth_scale_invariant="d + 1"), key="depth_scale_invariant")
+    text = returning(points_metric=POINTS, depth_scale_invariant="d + 1")
+    run(text, here=True, key="depth_scale_invariant")
     with open_predictions(run.out) as found:
         assert (found.kind, found.alignment, found.depth(0)[0, 0]) == ("depth", "scale", 3.0)
 
@@ -128,9 +150,9 @@ def test_another_key_may_be_taken(run):
 def test_a_mask_takes_values_out(run):
     text = returning(depth_metric="d + np.arange(32)", mask="np.arange(32) * (d > 0) > 3")
     with pytest.raises(SceneGenError) as caught:
-        run(text)
+        run(text, here=True)
     assert "--missing nearest" in caught.value.hint
-    run(text, missing="nearest")
+    run(text, here=True, missing="nearest")
     with open_predictions(run.out) as found:
         assert found.depth(0)[5].tolist() == [6.0] * 4 + list(range(6, 34))
 
@@ -334,6 +356,9 @@ BAD = {
     "load raises": ("def load():\n  1 / 0\n", ["line 2", "load()", "ZeroDivisionError"]),
     "raises": ("def f(): [][1]\ndef infer(image): f()\n", ["line 1", "row 0", "IndexError"]),
     "arguments": ("def infer(): pass\n", ["row 0", "TypeError"]),
+    "short batch": (INFER + "def infer_batch(images): return [infer(images[0])]\n", ["rows 0 to"]),
+}
+BAD_VALUES = {
     "None": ("def infer(image): pass\n", ["row 0", "None"]),
     "an array": ("def infer(image): return image\n", ["row 0", "ndarray of shape (32, 32, 3)"]),
     "other keys": (returning(depth="d"), ["row 0", "'depth'"]),
@@ -346,15 +371,14 @@ BAD = {
     "mask": (returning(depth_metric="d", mask="d[1:] > 0"), ["row 0", "mask"]),
     "camera": (returning(depth_metric="d", intrinsics="d"), ["row 0", "intrinsics"]),
     "normal": (returning(depth_metric="d", normal="d"), ["row 0", "normal"]),
-    "short batch": (INFER + "def infer_batch(images): return [infer(images[0])]\n", ["rows 0 to"]),
 }
 
 
-@pytest.mark.parametrize("name", BAD)
+@pytest.mark.parametrize("name", [*BAD, *BAD_VALUES])
 def test_one_line_that_says_where(name, run):
-    text, words = BAD[name]
+    text, words = (BAD | BAD_VALUES)[name]
     with pytest.raises(SceneGenError) as caught:
-        run(text)
+        run(text, here=name in BAD_VALUES)
     line = str(caught.value)
     assert len(line.splitlines()) == 1
     assert [word for word in words if word not in line] == [], line
@@ -391,6 +415,7 @@ def test_questions(value, run, truths):
         "    assert reference.shape == (32, 32, 3) and answers.shape == (3, 32, 32, 3)\n"
         f"    assert reference.dtype == answers.dtype == np.uint8\n    return {value}\n",
         truths.iqtt,
+        here=value != "2",
     )
     with open_predictions(run.out) as found:
         assert found.answers.tolist() == [2] * 6
@@ -400,6 +425,6 @@ def test_questions(value, run, truths):
 @pytest.mark.parametrize("value", ["None", "3", "'B'", "[1.0, 2.0]", "[1.0, 2.0, float('nan')]"])
 def test_what_is_no_answer(value, run, truths, tmp_path):
     with pytest.raises(SceneGenError, match="row 0"):
-        run(f"def infer(reference, answers): return {value}\n", truths.iqtt)
+        run(f"def infer(reference, answers): return {value}\n", truths.iqtt, here=True)
     assert not run.out.exists()
     assert not (tmp_path / "p.h5.rows").exists()

@@ -45,7 +45,7 @@ def bucket():
     server._server.server_close()
 
 
-@pytest.fixture(params=["memory", "s3"])
+@pytest.fixture(params=["s3", pytest.param("memory", marks=pytest.mark.slow)])
 def home(request):
     """Return the URL of an empty folder in a store."""
     name = f"{os.urandom(4).hex()}"

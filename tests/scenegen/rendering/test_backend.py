@@ -151,9 +151,8 @@ def test_devices(monkeypatch):
     assert select_variant("cuda") == "cuda_ad_rgb"
 
 
-@pytest.mark.parametrize(
-    "library", [NO_LLVM[0], *(pytest.param(it, marks=pytest.mark.slow) for it in OLD[:1])]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("library", [NO_LLVM[0], *OLD[:1]])
 def test_rendering_goes_on_without_llvm_and_says_so_once(library):
     environment = os.environ | {LLVM_VARIABLE: library}
     done = subprocess.run(

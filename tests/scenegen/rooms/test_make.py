@@ -44,6 +44,7 @@ def contents(path):
         return found, file.attrs["fingerprint"]
 
 
+@pytest.mark.slow
 def test_the_same_command_gives_the_same_bytes_in_another_process(make_rooms, tmp_path):
     render = "render --n 5 --seed 8 --size 32 --min-visible-pixels 3 --out x.h5"
     batch = ["--batch", "2"]  # is not recorded, as it changes no byte

@@ -123,6 +123,7 @@ def test_a_folder_that_workers_do_not_see_is_named(cluster, tmp_path):
     assert "n 1, not 2" in refused.value.found
 
 
+@pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_one_line(tmp_path):
     with connected(LOCAL, 1, scorer_versions) as found:
         results = found.in_order(partial(slow_square, tmp_path), range(50))
@@ -151,6 +152,7 @@ with connected(LOCAL, 2, dict) as cluster:
 """
 
 
+@pytest.mark.slow
 def test_a_plain_script_needs_no_guard(tmp_path):
     (tmp_path / "plain.py").write_text(PLAIN)
     environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[4])}

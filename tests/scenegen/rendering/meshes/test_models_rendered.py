@@ -49,7 +49,14 @@ def test_hundreds_of_other_models_change_no_bit():
     assert [bits(together, row) for row in (3, 4)] == alone
 
 
-@pytest.mark.parametrize("limits", [{"MOST_FACES": 9000}, {"MOST_MODELS": 3}, {"MOST_DRAWN": 9000}])
+@pytest.mark.parametrize(
+    "limits",
+    [
+        {"MOST_MODELS": 3},
+        pytest.param({"MOST_FACES": 9000}, marks=pytest.mark.slow),
+        pytest.param({"MOST_DRAWN": 9000}, marks=pytest.mark.slow),
+    ],
+)
 def test_a_batch_cut_into_parts_is_the_same(limits, scenes_of, monkeypatch):
     scenes = scenes_of(FAMILIES, 7)
     batch = pack(FAMILIES, scenes)

@@ -55,6 +55,7 @@ def slips(unit, i, shape, seed=0):
     return int((late & (abs(cosine) > 0.2)).sum())
 
 
+@pytest.mark.slow
 def test_no_ray_slips_through_basic_shapes_and_without_overlap_some_do(variant, unit, monkeypatch):
     """Cast as meshes, as the teapot is."""
     meshes = tuple(replace(unit_shape(name), surface=None) for name in BASIC)
