@@ -69,7 +69,7 @@ def test_what_a_class_predicts_and_where(name, folders):
         images = rng.integers(0, 256, (2, height, width, 3), dtype=np.uint8)
         model.network.forward = forward
         random = model.infer_batch(images)
-        assert [list(one)[0] for one in random] == [key, key]
+        assert [next(iter(one)) for one in random] == [key, key]
         model.network.forward = known
         for one in model.infer_batch(images):
             values = np.asarray(one[key])
@@ -238,3 +238,52 @@ def test_another_environment_with_an_old_numpy(truths, tmp_path):
         expected = 1.0 + srgb_bytes(rooms[2].radiance).mean(axis=-1)
         np.testing.assert_allclose(found.depth(2), expected, rtol=1e-6)
         assert found.alignment == "none"  # a file's own numbers are in scene units
+
+
+MOGE = """
+import sys, torch
+from moge.model import import_model_class_by_version as version
+torch.manual_seed(0)
+def head(out):
+    return {"dim_in": [8] * 5, "dim_res_blocks": [8] * 5, "dim_out": [None] * 4 + [out],
+            "resamplers": ["bilinear"] * 4, "res_block_in_norm": "none",
+            "res_block_hidden_norm": "none"}
+neck = {**head(8), "dim_in": [18, 2, 2, 2, 2], "dim_out": [8] * 5}
+encoder = {"backbone": "dinov2_vits14", "intermediate_layers": 4, "dim_out": 16}
+common = {"remap_output": "exp", "num_tokens_range": [16, 64]}
+v2 = {"encoder": encoder, "neck": neck, "points_head": head(3), "mask_head": head(1),
+      "normal_head": head(3), "scale_head": {"dims": [384, 16, 1]}, **common}
+v1 = {"encoder": "dinov2_vits14", "intermediate_layers": 4, "dim_proj": 16,
+      "dim_upsample": [8, 8, 8], "res_block_norm": "layer_norm", "mask_threshold": -1.0, **common}
+for name, config in ("v1", v1), ("v2", v2):
+    network = version(name)(**config)
+    if name == "v2":
+        list(network.mask_head.parameters())[-1].data += 9.0
+    torch.save({"model_config": config, "model": network.state_dict()}, sys.argv[1] + name)
+"""
+
+
+@pytest.mark.slow
+def test_both_versions_of_moge(truths, tmp_path, monkeypatch):
+    import os
+    import subprocess
+    import sys
+
+    packages = ["dlr-moge==2.0.0", "dlr-utils3d==1.3", "dlr-pipeline", "opencv-python-headless"]
+    target = tmp_path / "packages"
+    pip = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", str(target)]
+    subprocess.run([*pip, *packages], check=True, timeout=300)
+    places = [str(target), os.environ.get("PYTHONPATH", "")]
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join(filter(None, places)))
+    subprocess.run([sys.executable, "-c", MOGE, f"{tmp_path}/"], check=True)
+    for name, key in ("v1", "points_scale_invariant"), ("v2", "points_metric"):
+        out = tmp_path / f"{name}.h5"
+        with opened_model(f"moge:{tmp_path / name}") as model:
+            call = Call(intrinsics=True, batch=3, missing="nearest")
+            said = run_model(model, truths.rooms, out, call=call, method=model.title)
+        assert said == f"{key} of 8 rows"
+        with open_predictions(out) as found, RoomsFile(truths.rooms) as rooms:
+            assert (found.kind, found.alignment) == ("points", "scale")
+            assert found.has_normals == (name == "v2")
+            fov = found.view(5).fov_y_degrees
+            assert fov == pytest.approx(rooms[5].fov_y_degrees, abs=1e-3)
