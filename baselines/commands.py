@@ -30,7 +30,7 @@ from baselines.pix2shape.commands import (
 )
 from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import LARGEST, OVERWRITE
-from scenegen.command_line.output import print_line
+from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputFolder
 
 UNTRAINED = {
@@ -340,4 +340,43 @@ def _module(name: str) -> Any:
     return import_module(f"baselines.{HOMES[name][0]}")
 
 
-COMMANDS = (baseline, train_baseline)
+@click.command(epilog=f"{EXAMPLE}bench probe hf:facebook/dinov2-base --data iqtt --out dinov2")
+@click.argument("model", metavar="hf:NAME")
+@click.option("--data", type=InputPath(), required=True, help="Folder of a split, with answers.")
+@click.option("--out", type=OutputFolder(), required=True, help="Folder to write, a new one.")
+@click.option("--device", default="cpu", show_default=True, help="Such as cuda.")
+@click.option(
+    "--batch", type=click.IntRange(1, 4096), default=8, show_default=True,
+    help="Questions at a time.",
+)  # fmt: skip
+def probe(model: str, data: str, out: str, device: str, batch: int) -> None:
+    """Ask every layer of an encoder which pictures show one shape.
+
+    The answer whose features have the greatest cosine with the reference's is taken; nothing is
+    learned. The folder gets answers and scores of each layer, and a curve, layers.png.
+    """
+    needs_torch("bench probe", ("torch", "transformers"))
+    from baselines import encoders
+    from iqtt.files.reader import open_questions
+    from scenegen.common.text_table import aligned, number, with_interval
+
+    if not model.startswith(encoders.PREFIX):
+        raise click.BadParameter(f"found {model!r:.60}, expected hf:NAME", param_hint="MODEL")
+    with open_questions(encoders.split_paths(data)[0]) as questions:
+        count = len(questions)
+    with progress_bar(count, "question") as bar:
+        scores = encoders.probe(model, data, out, device=device, batch=batch, progress=bar.update)
+    encoders.draw(scores, Path(out) / "layers.png")
+    kinds = list(encoders.accuracies(scores[0]))
+    floors = scores[0].question_floors
+    rows = [["layer", *kinds]]
+    for i, one in enumerate(scores):
+        values = encoders.accuracies(one).values()
+        rows.append([str(i), *(" ".join(with_interval(v.value, v.low, v.high)) for v in values)])
+    rows.append(["floor", *(number(floors[k].accuracy) if k in floors else "" for k in kinds)])
+    for line in aligned(rows):
+        print_line(line)
+    print_line(f"{out}: answers and scores of {len(scores)} layers, layers.png")
+
+
+COMMANDS = (baseline, train_baseline, probe)

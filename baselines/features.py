@@ -84,10 +84,16 @@ def read_features(path: str | Path, count: int, questions: QuestionsFile) -> Arr
     if not np.isfinite(read).all():
         row = int(np.flatnonzero(~np.isfinite(read).all(axis=(1, 2)))[0])
         raise FileFormatError(f"{path}: row {row}", "features that are not finite", "numbers")
+    return of_length_one(read)
+
+
+def of_length_one(features: Array) -> Array:
+    """Return features (..., D) divided by their lengths, as float64; 0 stays 0."""
+    values = np.asarray(features, np.float64)
     for norm in (np.inf, 2):  # the first, so that no square overflows
-        length = np.linalg.norm(read, norm, axis=2, keepdims=True)
-        read = read / np.where(length > 0, length, 1)
-    return read
+        length = np.linalg.norm(values, norm, axis=-1, keepdims=True)
+        values = values / np.where(length > 0, length, 1)
+    return values
 
 
 def cosines_with_reference(features: Array) -> Array:

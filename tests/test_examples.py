@@ -95,3 +95,18 @@ def test_the_sample_has_its_documented_scores(tmp_path):
     assert found.meta.truth_digest == told.meta.truth_digest
     assert found.meta.truth_fingerprint == told.meta.truth_fingerprint
     assert found.meta.submissions[0].sha256 == told.meta.submissions[0].sha256
+
+
+@pytest.mark.slow
+def test_a_public_network_learns(run, make_rooms, tmp_path):
+    pytest.importorskip("transformers")
+    from tiny_depth_models import save
+
+    save("depth-anything", tmp_path / "network")
+    size = {"height": 64, "width": 64}
+    train, validation = make_rooms(tmp_path / "t.h5", 96, **size), tmp_path / "v.h5"
+    make_rooms(validation, 16, **size, seed=1)
+    code, printed, _ = run("finetune", "network", train, validation, "--epochs", 3, "--rate", 1e-3)
+    skills = [float(line.split("mse_depth")[1].split()[0]) for line in printed.splitlines()]
+    assert (code, len(skills)) == (0, 4)
+    assert skills[-1] > skills[0] + 0.1

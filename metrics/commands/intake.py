@@ -27,6 +27,18 @@ class Factor(click.ParamType):  # type: ignore[type-arg]
             self.fail(f"found {value!r:.40}, expected a number such as 0.001 or 1/256", param, ctx)
 
 
+class ModelName(InputPath):
+    """A Python file, or the name of a public model."""
+
+    name = "model"
+
+    def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
+        """Take names as they are, and paths as `InputPath` does."""
+        from metrics.intake.model_file import LIBRARIES
+
+        return value if value.startswith(LIBRARIES) else super().convert(value, param, ctx)
+
+
 ALIGNMENTS = ("none", "median_scale", "scale", "scale_shift")
 DATA = click.option(
     "--data", "truth", type=InputPath(), required=True, metavar="ROOMS.h5",
@@ -166,13 +178,18 @@ def _print_hints(out: str, truth: str) -> None:
 
 # fmt: off
 @click.command(epilog=f"{EXAMPLE}bench run my_model.py --data rooms.h5 --out mine.h5")
-@click.argument("model", type=InputPath(), metavar="MODEL.py")
+@click.argument("model", type=ModelName(), metavar="MODEL")
+@click.argument("words", nargs=-1, type=click.UNPROCESSED, metavar="[-- OPTIONS]")
 @DATA
 @OUT
 @METHOD
 @RUN
 @NOTES
 @click.option("--device", help="Handed to the model's load(), such as cuda.")
+@click.option("--dtype", help="Handed to the model's load(), such as bfloat16.")
+@click.option("--python", type=InputPath(), metavar="PROGRAM",
+              help="The Python that runs the model, of another environment, such as"
+              " ~/envs/da3/bin/python. It needs NumPy and nothing of this project.")
 @click.option("--batch", type=click.IntRange(1, 4096),
               help="Images for each call of the model's infer_batch [default: 8]; handed to its"
               " load(), too.")
@@ -192,20 +209,22 @@ def _print_hints(out: str, truth: str) -> None:
 @click.option("--traceback", is_flag=True, help="Show all of an error that the model raises.")
 @OVERWRITE
 def run(
-    model: str, truth: str, out: str, method: str | None, run_name: str, notes: str,
-    device: str | None, batch: int | None, intrinsics: bool, curve: str, exposure: float,
-    key: str | None, frame: Any, missing: Any, keep: str | None, timeout: float | None,
-    traceback: bool, overwrite: bool,
+    model: str, words: tuple[str, ...], truth: str, out: str, method: str | None, run_name: str,
+    notes: str, device: str | None, dtype: str | None, python: str | None, batch: int | None,
+    intrinsics: bool, curve: str, exposure: float, key: str | None, frame: Any, missing: Any,
+    keep: str | None, timeout: float | None, traceback: bool, overwrite: bool,
 ) -> None:
     """Run a model on every image of a file and write its predictions.
 
-    MODEL.py holds infer(image, intrinsics=None), which returns a dict with depth, disparity or
-    points; for questions infer(reference, answers), which returns an index or scores. It may be a
-    class, or what load() returns. docs/your-model.md has examples.
+    MODEL is a public depth model by its name, hf:NAME for what transformers loads, moge:NAME for
+    MoGe; or a Python file. That holds infer(image, intrinsics=None), which returns a dict with
+    depth, disparity or points; for questions infer(reference, answers), which returns an index or
+    scores. It may be a class, what load() returns, or a Baseline of MoGe's evaluation, whose load
+    gets what stands after --. docs/your-model.md has examples.
 
     A killed run loses nothing: the same command goes on where it stopped.
     """
-    from metrics.intake.model_file import ModelError, opened_model
+    from metrics.intake.model_file import LIBRARIES, ModelError, opened_model
     from metrics.intake.outputs import KEYS
     from metrics.intake.running import DEFAULT_BATCH, Call, count_rows, run_model
     from scenegen.files.new_file import check_writable
@@ -214,18 +233,25 @@ def run(
     if key is not None and key not in KEYS:
         raise click.BadParameter(f"found {key!r:.40}, expected one of {', '.join(KEYS)}",
                                  param_hint="--key")
-    asked = {"device": device, "batch": batch}
+    named = model.startswith(LIBRARIES)
+    # A public model makes batches of any size; only the key of one that is not known is its affair.
+    asked = {"device": device, "dtype": dtype, "batch": None if named else batch}
+    asked |= {"key": key} if model.startswith("hf:") else {}
     options = {name: value for name, value in asked.items() if value is not None}
     loaded = None
+    kept = {**options, "arguments": words} if words else options
     call = Call(curve, exposure, intrinsics, batch or DEFAULT_BATCH, frame, key, missing)
     try:
         with (
-            opened_model(model, options, timeout, partial(print_line, err=True)) as loaded,
+            opened_model(
+                model, options, timeout, partial(print_line, err=True), arguments=words,
+                python=python,
+            ) as loaded,
             progress_bar(count_rows(truth), "row") as bar,
         ):
             said = run_model(
-                loaded, truth, out, call=call, method=method or Path(model).stem, run=run_name,
-                notes=notes, overwrite=overwrite, keep=keep, options=options, progress=bar.update,
+                loaded, truth, out, call=call, method=method or loaded.title, run=run_name,
+                notes=notes, overwrite=overwrite, keep=keep, options=kept, progress=bar.update,
             )
     except ModelError as error:
         if traceback and error.traceback:

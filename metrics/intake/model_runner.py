@@ -1,19 +1,23 @@
 """The process in which a model lives: it imports the model's file and calls it.
 
-`model_file` runs this file by its path. It imports nothing of this project, so that a model's own
-`metrics` or `cli.py` is what the model gets. Requests come by standard input and answers go by
-standard output; what the model prints goes to standard error. After an error it does nothing more.
+`model_file` runs this file by its path, in any Python from 3.9 on that has NumPy from 1.24 on. It
+imports nothing of this project, so that a model's own `metrics` or `cli.py` is what the model gets.
+Requests come by standard input and answers go by standard output; what the model prints goes to
+standard error. After an error it does nothing more.
 """
+
+from __future__ import annotations
 
 import importlib.util
 import inspect
+import io
 import os
 import pickle
 import signal
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from queue import SimpleQueue
 from types import ModuleType, SimpleNamespace
@@ -36,27 +40,34 @@ def main() -> None:
     os.dup2(2, 1)
     messages: SimpleQueue[bytes] = SimpleQueue()
     threading.Thread(target=_listen, args=(requests, messages), daemon=True).start()
-    path, settings = pickle.loads(messages.get())
+    path, settings, arguments = loads(messages.get())
     sys.argv = [path]
-    sys.path.insert(0, str(Path(path).resolve().parent))
+    folder = Path(path).resolve().parent
+    if folder != Path(__file__).resolve().parent:
+        sys.path.insert(0, str(folder))
     model: Any = None
 
     def load() -> dict[str, Any]:
         nonlocal model
-        model = _loaded(path, settings)
+        model = _loaded(path, settings, arguments)
         batch = getattr(model, "infer_batch", None)
         called = batch if callable(batch) else model.infer
-        return {"batch": callable(batch), "intrinsics": _accepts(called, "intrinsics")}
+        return {
+            "batch": callable(batch),
+            "intrinsics": _accepts(called, "intrinsics"),
+            "metres": bool(getattr(model, "metres", False)),
+            "provenance": plain(model.provenance()) if hasattr(model, "provenance") else {},
+        }
 
     answer = _answer(path, load)
     write(answers, answer)
     while answer[:1] == b"+" and (message := messages.get()):
-        name, arguments = pickle.loads(message)
+        name, arguments = loads(message)
         answer = _answer(path, lambda: plain(getattr(model, name)(*arguments)))  # noqa: B023
         write(answers, answer)
 
 
-def _listen(requests: IO[bytes], messages: "SimpleQueue[bytes]") -> None:
+def _listen(requests: IO[bytes], messages: SimpleQueue[bytes]) -> None:
     """Pass messages on. Ends this process, whatever it does, when the one that started it ends.
 
     What the model has started ends, too, as this process leads a group of its own.
@@ -86,10 +97,42 @@ def read(stream: IO[bytes]) -> bytes:
     return message
 
 
+class _Pickler(pickle.Pickler):
+    """Sends arrays as bytes: what NumPy pickles cannot be read by one that is much older."""
+
+    def persistent_id(self, obj: Any) -> Any:
+        np = sys.modules.get("numpy")
+        if np is None or not isinstance(obj, np.ndarray):
+            return None
+        mask = np.ma.getmaskarray(obj) if isinstance(obj, np.ma.MaskedArray) else None
+        return obj.dtype.str, obj.shape, bytearray(obj.tobytes()), mask
+
+
+class _Unpickler(pickle.Unpickler):
+    def persistent_load(self, pid: Any) -> Any:
+        import numpy as np
+
+        dtype, shape, content, mask = pid
+        array = np.frombuffer(content, dtype).reshape(shape)  # of a bytearray, so it is writable
+        return array if mask is None else np.ma.MaskedArray(array, mask)
+
+
+def dumps(value: Any) -> bytes:
+    """Return a value of Python's own types and arrays as bytes."""
+    stream = io.BytesIO()
+    _Pickler(stream, 5).dump(value)
+    return stream.getvalue()
+
+
+def loads(message: bytes) -> Any:
+    """Return the value of `dumps`, of any version of Python and NumPy."""
+    return _Unpickler(io.BytesIO(message)).load()
+
+
 def _answer(path: str, function: Callable[[], Any]) -> bytes:
     """Return what a function of the model returns, after `+`; or what it raised, after `-`."""
     try:
-        return b"+" + pickle.dumps(function(), 5)
+        return b"+" + dumps(function())
     except BaseException as error:
         if isinstance(error, UnusableError):
             told: dict[str, Any] = {"unusable": error.args}
@@ -97,8 +140,9 @@ def _answer(path: str, function: Callable[[], Any]) -> bytes:
             text = f"{type(error).__name__}: {error}".strip().removesuffix(":")
             told = {"found": " ".join(text.split())[:400], "line": _line(error, path)}
             told |= {"interrupt": isinstance(error, KeyboardInterrupt)}
-            told |= {"traceback": "".join(traceback.format_exception(error))}
-        return b"-" + pickle.dumps(told)
+            lines = traceback.format_exception(type(error), error, error.__traceback__)
+            told |= {"traceback": "".join(lines)}
+        return b"-" + dumps(told)
 
 
 def _line(error: BaseException, path: str) -> int | None:
@@ -113,12 +157,17 @@ def _line(error: BaseException, path: str) -> int | None:
 # ---- the model ----
 
 
-def _loaded(path: str, settings: Mapping[str, Any]) -> Any:
+def _loaded(path: str, settings: Mapping[str, Any], arguments: Sequence[str]) -> Any:
     """Import the file and return its model, as `model_file.opened_model` says."""
     module = _imported(path)
     make = getattr(module, "load", None)
     if not callable(make):
         make = None if callable(getattr(module, "infer", None)) else _only_class(module, path)
+    if hasattr(getattr(make, "load", None), "main"):  # a command of click
+        return _Baseline(make, settings, arguments)
+    if arguments:
+        found = f"{path}, which has no Baseline with a command load"
+        raise UnusableError("what stands after --", found, "a file of MoGe's evaluation", EXAMPLE)
     taken = {name: settings[name] for name in settings if make and _accepts(make, name)}
     model: Any = module
     if make is not None:
@@ -129,11 +178,56 @@ def _loaded(path: str, settings: Mapping[str, Any]) -> Any:
     for name in settings:
         batches = name == "batch" and callable(getattr(model, "infer_batch", None))
         if name not in taken and not batches:
-            expected = f"a load() or a class that takes {name}"
-            if name == "batch":
-                expected += ", or infer_batch(images, intrinsics=None)"
-            raise UnusableError(f"--{name}", f"{path}, which does not take it", expected)
+            raise UnusableError(*_untaken(name, path))
     return model
+
+
+def _untaken(name: str, path: str) -> tuple[str, str, str]:
+    expected = f"a load() or a class that takes {name}"
+    if name == "batch":
+        expected += ", or infer_batch(images, intrinsics=None)"
+    return f"--{name}", f"{path}, which does not take it", expected
+
+
+class _Baseline:
+    """A wrapper of MoGe's evaluation: `load` is a command of click, images are tensors.
+
+    `infer` takes an image (3, H, W) in [0, 1] and normalised intrinsics, and returns metres. Where
+    there is an `infer_for_evaluation`, that is called.
+    """
+
+    metres = True
+
+    def __init__(self, made: Any, settings: Mapping[str, Any], arguments: Sequence[str]) -> None:
+        options = {word for parameter in made.load.params for word in parameter.opts}
+        words = list(arguments)
+        for name, value in settings.items():
+            if f"--{name}" not in options:
+                raise UnusableError(*_untaken(name, f"the command load of {made.__name__}"))
+            words += [f"--{name}", str(value)]
+        import click
+
+        try:
+            self.wrapped = made.load.main(words, standalone_mode=False)
+        except click.ClickException as error:
+            where, known = "what stands after --", ", ".join(sorted(options))
+            raise UnusableError(
+                where, error.format_message(), f"options of its load: {known}"
+            ) from None
+        self.called = getattr(self.wrapped, "infer_for_evaluation", None) or self.wrapped.infer
+
+    def infer(self, image: Any, intrinsics: Any = None) -> Any:
+        """Image (H, W, 3), sRGB bytes, and a matrix in pixels, to what the wrapper returns."""
+        import torch
+
+        device = getattr(self.wrapped, "device", "cpu")
+        tensor = torch.from_numpy(image).to(device).permute(2, 0, 1).float() / 255.0
+        with torch.inference_mode():
+            if intrinsics is None:
+                return self.called(tensor)
+            height, width = image.shape[:2]
+            matrix = torch.from_numpy(intrinsics).float() / torch.tensor([[width], [height], [1]])
+            return self.called(tensor, matrix.to(device))
 
 
 def _imported(path: str) -> ModuleType:

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -127,7 +127,7 @@ def _run_rooms(
 ) -> str:  # fmt: skip
     if call.intrinsics:
         if not model.takes_intrinsics:
-            found = f"infer of {model.path}, which takes none"
+            found = f"infer of {model.name}, which takes none"
             raise ModelError("--intrinsics", found, "infer(image, intrinsics=None)")
         texts["notes"] = "\n".join(filter(None, (texts["notes"], TOLD)))
     with RoomsFile(data) as rooms:
@@ -137,9 +137,12 @@ def _run_rooms(
             rows = _geometries(model, rooms, call, kept)
             start = next(rows)
             first = start[1]
+            model.ask_provenance()
+            told = [f"{name}: {text}" for name, text in model.provenance.items() if text]
+            texts["notes"] = "\n".join(filter(None, (texts["notes"], *told)))
             with RoomPredictionWriter(out, data, alignment=first.alignment, **texts) as writer:
                 for row, geometry in itertools.chain([start], rows):
-                    where = f"{model.path}: row {row}"
+                    where = f"{model.name}: row {row}"
                     try:
                         if geometry.key != first.key:
                             expected = f"{first.key!r}, as in row 0"
@@ -178,7 +181,13 @@ def _geometries(
                     frame=call.frame, key=call.key, missing=call.missing,
                 )  # fmt: skip
             except OutputError as error:
-                raise error.inside(f"{model.path}: row {row}") from error
+                raise error.inside(f"{model.name}: row {row}") from error
+            if (
+                model.metres
+                and geometry.alignment == "none"
+                and not getattr(rooms.spec, "in_metres", False)
+            ):
+                geometry = replace(geometry, alignment="scale")
             yield row, geometry
 
 
@@ -217,7 +226,7 @@ def _begun(
         outputs = several()
         if not isinstance(outputs, list) or len(outputs) != len(rows):
             count = f" of {len(outputs)}" if isinstance(outputs, list) else ""
-            place, found = f"{model.path}: {where}: infer_batch", type(outputs).__name__ + count
+            place, found = f"{model.name}: {where}: infer_batch", type(outputs).__name__ + count
             raise OutputError(place, found, f"a list of {len(rows)} dicts")
         return dict(zip(rows, outputs, strict=True))
 
@@ -262,13 +271,13 @@ def _run_questions(
                 return row, None, model.begin("infer", f"row {row}", images[0], images[1:])
 
             for row, arrays, wait in _one_ahead(begin, range(len(questions))):
-                where = f"{model.path}: row {row}: returned"
+                where = f"{model.name}: row {row}: returned"
                 value = arrays["value"] if arrays else _answer(wait(), questions.answers, where)
                 if arrays is None:
                     kept.write(row, {"value": value})
                 values.append(value)
                 if values[-1].shape != values[0].shape:
-                    where = f"{model.path}: row {row}: returned"
+                    where = f"{model.name}: row {row}: returned"
                     raise OutputError(where, "an index after scores, or scores after an index",
                                       "the same for all questions")  # fmt: skip
                 progress(1)
