@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from metrics.in_memory import evaluate
-from metrics.measures.relief import empty_room
+from metrics.measures.empty_room import empty_room
 from metrics.scoring.metric_names import OTHER_SCENE, in_order, metric
 from metrics.scoring.records import ScoreFile
 from scenegen.camera import pixel_directions
