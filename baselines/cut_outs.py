@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from baselines.picture import outline_mask, residual
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.submissions.layout import Shown
 from scenegen.camera import pixel_directions, pixel_size, transform_points

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.files.reader import open_questions
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.submissions.layout import Shown
 from scenegen.common.errors import SpecError

@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 from metrics.measures.alignment import Alignment
 from metrics.measures.behind import behind_scores, hidden_from
 from metrics.measures.boundaries import boundary_scores
-from metrics.measures.chamfer_hausdorff import (
+from metrics.measures.depth import DepthPair, compare_depth, depth_scores, mse_depth
+from metrics.measures.guesses import balls_and_blocks, depth_of_balls, depth_of_blocks
+from metrics.measures.objects import counted_objects, object_means, single_objects
+from metrics.measures.relief import depth_along, empty_room, relief_scores
+from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores
+from metrics.measures.surfaces.chamfer_hausdorff import (
     NearestDistances,
     chamfer,
     hausdorff,
@@ -21,16 +26,14 @@ from metrics.measures.chamfer_hausdorff import (
     paper_scores,
     point_scores,
 )
-from metrics.measures.depth import DepthPair, compare_depth, depth_scores, mse_depth
-from metrics.measures.empty_room import depth_along, empty_room
-from metrics.measures.guesses import balls_and_blocks, depth_of_balls, depth_of_blocks
-from metrics.measures.image_search import nearest_distances_on_image
-from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_points
-from metrics.measures.objects import counted_objects, object_means, single_objects
-from metrics.measures.points import departures, local_point_scores, point_map_scores
-from metrics.measures.relief import relief_scores
-from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores
-from metrics.measures.surface import Surface, surface_distances, surface_of
+from metrics.measures.surfaces.image_search import nearest_distances_on_image
+from metrics.measures.surfaces.normals import (
+    angular_errors_degrees,
+    normal_scores,
+    normals_from_points,
+)
+from metrics.measures.surfaces.patches import Surface, surface_distances, surface_of
+from metrics.measures.surfaces.points import departures, local_point_scores, point_map_scores
 from metrics.scoring.geometry import (
     Geometry,
     alignments_scored,

@@ -14,7 +14,7 @@ from baselines.pix2shape.weights import FOLDER, names, open_weights, suited
 from baselines.training.checkpoint import load_tensors, save_tensors
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.submissions.reader import open_predictions
 from scenegen.camera import look_at
 from scenegen.common.errors import FileFormatError, SpecError

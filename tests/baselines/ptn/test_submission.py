@@ -11,7 +11,7 @@ from baselines.ptn.submission import FILES, seen, write_submission
 from baselines.ptn.training import train
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.scoring.evaluate import score
 from scenegen.rooms.reader import RoomsFile
 

@@ -7,7 +7,7 @@ import pytest
 
 from metrics.measures.boundaries import boundary_scores
 from metrics.measures.depth import compare_depth, depth_scores
-from metrics.measures.points import local_point_scores, point_map_scores
+from metrics.measures.surfaces.points import local_point_scores, point_map_scores
 
 RNG = np.random.default_rng(5)
 TRUE = RNG.uniform(0.5, 3.0, (9, 11))

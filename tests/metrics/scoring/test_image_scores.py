@@ -7,11 +7,11 @@ from h5_edits import replaced
 from made_scores import rooms_scores
 
 from baselines.trivial import write_room_baseline
-from metrics.measures.chamfer_hausdorff import nearest_distances
-from metrics.measures.empty_room import empty_room
-from metrics.measures.normals import normals_from_depth
 from metrics.measures.objects import LEAST_PIXELS
-from metrics.measures.surface import surface_distances, surface_of
+from metrics.measures.relief import empty_room
+from metrics.measures.surfaces.chamfer_hausdorff import nearest_distances
+from metrics.measures.surfaces.normals import normals_from_depth
+from metrics.measures.surfaces.patches import surface_distances, surface_of
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
@@ -185,7 +185,7 @@ def scored(baseline, truth, folder):
 def test_rooms_without_objects_have_no_such_scores(make_rooms, tmp_path):
     truth = make_rooms(tmp_path / "bare.h5", 3, objects=(0, 0))
     found = scored("empty-room", truth, tmp_path)
-    assert {metric(name).lacking for name in found.metrics} <= {"", "boundary"}
+    assert {metric(name).lacking for name in found.metrics} <= {"", "boundary", "planes"}
     assert found.metrics["chamfer"].value < 1e-5
     assert (dict(found.skills), dict(found.by_object_shape)) == ({}, {})
     assert len(found.objects["row"]) == 0

@@ -11,13 +11,13 @@ from scipy.spatial import cKDTree
 from metrics.measures.alignment import Alignment
 from metrics.measures.behind import behind_scores
 from metrics.measures.boundaries import boundary_scores
-from metrics.measures.chamfer_hausdorff import NearestDistances, paper_scores, point_scores
 from metrics.measures.depth import compare_depth, depth_scores
-from metrics.measures.normals import normal_scores
 from metrics.measures.objects import object_means, single_objects
-from metrics.measures.points import local_point_scores, point_map_scores
 from metrics.measures.relief import relief_scores
 from metrics.measures.shape import shape_scores
+from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, paper_scores, point_scores
+from metrics.measures.surfaces.normals import normal_scores
+from metrics.measures.surfaces.points import local_point_scores, point_map_scores
 from metrics.scoring.metric_names import (
     ALL,
     HEADLINE,

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.distance import cdist
 
-from metrics.measures.chamfer_hausdorff import (
+from metrics.measures.surfaces.chamfer_hausdorff import (
     NearestDistances,
     f_score,
     nearest_distances,

@@ -4,7 +4,7 @@ A pixel has a point of a surface and the normal there. They tell a patch of it: 
 point, in the tangent plane. A point that lies on the surface between two pixels is near their
 patches, although it is half a pixel away from either point. So these distances hardly depend on the
 number of pixels. Of the truth the normals are exact. Of a prediction they are derived from its
-points, by `measures.normals`.
+points, by `normals`.
 
 With a point q, the point p and the normal n of a patch, and the pixel size s on the plane at depth
 1, the distance from q to the patch is
@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.chamfer_hausdorff import NearestDistances
+from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances
 
 Array = NDArray[Any]
 Mask = NDArray[np.bool_]

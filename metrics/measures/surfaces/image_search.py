@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.measures.chamfer_hausdorff import NearestDistances, query_nearest
 from metrics.measures.checks import require, require_depth_pair, require_fov
+from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, query_nearest
 from scenegen.camera import pixel_directions, pixel_size
 
 Array = NDArray[np.float64]

@@ -1,4 +1,4 @@
-"""Hints on answers to questions: scores that are distances."""
+"""All hints on a submission of rooms, and on answers to questions: scores that are distances."""
 
 from typing import Any
 
@@ -6,8 +6,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.statistics import wilson_interval
+from metrics.submissions.hints.depth import depth_hints, disparity_hints
+from metrics.submissions.hints.normals import normal_hints
+from metrics.submissions.hints.order import order_hints
+from metrics.submissions.hints.points import point_hints
+from metrics.submissions.hints.samples import sample_rooms
 from metrics.submissions.problems import HINT, Problem
-from metrics.submissions.reader import QuestionPredictions
+from metrics.submissions.reader import QuestionPredictions, RoomPredictions
+from scenegen.rooms.reader import RoomsFile
+
+
+def room_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]:
+    """Return hints on a submission whose images have the size of the truth's.
+
+    They rest on 24 images for depth and normals, and on a few pixels of at most 4096 rows of the
+    truth for the order of rows. Values that are not finite are ignored. Raises FileFormatError
+    where the truth is damaged.
+    """
+    samples = sample_rooms(predictions, truth)
+    if predictions.kind == "disparity":
+        hints = disparity_hints(samples)
+    else:
+        hints = depth_hints(samples, predictions.alignment, predictions.kind)
+    if predictions.kind == "points":
+        hints += point_hints(samples, predictions.alignment)
+    if predictions.has_normals:
+        hints += normal_hints(samples)
+    return hints + order_hints(predictions, truth)
 
 
 def answer_hints(predictions: QuestionPredictions, answers: NDArray[Any]) -> list[Problem]:

@@ -6,7 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_depth
+from metrics.measures.surfaces.normals import (
+    angular_errors_degrees,
+    normal_scores,
+    normals_from_depth,
+)
 from scenegen.camera import back_project, pixel_directions
 
 FOV = 20.0

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from metrics.measures import image_search
-from metrics.measures.chamfer_hausdorff import nearest_distances
-from metrics.measures.image_search import nearest_distances_on_image
+from metrics.measures.surfaces import image_search
+from metrics.measures.surfaces.chamfer_hausdorff import nearest_distances
+from metrics.measures.surfaces.image_search import nearest_distances_on_image
 from scenegen.camera import back_project
 
 

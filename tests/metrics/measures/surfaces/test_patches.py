@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from metrics.measures.chamfer_hausdorff import nearest_distances
-from metrics.measures.surface import surface_distances, surface_of
+from metrics.measures.surfaces.chamfer_hausdorff import nearest_distances
+from metrics.measures.surfaces.patches import surface_distances, surface_of
 from scenegen.camera import back_project, pixel_directions, pixel_size
 
 RNG = np.random.default_rng(3)
