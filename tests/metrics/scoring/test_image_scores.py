@@ -6,11 +6,7 @@ import pytest
 from h5_edits import replaced
 
 from baselines.trivial import write_room_baseline
-from metrics.measures.chamfer_hausdorff import nearest_distances
 from metrics.measures.empty_room import empty_room
-from metrics.measures.normals import normals_from_depth
-from metrics.measures.objects import LEAST_PIXELS
-from metrics.measures.surface import surface_distances, surface_of
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
@@ -18,7 +14,6 @@ from metrics.scoring.image_scores import true_relief
 from metrics.scoring.metric_names import OF_CUT_OUT, metric
 from metrics.scoring.rows import other_scenes
 from metrics.scoring.runs import Settings
-from scenegen.camera import back_project, pixel_size
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
@@ -117,58 +112,6 @@ def test_true_outlines_without_any_shape_win_relief_but_find_no_object(make_room
     assert found.skills["relief_iou"].value > 0.5
     assert found.metrics["object_recall_0.02"].value < 0.2
     assert found.metrics["derived_object_normal_mean_degrees"].value > 40.0
-
-
-def reverse_distances(depth, room, mask):
-    """From the true points to predicted patches, (H, W)."""
-    points, true = (back_project(d, room.fov_y_degrees)[mask] for d in (depth, room.depth))
-    normals, _ = normals_from_depth(depth, room.fov_y_degrees, mask)
-    pitch, image = pixel_size(len(mask), room.fov_y_degrees), np.full(mask.shape, np.nan)
-    said, truth = (
-        surface_of(p, n[mask], pitch, mask)
-        for p, n in ((points, normals), (true, room.normal.astype(float)))
-    )
-    image[mask] = surface_distances(said, truth, nearest_distances(points, true), False).reverse
-    return image
-
-
-def test_scores_of_objects_and_relief_are_those_of_scipy_and_numpy(folder):
-    found = score([folder / "noisy-0.h5"], folder / "rooms.h5")
-    with RoomsFile(folder / "rooms.h5") as rooms, h5py.File(folder / "noisy-0.h5") as file:
-        place = {int(row): i for i, row in enumerate(file["row"])}
-        for row, room in enumerate(rooms):
-            depth, mask = file["depth"][place[row]].astype(float), np.isfinite(room.depth)
-            _, true = (back_project(d, room.fov_y_degrees) for d in (depth, room.depth))
-            near_true, each = reverse_distances(depth, room, mask), {}
-            for one in np.unique(room.object_id[room.object_id > 0]).tolist():
-                pixels = room.object_id == one
-                if pixels.sum() >= LEAST_PIXELS:
-                    error = np.abs(depth - room.depth)[pixels]
-                    each[one] = near_true[pixels], error, error.size
-            entries = np.flatnonzero(found.objects["row"] == row)
-            assert found.objects["object"][entries].tolist() == list(each)
-            assert found.objects["pixels"][entries].tolist() == [n for *_, n in each.values()]
-            names = [s.shape for s in room.scene.objects]
-            assert [names[k - 1] for k in each] == found.objects["shape"][entries].tolist()
-            near, errors, _ = (
-                np.array([v[i].mean() if i < 2 else v[i] for v in each.values()]) for i in range(3)
-            )
-            assert found.objects["object_completeness"][entries] == pytest.approx(near)
-            assert found.objects["object_depth_error"][entries] == pytest.approx(errors)
-            pooled = np.concatenate([v[0] for v in each.values()]).mean()
-            assert found.items["object_completeness"][row] == pytest.approx(pooled)
-            assert found.items["object_recall_0.05"][row] == np.mean(near < 0.05)
-            corner = room.world_from_camera
-            world = true[mask] @ corner[:3, :3].T
-            rays = world / room.depth[mask][:, None]
-            wall = np.min(-corner[:3, 3] / np.where(rays < 0, rays, -1e-9), axis=-1)
-            said, relief = wall - depth[mask], wall - room.depth[mask]
-            expected = np.corrcoef(said, relief)[0, 1]
-            assert found.items["relief_correlation"][row] == pytest.approx(expected, abs=1e-6)
-            both, any_ = ((said > 0.05) & (relief > 0.05)), ((said > 0.05) | (relief > 0.05))
-            assert found.items["relief_iou"][row] == pytest.approx(
-                both.sum() / any_.sum(), abs=2e-3
-            )
 
 
 def scored(baseline, truth, folder):
