@@ -163,32 +163,6 @@ def test_an_image_with_a_value_that_is_not_finite_has_the_worst_scores(folder, t
     assert not found.comparable
 
 
-@pytest.mark.parametrize(
-    ("alignment", "told"),
-    [
-        ("scale", lambda depth: 2.0 * depth),
-        ("scale_shift", lambda depth: (depth - np.nanmin(depth)) / np.ptp(depth)),
-        ("scale_shift", lambda depth: 7.0 + 0.01 * depth),
-    ],
-)
-def test_headlines_of_relative_depth_are_those_after_its_alignment(
-    folder, tmp_path, alignment, told
-):
-    """Depth that is exact up to what the method says it cannot know is perfect."""
-    truth, path = folder / "rooms.h5", tmp_path / "relative.h5"
-    with (
-        RoomsFile(truth) as rooms,
-        RoomPredictionWriter(path, truth, method="m", alignment=alignment) as out,
-    ):
-        for row, room in enumerate(rooms):
-            out.add(row, told(room.depth))
-    scores = score([path], truth)
-    for name, skill in scores.skills.items():
-        assert skill.value == pytest.approx(1.0, abs=2e-3), name
-    assert scores.metrics["chamfer"].value < 1e-4
-    assert scores.metrics["mse_depth"].value < 1e-9
-
-
 def test_every_row_serves_once_as_that_of_another_scene():
     scene = np.array([4, 4, 4, 9, 9, 9, 2, 2, 2])
     view = np.array([0, 1, 2] * 3)
