@@ -173,7 +173,8 @@ def check_content(db: sqlite3.Connection, path: Path) -> None:
             raise FileFormatError(path, f"another schema, such as {other:.60}", ", ".join(TABLES))
         trouble = db.execute("PRAGMA quick_check(1)").fetchone()[0]  # of the tables' rules, too
         if trouble != "ok":
-            raise FileFormatError(path, f"damage: {trouble:.200}", "a whole file")
+            what = " ".join(str(trouble).split())  # SQLite writes several lines
+            raise FileFormatError(path, f"damage: {what:.200}", "a whole file")
         if db.execute("SELECT count(*) FROM study").fetchone() != (1,):
             raise FileFormatError(f"{path}: study", "no settings, or several", "one row")
         for problem, query in CONTRADICTIONS.items():

@@ -125,14 +125,6 @@ def test_other_names_are_unknown(name):
         metric(name)
 
 
-@pytest.mark.parametrize(
-    ("name", "close"), [("chamfr", "chamfer"), ("mse", "rmse"), ("deltta_1", "delta_1")]
-)
-def test_close_names_are_named(name, close):
-    with refused(UnknownMetricError, found=name, hint=close):
-        metric(name)
-
-
 def test_the_order_is_that_of_the_table():
     expected = ["chamfer", "f_score_0.05", "f_score_0.1", "mse_depth", "iqtt_accuracy", "a", "z"]
     assert in_order(reversed(expected)) == expected

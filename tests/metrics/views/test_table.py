@@ -179,15 +179,3 @@ def test_notes_are_wrapped_to_the_width_and_told_once():
         assert sum("short" in line for line in lines) == 1
         assert not any(line.strip().startswith(("1.", "- this")) for line in lines)
         assert len(write("title", [some], [], None).splitlines()[-2].lstrip("- ")) == len(LONG)
-
-
-def test_heads_of_wide_tables_are_as_narrow_as_their_columns():
-    table = make_table(
-        "", ("method", "a very long head: skill", "b"), [["mine", "0.1 [0, 1]", "2"]]
-    )
-    lines = to_text("", [table], width=30).splitlines()
-    assert [line.split() for line in lines] == [
-        ["a", "very"], ["long", "head:"], ["method", "skill", "b"],
-        ["mine", "0.1", "[0,", "1]", "2"],
-    ]  # fmt: skip
-    assert len(to_text("", [table], width=60).splitlines()) == 2

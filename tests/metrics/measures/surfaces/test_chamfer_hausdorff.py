@@ -53,15 +53,6 @@ def test_scores_follow_their_definitions(seed):
     assert point_scores(nearest_distances(a, b)) == pytest.approx(expected_scores(a, b), rel=1e-9)
 
 
-@pytest.mark.parametrize("backend", ["pykdtree", "scipy"])
-def test_rooms_agree_with_brute_force(room_depth, backend):
-    if backend == "pykdtree":
-        pytest.importorskip("pykdtree")
-    a, b = room_clouds(room_depth)
-    scores = point_scores(nearest_distances(a, b, backend))
-    assert scores == pytest.approx(expected_scores(a, b), abs=1e-12, rel=1e-12)
-
-
 def test_agrees_with_point_cloud_utils(room_depth):
     pcu = pytest.importorskip("point_cloud_utils")
     for a, b in (room_clouds(room_depth), random_clouds(5)):
