@@ -190,8 +190,7 @@ def read_table(
     scans: list[tuple[Array, ...]] = []
     digests_of_images: list[bytes] = []
     tasks = cut(count, chunk if cluster is None else CHUNKS * chunk)
-    here: Callable[[], AbstractContextManager[QuestionsFile]] = partial(nullcontext, questions)
-    opening = here if cluster is None else questions.reopener()
+    opening = (lambda: nullcontext(questions)) if cluster is None else questions.reopener()
     scan = partial(_scan_images, opening, chunk, background, measured)
     for parts, digest in map(scan, tasks) if cluster is None else cluster.in_order(scan, tasks):
         scans += parts
