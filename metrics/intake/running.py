@@ -182,11 +182,8 @@ def _geometries(
                 )  # fmt: skip
             except OutputError as error:
                 raise error.inside(f"{model.name}: row {row}") from error
-            if (
-                model.metres
-                and geometry.alignment == "none"
-                and not getattr(rooms.spec, "in_metres", False)
-            ):
+            in_metres = bool(getattr(rooms.spec, "interior", None))
+            if model.metres and geometry.alignment == "none" and not in_metres:
                 geometry = replace(geometry, alignment="scale")
             yield row, geometry
 
