@@ -254,6 +254,8 @@ def _run_questions(
 ) -> str:  # fmt: skip
     from iqtt.files.reader import QuestionsFile
 
+    if model.named:
+        raise ModelError(model.name, f"questions in {data}", "rooms, whose depth it predicts")
     values = []
     with QuestionsFile(data) as questions:
         settings |= {"data": questions.fingerprint or ""}

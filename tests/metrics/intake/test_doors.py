@@ -113,7 +113,7 @@ def refused(name, **more):
     return caught.value
 
 
-def test_one_line_says_what_is_wrong(tmp_path, folders, monkeypatch):
+def test_one_line_says_what_is_wrong(tmp_path, folders, truths, monkeypatch):
     from transformers import BertConfig
 
     (tmp_path / "bert").mkdir()
@@ -140,6 +140,9 @@ def test_one_line_says_what_is_wrong(tmp_path, folders, monkeypatch):
         error = refused(name, settings=settings)
         assert error.where.startswith(name)
         assert "\n" not in f"{error}"
+    assert refused(f"hf:{broken}", python=tmp_path).where == "--python"
+    with opened_model(f"hf:{folders('dpt')}") as model, pytest.raises(ModelError):
+        run_model(model, truths.iqtt, tmp_path / "q.h5", call=Call(), method="m")
     hint = refused("moge:a/b").hint if importlib.util.find_spec("moge") is None else "dlr-moge"
     assert "dlr-moge" in hint
 
