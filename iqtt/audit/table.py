@@ -190,7 +190,9 @@ def read_table(
     scans: list[tuple[Array, ...]] = []
     digests_of_images: list[bytes] = []
     tasks = cut(count, chunk if cluster is None else CHUNKS * chunk)
-    opening = (lambda: nullcontext(questions)) if cluster is None else questions.reopener()
+    opening: Callable[[], AbstractContextManager[QuestionsFile]] = questions.reopener()
+    if cluster is None:
+        opening = lambda: nullcontext(questions)  # noqa: E731
     scan = partial(_scan_images, opening, chunk, background, measured)
     for parts, digest in map(scan, tasks) if cluster is None else cluster.in_order(scan, tasks):
         scans += parts
