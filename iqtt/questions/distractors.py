@@ -293,8 +293,8 @@ def arrange(drawn: Drawn, answer: int, rng: np.random.Generator) -> Shapes:
 
 
 # Which of (shape, its mirror image, near shape) are the right answer and the two distractors, and
-# of what kinds these are. Where the near shape is right, the shape is near to it, and its mirror
-# image is `near-mirror`.
+# of what kinds these are. Where the mirror image is right, the near shape is near to what that
+# mirrors, so it is `near-mirror`. Where the near shape is right, the mirror image is so to it.
 _MIRROR_ROLES = np.array(
-    [[[0, 1, 2], [-1, 2, 1]], [[1, 0, 2], [-1, 2, 1]], [[2, 0, 1], [-1, 1, 4]]]
+    [[[0, 1, 2], [-1, 2, 1]], [[1, 0, 2], [-1, 2, 4]], [[2, 0, 1], [-1, 1, 4]]]
 )

@@ -64,7 +64,7 @@ def labels(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that each wrong answer is to the reference what its label says.
 
     A `mirror` is its mirror image. All others are neither it nor its mirror image: a `near` is it
-    with one cube moved, and a `near-mirror` is the mirror image of an answer labelled `near`.
+    with one cube moved, and a `near-mirror` is its mirror image with one cube moved.
     """
     wrong = []
     for table, its_shapes in zip(tables, shapes, strict=True):
@@ -77,23 +77,26 @@ def labels(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
         known = np.isin(table.truth["distractor_kind"], range(len(DISTRACTOR_KINDS)))
         bad |= known & ~mirror & of_reference
         bad |= near & ~_one_cube_moved(table, its_shapes, near)
-        # (Q, answer, answer): a mirror image of a near answer.
-        mirrors = classes[:, 1:, None] == classes[:, None, 1:]
-        mirrors &= (names[:, 1:, None] != names[:, None, 1:]) & near[:, None]
-        bad |= near_mirror & ~mirrors.any(axis=2)
+        bad |= near_mirror & ~_one_cube_moved(table, its_shapes, near_mirror, mirrored=True)
         wrong.append(bad.any(axis=1) & its_shapes.whole)
     return judge(
         "labels",
         "mirror: the reference's mirror image; near: the reference with one cube moved;"
-        " near-mirror: a near answer's mirror image; none but mirror is the reference's",
+        " near-mirror: its mirror image with one cube moved; none but mirror is its mirror image",
         tables,
         wrong,
         lambda t, row: f"kinds {tables[t].truth['distractor_kind'][row].tolist()} are not so",
     )
 
 
-def _one_cube_moved(table: AuditTable, shapes: Shapes, chosen: Array) -> Array:
-    """Return which of the chosen answers are the reference with one cube moved, (Q, K) bool."""
+def _one_cube_moved(
+    table: AuditTable, shapes: Shapes, chosen: Array, mirrored: bool = False
+) -> Array:
+    """Return which of the chosen answers are the reference with one cube moved, (Q, K) bool.
+
+    With `mirrored` it is the reference's mirror image.
+    """
+    sides = np.array([-1 if mirrored else 1, 1, 1])
     result = np.zeros(chosen.shape, np.bool_)
     chosen = chosen & shapes.whole[:, None]
     for n in np.unique(shapes.count[chosen.any(axis=1)]).tolist():
@@ -103,7 +106,7 @@ def _one_cube_moved(table: AuditTable, shapes: Shapes, chosen: Array) -> Array:
             reference, other = (
                 table.cubes[row, image, :n].astype(np.int64) for image in (0, 1 + answer)
             )
-            result[row, answer] = _all_but_one_coincide(reference, other)
+            result[row, answer] = _all_but_one_coincide(reference * sides, other)
     return result
 
 
