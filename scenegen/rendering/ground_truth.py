@@ -24,6 +24,8 @@ class GroundTruth:
         object_id: (B, H, W) int8; -1 nothing, 0 the room, k the k-th object, counting from 1.
         albedo: linear RGB reflectance, (B, H, W, 3) float32, NaN where the ray hits nothing; None
             unless objects have colours of their own, as it then follows from object ids.
+        exposure: how pictures of closed rooms were developed, (B, 5) as
+            `pictures.development.EXPOSURE`; None for other images.
     """
 
     image: Array
@@ -31,6 +33,7 @@ class GroundTruth:
     normal: Array
     object_id: Array
     albedo: Array | None = None
+    exposure: Array | None = None
 
     def pixels(self) -> dict[str, Array]:
         """Return the fields that there are, by name."""

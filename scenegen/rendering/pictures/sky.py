@@ -1,0 +1,118 @@
+"""What is outside the windows: a map of radiance by direction, and the sun.
+
+The sky is Mitsuba's `sunsky`, after Hosek and Wilkie (2012). Below the horizon is ground that the
+sky lights, with a line of trees before the sky. A map has latitude and longitude as axes: row 0 is
+up, +y, and column 0 is -z, going on towards +x.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import mitsuba
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.description.interiors import Interior
+
+Array = NDArray[Any]
+mi: Any = mitsuba
+ROWS, COLUMNS = 128, 256
+LATITUDE = 47.0  # degrees, at an equinox: the sun rises at 6 and sets at 18
+SUNLESS = 2.0  # degrees of height below which there is no sun
+DUSK = 3.0  # degrees of height of the sun that lights the sky after sunset
+SUN_RADIANS = 0.00465  # apparent radius of the sun
+GROUND = (0.13, 0.14, 0.08)  # reflectance
+TREES = (0.035, 0.055, 0.02)
+NIGHT = (0.0018, 0.0024, 0.0045)  # radiance of the sky at night, relative to that by day
+
+
+@dataclass(frozen=True, eq=False)
+class Outside:
+    """What lights a room from outside.
+
+    Attributes:
+        radiance: linear RGB by direction, (rows, columns, 3) float32.
+        toward_sun: unit vector, world, (3,).
+        sunlight: irradiance at a surface that faces the sun, linear RGB, (3,).
+    """
+
+    radiance: Array
+    toward_sun: Array
+    sunlight: Array
+
+
+def sun_height(hour: float) -> float:
+    """Return the height of the sun above the horizon, in degrees."""
+    turn = math.cos(math.radians(15 * (hour - 12))) * math.cos(math.radians(LATITUDE))
+    return math.degrees(math.asin(turn))
+
+
+def directions(rows: int, columns: int) -> Array:
+    """Return the unit vectors of the pixels of a map, world, (rows, columns, 3)."""
+    down = (np.arange(rows) + 0.5)[:, None] / rows * np.pi
+    around = (np.arange(columns) + 0.5)[None] / columns * 2 * np.pi
+    flat = np.sin(down)
+    return np.stack([flat * np.sin(around), np.cos(down) + 0 * around, -flat * np.cos(around)], -1)
+
+
+def outside(interior: Interior) -> Outside:
+    """Return sky, ground and sun of a room's hour."""
+    height = sun_height(interior.hour)
+    # The sun moves from the left of noon's direction to the right.
+    azimuth = math.radians(interior.facing_degrees + 15 * (interior.hour - 12))
+    level, up = math.cos(math.radians(height)), math.sin(math.radians(height))
+    sun = np.array([level * math.sin(azimuth), up, -level * math.cos(azimuth)])
+    night = height < -6
+    shown = np.array([math.sin(azimuth), math.tan(math.radians(max(height, DUSK))),
+                      -math.cos(azimuth)])  # fmt: skip
+    shown /= np.linalg.norm(shown)
+    view = directions(ROWS, COLUMNS)
+    radiance = _sky(_direction_key(shown), 3.5 if height > 8 else 5.0)
+    if night:
+        radiance = np.broadcast_to(np.array(NIGHT, np.float32), radiance.shape).copy()
+    elif height < SUNLESS:
+        radiance = radiance * np.float32(max(0.02, 0.5 + height / 12))
+    sunlight = np.zeros(3)
+    if height > SUNLESS:
+        # Beer and Lambert through a clear atmosphere, by its optical depth in red, green and blue.
+        mass = 1 / (up + 0.15 * (height + 3.9) ** -1.25)
+        sunlight = 17.0 * np.exp(-np.array([0.16, 0.22, 0.36]) * mass)
+    above = view[..., 1] > 0
+    weights = np.maximum(view[..., 1], 0) * np.sqrt(np.maximum(1 - view[..., 1] ** 2, 0))
+    from_sky = np.pi * (radiance * weights[..., None]).sum((0, 1)) / weights.sum()
+    light = (from_sky + sunlight * max(up, 0.0)) / np.pi
+    haze = radiance[ROWS // 2 - 3].mean(axis=0)
+    distance = np.clip(-view[..., 1:2] * 6, 0, 1)
+    ground = np.array(GROUND) * light * distance + (1 - distance) * 0.35 * haze
+    radiance = np.where(above[..., None], radiance, ground)
+    turn = (np.arange(COLUMNS) + 0.5) / COLUMNS * 2 * np.pi
+    phase = interior.facing_degrees
+    line = 0.05 + 0.04 * np.sin(3 * turn + phase) + 0.02 * np.sin(11 * turn + 2 * phase)
+    line += 0.012 * np.sin(37 * turn + 3 * phase) + 0.008 * np.sin(71 * turn + 5 * phase)
+    trees = above & (view[..., 1] < line)
+    radiance = np.where(trees[..., None], np.array(TREES) * light * 1.4, radiance)
+    return Outside(np.asarray(radiance, np.float32), sun, sunlight)
+
+
+def _direction_key(direction: Array) -> tuple[float, float, float]:
+    x, y, z = (round(float(v), 3) for v in direction)
+    return x, y, z
+
+
+@lru_cache(maxsize=16)
+def _sky(sun: tuple[float, float, float], turbidity: float) -> Array:
+    """Return the radiance of the sky without the sun's disc, (ROWS, COLUMNS, 3)."""
+    x, y, z = sun
+    emitter = mi.load_dict({
+        "type": "sunsky", "sun_direction": [x, -z, y], "turbidity": turbidity, "sun_scale": 0.0,
+    })  # fmt: skip
+    view = directions(ROWS, COLUMNS).reshape(-1, 3)
+    view[:, 1] = np.abs(view[:, 1])
+    si = mi.SurfaceInteraction3f()
+    si = mi.SurfaceInteraction3f()
+    si.wi = -mi.Vector3f(*(np.float32(view[:, i]) for i in (0, 2, 1))) * mi.Vector3f(1, -1, 1)
+    found = np.array(emitter.eval(si), np.float32)
+    found = found.T if found.shape[0] == 3 else found
+    return found.reshape(ROWS, COLUMNS, 3)
