@@ -1,0 +1,225 @@
+"""Members of families as furniture: in metres, with texture coordinates, made of materials.
+
+Frame: y up, standing on y = 0, centred in x and z, the front faces +z.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from scenegen.objects.families.members import member_parts, member_rng
+from scenegen.objects.families.parts.draws import pick, span
+from scenegen.objects.families.parts.surfaces import Part, joined
+from scenegen.objects.solids import Array
+from scenegen.objects.unwrapping import corner_uv
+
+WHOLE = ("picture", "screen", "dial")  # materials whose map covers a piece once
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a family is, how large, and where it belongs.
+
+    Attributes:
+        name: of its class.
+        nyu40: number of its class in the NYU40 list of labels.
+        stands: where it may be: "floor", "wall" (hangs on it), "on" (a surface), "hung" (from the
+            ceiling), "window", "sill".
+        height, width: least and greatest, in metres; the width is that along x. A width of None
+            means that the builder works in metres; else the unit shape is scaled to the ranges.
+        seats: whether people sit on it.
+        surfaces: whether things stand on it.
+    """
+
+    name: str
+    nyu40: int
+    stands: tuple[str, ...]
+    height: tuple[float, float]
+    width: tuple[float, float] | None = None
+    seats: bool = False
+    surfaces: bool = False
+
+
+FAMILIES_FACTS = {
+    "bowl": Facts("bowl", 40, ("on",), (0.05, 0.12), (0.12, 0.3)),
+    "mug": Facts("mug", 40, ("on",), (0.08, 0.13), (0.09, 0.15)),
+    "bottle": Facts("bottle", 40, ("on",), (0.2, 0.33), (0.06, 0.14)),
+    "can": Facts("can", 40, ("on",), (0.08, 0.18), (0.06, 0.14)),
+    "lamp": Facts("lamp", 35, ("on",), (0.32, 0.6), (0.15, 0.4)),
+    "bag": Facts("bag", 37, ("floor", "on"), (0.25, 0.5), (0.2, 0.5)),
+    "cap": Facts("cap", 40, ("on",), (0.1, 0.2), (0.17, 0.32)),
+    "chair": Facts("chair", 5, ("floor",), (0.78, 1.0), (0.42, 0.75), seats=True),
+    "table": Facts("table", 7, ("floor",), (0.7, 0.77), (0.7, 1.9), surfaces=True),
+}
+# The materials of each role: of a part's name, or of all other parts ("").
+_ROLES: dict[str, dict[str, tuple[str, ...]]] = {
+    "bowl": {"": ("ceramic", "ceramic", "wood", "metal", "plastic")},
+    "mug": {"": ("ceramic",)},
+    "bottle": {"": ("plastic", "ceramic"), "closure": ("metal", "plastic")},
+    "can": {"": ("print", "metal")},
+    "lamp": {"": ("wood", "metal", "ceramic", "metal"), "shade": ("glow",)},
+    "bag": {"": ("fabric", "leather"), "strap": ("leather",)},
+    "cap": {"": ("fabric", "felt")},
+    "chair": {
+        "seat": ("wood", "wood", "fabric", "leather", "plastic"),
+        "back": ("wood",),
+        "legs": ("wood", "wood", "metal"),
+        "tub": ("fabric", "leather"),
+    },
+    "table": {"top": ("wood", "wood", "wood", "stone", "paint"), "legs": ("wood", "metal")},
+}
+_SHARED = ("wood", "metal", "glow", "leather")  # all parts of one object are of the same one
+
+
+@dataclass(frozen=True, eq=False)
+class Furnishing:
+    """A member of a family as a thing in a room.
+
+    Attributes:
+        family, number: which member.
+        vertices: in metres, (V, 3) float64.
+        faces: three vertices of each triangle, (F, 3), counter-clockwise seen from outside; the
+            parts are closed surfaces.
+        corner_uv: texture coordinates of the corners, (F, 3, 2), in metres; from 0 to 1 for
+            materials in `WHOLE`.
+        corner_normals: unit normals of the smooth surface at the corners, (F, 3, 3).
+        part: the index into `materials`, (F,) int16.
+        patch: the number of the closed surface that a face belongs to, (F,) int32.
+        materials: kinds of materials, as of `rendering.materials`. A kind occurs twice where two
+            parts are of different materials of the same kind.
+    """
+
+    family: str
+    number: int
+    vertices: Array
+    faces: Array
+    corner_uv: Array
+    corner_normals: Array
+    part: Array
+    patch: Array
+    materials: tuple[str, ...]
+
+
+@lru_cache(maxsize=256)
+def furnishing(family: str, number: int) -> Furnishing:
+    """Return a family's member as furniture. Raises SpecError as `members.check_member`."""
+    rng = member_rng(family, number, 1)
+    parts = member_parts(family, number)
+    scale = _scale(family, parts, rng)
+    kinds, index = _materials(family, [part.material for part in parts], rng)
+    meshes, uv, normals = [], [], []
+    for part, i in zip(parts, index, strict=True):
+        vertices = part.vertices * scale
+        smooth = part.normals / scale
+        smooth /= np.linalg.norm(smooth, axis=1, keepdims=True)
+        meshes.append((vertices, part.faces, smooth))
+        normals.append(smooth[part.faces])
+        uv.append(corner_uv(part, vertices, whole=kinds[i] in WHOLE))
+    vertices, faces, _ = joined(meshes)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    vertices -= [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]
+    counts = [len(part.faces) for part in parts]
+    pieces = [part.pieces for part in parts]
+    sizes = np.repeat(np.divide(counts, pieces).astype(int), pieces)
+    return Furnishing(
+        family,
+        number,
+        vertices,
+        faces,
+        corner_uv=np.concatenate(uv),
+        corner_normals=np.concatenate(normals),
+        part=np.repeat(np.array(index, np.int16), counts),
+        patch=np.repeat(np.arange(len(sizes), dtype=np.int32), sizes),
+        materials=kinds,
+    )
+
+
+def _scale(family: str, parts: list[Part], rng: np.random.Generator) -> Array:
+    """Return the factors from the builder's units to metres, (3,); those of x and z are equal.
+
+    A member keeps its proportions as far as the ranges of height and width allow.
+    """
+    facts = FAMILIES_FACTS[family]
+    height = span(rng, *facts.height)
+    if facts.width is None:
+        return np.ones(3)
+    extent = np.ptp(np.concatenate([part.vertices for part in parts]), axis=0)
+    up = height / float(extent[1])
+    wide = min(max(up * float(extent[0]), facts.width[0]), facts.width[1])
+    sideways = wide / float(extent[0])
+    return np.array([sideways, up, sideways])
+
+
+def _materials(
+    family: str, names: list[str], rng: np.random.Generator
+) -> tuple[tuple[str, ...], list[int]]:
+    """Return the kinds of a member's materials, and the index of each part's."""
+    roles, kinds, number_of = _ROLES.get(family, {}), [], {}
+    for name in dict.fromkeys(names):
+        kind = pick(rng, roles.get(name, (name,)))
+        if kind in _SHARED and kind in kinds:
+            number_of[name] = kinds.index(kind)
+            continue
+        number_of[name] = len(kinds)
+        kinds.append(kind)
+    return tuple(kinds), [number_of[name] for name in names]
+
+
+Rectangle = tuple[float, float, float, float, float]
+CLEAR = 0.12  # metres of free height above a support
+LEAST_SIDE = 0.08  # metres, of a support
+_GRID = np.linspace(-1.0, 1.0, 9)
+
+
+def supports(thing: Furnishing) -> list[Rectangle]:
+    """Return horizontal rectangles (y, x0, x1, z0, z1) on which things can stand, in metres.
+
+    They lie on tops, boards and seats, with at least CLEAR of free height above them. The lowest
+    come first. There are none on a thing whose family has neither surfaces nor seats.
+    """
+    facts = FAMILIES_FACTS[thing.family]
+    if not (facts.surfaces or facts.seats):
+        return []
+    corners = thing.vertices[thing.faces]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(a, b)
+    level = (np.ptp(corners[..., 1], axis=1) < 1e-6) & (normal[:, 1] > 0.0)
+    patches = thing.patch[level]
+    heights = np.round(corners[level, 0, 1], 4)
+    found = []
+    for patch, y in sorted({*zip(patches.tolist(), heights.tolist(), strict=True)}):
+        points = corners[level][(patches == patch) & (heights == y)].reshape(-1, 3)
+        low, high = points.min(axis=0), points.max(axis=0)
+        middle, half = (low + high) / 2, (high - low) / 2
+        for share in (0.97, 0.85, 0.7, 0.55):
+            x, z = share * half[0], share * half[2]
+            if min(x, z) < LEAST_SIDE / 2:
+                break
+            grid = np.stack(np.meshgrid(x * _GRID, z * _GRID), axis=-1).reshape(-1, 2)
+            if _is_free(corners, grid + middle[::2], float(points[0, 1])):
+                found.append((float(points[0, 1]), middle[0] - x, middle[0] + x,
+                              middle[2] - z, middle[2] + z))  # fmt: skip
+                break
+    return sorted(tuple(map(float, rectangle)) for rectangle in found)
+
+
+def _is_free(corners: Array, places: Array, y: float) -> bool:
+    """Return whether all places (x, z), (P, 2), are on a surface at y, with nothing above them."""
+    near = (corners[..., 1].max(axis=1) > y - 1e-6) & (corners[..., 1].min(axis=1) < y + CLEAR)
+    a, b, c = corners[near].swapaxes(0, 1)
+
+    def side(p: Array, q: Array) -> Array:
+        """Return on which side of the lines p-q the places lie, seen from above, (F, P)."""
+        ahead, across = q[:, ::2] - p[:, ::2], places[None] - p[:, None, ::2]
+        return ahead[:, :1] * across[..., 1] - ahead[:, 1:] * across[..., 0]
+
+    u, v, w = side(b, c), side(c, a), side(a, b)
+    total = u + v + w
+    inside = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0))
+    inside &= np.abs(total) > 1e-12
+    share = np.stack([u, v, w]) / np.where(inside, total, 1.0)
+    height = np.einsum("kfp,kf->fp", share, np.stack([a[:, 1], b[:, 1], c[:, 1]]))
+    on = inside & (np.abs(height - y) < 1e-5)
+    above = inside & (height > y + 1e-4) & (height < y + CLEAR)
+    return bool(on.any(axis=0).all() and not above.any())
