@@ -14,21 +14,22 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.rendering.pictures.sky import Outside
+
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
-WINDOWS = 4  # slots for windows: the same for all scenes, so that they share a kernel
+WINDOWS = 3  # slots for windows: the same for all scenes, so that they share a kernel
 FAR = 100.0  # metres, of what is outside
+SUN_SHARE = 0.4  # of the samples
 
 
-def daylight(radiance: Array, windows: Array) -> Any:
+def daylight(outside: Outside, windows: Array) -> Any:
     """Return an emitter of the current Mitsuba variant.
 
-    Args:
-        radiance: map by direction, (rows, columns, 3), as of `sky.Outside`.
-        windows: corner and two edges of each, world, (N, 3, 3), with N up to WINDOWS.
+    `windows` are corner and two edges of each, world, (N, 3, 3), with N up to WINDOWS.
     """
-    return _daylight_class(mi.variant())(radiance, windows)
+    return _daylight_class(mi.variant())(outside, windows)
 
 
 @cache
@@ -38,10 +39,13 @@ def _daylight_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
     class Daylight(mi.Emitter):  # type: ignore[misc]
         """The emitter."""
 
-        def __init__(self, radiance: Array, windows: Array) -> None:
+        def __init__(self, outside: Outside, windows: Array) -> None:
             mi.Emitter.__init__(self, mi.Properties())
-            rows, columns = radiance.shape[:2]
-            self.map = mi.Float(np.ascontiguousarray(radiance, np.float32).ravel())
+            rows, columns = outside.radiance.shape[:2]
+            self.map = mi.Float(np.ascontiguousarray(outside.radiance, np.float32).ravel())
+            shines = outside.sunlight.max() > 0
+            sun = [*outside.toward_sun, SUN_SHARE * shines, *outside.sunlight]
+            self.sun = [dr.opaque(mi.Float, float(value)) for value in sun]
             self.rows, self.columns = dr.opaque(mi.Float, rows), dr.opaque(mi.Float, columns)
             table = np.zeros((WINDOWS, 16), np.float32)
             table[: len(windows), :9] = windows.reshape(-1, 9)
@@ -55,7 +59,7 @@ def _daylight_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
             table[: len(windows), 14] = 1 / (windows[:, 2] ** 2).sum(axis=1)
             self.windows = mi.Float(table.ravel())
             self.area = dr.opaque(mi.Float, float(max(area.sum(), 1e-9)))
-            self.m_flags = mi.UInt32(+mi.EmitterFlags.Infinite) if False else +mi.EmitterFlags.Infinite
+            self.m_flags = +mi.EmitterFlags.Infinite
 
         def _window(self, slot: Any) -> tuple[Any, ...]:
             rows = [dr.gather(mi.Vector4f, self.windows, slot * 4 + i) for i in range(4)]
@@ -91,39 +95,43 @@ def _daylight_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
                 a, b = dr.dot(at, u) * uu, dr.dot(at, v) * vv
                 hit = (t > 0) & (a >= 0) & (a <= 1) & (b >= 0) & (b <= 1) & (uu > 0)
                 total += dr.select(hit & (cosine != 0), t * t / dr.abs(cosine), 0)
-            return total / self.area
+            return total * (1 - self.sun[3]) / self.area
 
         def sample_direction(self, it: Any, sample: Any, active: Any = True) -> Any:
-            """Sample a point of the windows."""
-            start, end, chosen = mi.Float(0), mi.Float(0), mi.UInt32(0)
-            before = mi.Float(0)
-            end = mi.Float(1)
+            """Sample the sun, or a point of the windows."""
+            share_of_sun = self.sun[3]
+            at_sun = sample.x < share_of_sun
+            x = (sample.x - share_of_sun) / (1 - share_of_sun)
+            start, before, end, chosen = mi.Float(0), mi.Float(0), mi.Float(1), mi.UInt32(0)
             for slot in range(WINDOWS):
                 share = self._window(mi.UInt32(slot))[4]
-                inside = (sample.x >= before) & (sample.x < share)
+                inside = (x >= before) & (x < share)
                 chosen = dr.select(inside, slot, chosen)
                 start = dr.select(inside, before, start)
                 end = dr.select(inside, share, end)
                 before = dr.minimum(share, 1)
             end = dr.minimum(end, 1)
-            x = dr.clip((sample.x - start) / dr.maximum(end - start, 1e-6), 0, 1)
+            x = dr.clip((x - start) / dr.maximum(end - start, 1e-6), 0, 1)
             o, u, v, _, _, uu, _ = self._window(chosen)
             p = o + x * u + sample.y * v
             to = p - it.p
             d = to / dr.sqrt(dr.maximum(dr.dot(to, to), 1e-12))
-            density = self._density(mi.Vector3f(it.p), d)
-            active = active & (density > 0) & (uu > 0)
+            toward_sun = mi.Vector3f(*self.sun[:3])
+            d = dr.select(at_sun, toward_sun, d)
+            density = dr.select(at_sun, share_of_sun, self._density(mi.Vector3f(it.p), d))
+            active = active & (density > 0) & ((uu > 0) | at_sun)
             ds = dr.zeros(mi.DirectionSample3f)
             ds.p = mi.Point3f(it.p) + d * FAR
             ds.n = -mi.Normal3f(d)
             ds.uv = mi.Point2f(x, sample.y)
             ds.time = it.time
             ds.pdf = dr.select(active, density, 0)
-            ds.delta = mi.Bool(False)
+            ds.delta = at_sun
             ds.emitter = mi.EmitterPtr(self)
             ds.d = d
             ds.dist = mi.Float(FAR)
-            return ds, dr.select(active, self._radiance(d) / density, 0)
+            light = dr.select(at_sun, mi.Color3f(*self.sun[4:]), self._radiance(d))
+            return ds, dr.select(active, light / density, 0)
 
         def pdf_direction(self, it: Any, ds: Any, active: Any = True) -> Any:
             """Return the probability density of `sample_direction`."""

@@ -18,10 +18,11 @@ from scenegen.rendering.packing import SceneBatch
 Array = NDArray[Any]
 TEXEL_RANGE = 255.0
 GLOW = "glow"
-LAMP_FLUX = 0.35  # of a lamp, in the units of the sky's radiance times square metres
-CEILING_FLUX = 1.6
+LAMP_FLUX = 0.03  # of a lamp, in the units of the sky's radiance times square metres
+CEILING_FLUX = 0.1
 WARM = (1.0, 0.72, 0.44)  # linear RGB of lamps, of some 3000 K
-OUT_OF_SIGHT = -50.0  # metres, where the triangle is that stands for lamps in rooms without any
+OUT_OF_SIGHT = -50.0  # metres, where dark triangles are that stand for lamps
+LEAST_SHINING = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,10 +134,12 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool) -> Matter:
     corners, normals, uv, of_face = (
         np.concatenate(x) for x in zip(*collected.parts, strict=True)
     )
-    if not collected.glowing:
-        triangle = np.array([[[0, 0, 0], [1, 0, 0], [0, 0, 1]]]) + [0, OUT_OF_SIGHT, 0]
-        collected.glowing.append((triangle, np.tile([0.0, 1.0, 0.0], (1, 3, 1)),
-                                  np.zeros((1, 3, 2)), np.zeros((1, 3))))  # fmt: skip
+    # A kernel counts the triangles that shine by powers of two: so all have about as many.
+    count = sum(len(part[0]) for part in collected.glowing)
+    more = max(LEAST_SHINING, 1 << count.bit_length()) - count
+    triangle = np.array([[[0, 0, 0], [1e-3, 0, 0], [0, 0, 1e-3]]]) + [0, OUT_OF_SIGHT, 0]
+    dark = (triangle, np.tile([0.0, 1.0, 0.0], (1, 3, 1)), np.zeros((1, 3, 2)), np.zeros((1, 3)))
+    collected.glowing.append(tuple(np.repeat(part, more, axis=0) for part in dark))  # type: ignore[arg-type]
     shining, shining_normals, shining_uv, radiance = (
         np.concatenate(x) for x in zip(*collected.glowing, strict=True)
     )

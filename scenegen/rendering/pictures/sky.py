@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
+import drjit
 import mitsuba
 import numpy as np
 from numpy.typing import NDArray
@@ -17,15 +18,17 @@ from numpy.typing import NDArray
 from scenegen.description.interiors import Interior
 
 Array = NDArray[Any]
+dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
 ROWS, COLUMNS = 128, 256
 LATITUDE = 47.0  # degrees, at an equinox: the sun rises at 6 and sets at 18
 SUNLESS = 2.0  # degrees of height below which there is no sun
 DUSK = 3.0  # degrees of height of the sun that lights the sky after sunset
-SUN_RADIANS = 0.00465  # apparent radius of the sun
+SUN = 1.7  # irradiance above the atmosphere, in the units of `sunsky`
+TURBIDITY = 4.0  # of the air: 2 is very clear
 GROUND = (0.13, 0.14, 0.08)  # reflectance
 TREES = (0.035, 0.055, 0.02)
-NIGHT = (0.0018, 0.0024, 0.0045)  # radiance of the sky at night, relative to that by day
+NIGHT = (3e-5, 4e-5, 7e-5)  # radiance of the sky at night
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +72,7 @@ def outside(interior: Interior) -> Outside:
                       -math.cos(azimuth)])  # fmt: skip
     shown /= np.linalg.norm(shown)
     view = directions(ROWS, COLUMNS)
-    radiance = _sky(_direction_key(shown), 3.5 if height > 8 else 5.0)
+    radiance = _sky(_direction_key(shown))
     if night:
         radiance = np.broadcast_to(np.array(NIGHT, np.float32), radiance.shape).copy()
     elif height < SUNLESS:
@@ -78,7 +81,7 @@ def outside(interior: Interior) -> Outside:
     if height > SUNLESS:
         # Beer and Lambert through a clear atmosphere, by its optical depth in red, green and blue.
         mass = 1 / (up + 0.15 * (height + 3.9) ** -1.25)
-        sunlight = 17.0 * np.exp(-np.array([0.16, 0.22, 0.36]) * mass)
+        sunlight = SUN * np.exp(-np.array([0.16, 0.22, 0.36]) * mass)
     above = view[..., 1] > 0
     weights = np.maximum(view[..., 1], 0) * np.sqrt(np.maximum(1 - view[..., 1] ** 2, 0))
     from_sky = np.pi * (radiance * weights[..., None]).sum((0, 1)) / weights.sum()
@@ -102,17 +105,26 @@ def _direction_key(direction: Array) -> tuple[float, float, float]:
 
 
 @lru_cache(maxsize=16)
-def _sky(sun: tuple[float, float, float], turbidity: float) -> Array:
+def _sky(sun: tuple[float, float, float]) -> Array:
     """Return the radiance of the sky without the sun's disc, (ROWS, COLUMNS, 3)."""
+    emitter, parameters = _sunsky(mi.variant())
     x, y, z = sun
-    emitter = mi.load_dict({
-        "type": "sunsky", "sun_direction": [x, -z, y], "turbidity": turbidity, "sun_scale": 0.0,
-    })  # fmt: skip
-    view = directions(ROWS, COLUMNS).reshape(-1, 3)
-    view[:, 1] = np.abs(view[:, 1])
-    si = mi.SurfaceInteraction3f()
-    si = mi.SurfaceInteraction3f()
-    si.wi = -mi.Vector3f(*(np.float32(view[:, i]) for i in (0, 2, 1))) * mi.Vector3f(1, -1, 1)
-    found = np.array(emitter.eval(si), np.float32)
-    found = found.T if found.shape[0] == 3 else found
+    toward = mi.Vector3f(*(mi.Float([value]) for value in (x, -z, y)))
+    dr.make_opaque(toward)  # so that all hours share a kernel
+    parameters["sun_direction"] = toward
+    parameters.update()
+    view = directions(ROWS, COLUMNS).reshape(-1, 3).astype(np.float32)
+    si = dr.zeros(mi.SurfaceInteraction3f, len(view))
+    # Its z is up, and `wi` points back.
+    si.wi = mi.Vector3f(-view[:, 0], view[:, 2], -np.abs(view[:, 1]))
+    channels = [*emitter.eval(si)]
+    dr.eval(channels)
+    found = np.stack([np.asarray(channel, np.float32) for channel in channels], -1)
     return found.reshape(ROWS, COLUMNS, 3)
+
+
+@lru_cache(maxsize=4)
+def _sunsky(variant: str) -> tuple[Any, Any]:  # noqa: ARG001 - part of the key
+    emitter = mi.load_dict({"type": "sunsky", "sun_direction": [0, 0, 1], "turbidity": TURBIDITY,
+                            "sun_scale": 0.0})  # fmt: skip
+    return emitter, mi.traverse(emitter)

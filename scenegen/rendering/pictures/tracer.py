@@ -50,13 +50,13 @@ def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Arr
     spec = batch.spec
     interior = from_json(Interior, batch.interior[b], "interior")
     matter = gather_matter(batch, b, interior.lit)
-    scene, bsdf = _scene(interior, matter)
+    scene = _scene(interior, matter)
     integrator = mi.load_dict({
         "type": "path", "max_depth": MAX_DEPTH, "rr_depth": ROULETTE_DEPTH,
     })  # fmt: skip
     pixels = spec.height * spec.width
-    right, up, back, origin = (mi.Vector3f(*v) for v in batch.world_from_camera[b, :3].T.tolist())
-    size = pixel_size(spec.height, float(batch.fov_y_degrees[b]))
+    camera = _camera(batch, b)
+    right, up, back, origin, size = camera
     places = sample_positions(spec.spp)
     total = np.zeros((pixels, 10))
     at_once = max(1, RAYS_AT_ONCE // pixels)
@@ -80,9 +80,9 @@ def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Arr
         hit = si.is_valid()
         albedo = dr.select(hit, si.bsdf().eval_diffuse_reflectance(si, hit), 1)
         normal = dr.select(hit, si.sh_frame.n, 0)
-        values = np.stack(
-            [np.asarray(v, np.float32) for v in (*radiance, *albedo, *normal, mi.Float(hit))], -1
-        )
+        planes = [*radiance, *albedo, *normal, dr.select(hit, mi.Float(1), 0)]
+        dr.eval(planes)  # at once: each would trace the paths again
+        values = np.stack([np.asarray(plane, np.float32) for plane in planes], -1)
         values[:, :3] = np.minimum(np.nan_to_num(values[:, :3]), _ceiling(values[:, :3]))
         total += values.reshape(pixels, count, 10).sum(axis=1, dtype=np.float64)
     mean = (total / spec.spp).reshape(spec.height, spec.width, 10)
@@ -96,8 +96,19 @@ def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Arr
     image, exposure = develop(radiance, albedo, hit[..., 0] > 0.5, spec.image_dtype, noise)
     found = {"image": image, "exposure": exposure}
     if "albedo" in names:
-        found["albedo"] = _albedo(batch, b, scene, bsdf, (right, up, back, origin), size)
+        found["albedo"] = _albedo(batch, b, scene, camera)
     return found
+
+
+def _camera(batch: SceneBatch, b: int) -> tuple[Any, ...]:
+    """Return right, up, back and position of a camera, and the size of a pixel at depth 1.
+
+    They are variables, so that all cameras share a kernel.
+    """
+    size = pixel_size(batch.spec.height, float(batch.fov_y_degrees[b]))
+    numbers = [*batch.world_from_camera[b, :3].T.ravel().tolist(), size]
+    values = [dr.opaque(mi.Float, float(number)) for number in numbers]
+    return *(mi.Vector3f(*values[i : i + 3]) for i in (0, 3, 6, 9)), values[12]
 
 
 def _ceiling(radiance: Array) -> float:
@@ -106,10 +117,10 @@ def _ceiling(radiance: Array) -> float:
     return BRIGHTEST * max(middle, 1e-6)
 
 
-def _albedo(batch: SceneBatch, b: int, scene: Any, bsdf: Any, camera: Any, size: float) -> Array:
+def _albedo(batch: SceneBatch, b: int, scene: Any, camera: Any) -> Array:
     """Return the base colour where the ray through each pixel's centre hits; NaN for nothing."""
     spec = batch.spec
-    right, up, back, origin = camera
+    right, up, back, origin, size = camera
     index = dr.arange(mi.UInt32, spec.height * spec.width)
     x = mi.Float(index % spec.width) + 0.5
     y = mi.Float(index // spec.width) + 0.5
@@ -120,22 +131,15 @@ def _albedo(batch: SceneBatch, b: int, scene: Any, bsdf: Any, camera: Any, size:
     return values.reshape(spec.height, spec.width, 3)
 
 
-def _scene(interior: Interior, matter: Matter) -> tuple[Any, Any]:
-    """Return the scene, of the same form for all rooms, and the material of its surfaces."""
-    bsdf = matter_bsdf(matter.tables)
-    around = outside(interior)
+def _scene(interior: Interior, matter: Matter) -> Any:
+    """Return the scene, of the same form for all rooms."""
     contents: dict[str, Any] = {
         "type": "scene",
-        "matter": _mesh("matter", matter.soup, bsdf=bsdf),
+        "matter": _mesh("matter", matter.soup, bsdf=matter_bsdf(matter.tables)),
         "glow": _mesh("glow", matter.glowing, radiance=matter.radiance),
-        "day": daylight(around.radiance, windows_of(interior)),
-        "sun": {
-            "type": "directional",
-            "direction": [-float(v) for v in around.toward_sun],
-            "irradiance": {"type": "rgb", "value": [float(v) for v in around.sunlight]},
-        },
+        "day": daylight(outside(interior), windows_of(interior)),
     }
-    return mi.load_dict(contents), bsdf
+    return mi.load_dict(contents)
 
 
 def windows_of(interior: Interior) -> Array:
