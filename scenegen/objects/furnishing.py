@@ -8,13 +8,14 @@ from functools import lru_cache
 
 import numpy as np
 
+from scenegen.objects.coarse_hulls import POINT_STEP, rounded
 from scenegen.objects.families.members import member_parts, member_rng
 from scenegen.objects.families.parts.draws import pick, span
 from scenegen.objects.families.parts.surfaces import Part, joined
 from scenegen.objects.solids import Array
 from scenegen.objects.unwrapping import corner_uv
 
-WHOLE = ("picture", "screen", "dial")  # materials whose map covers a piece once
+WHOLE = ("picture", "screen", "dial", "rug", "leaf")  # materials whose map covers a piece once
 
 
 @dataclass(frozen=True)
@@ -51,8 +52,41 @@ FAMILIES_FACTS = {
     "cap": Facts("cap", 40, ("on",), (0.1, 0.2), (0.17, 0.32)),
     "chair": Facts("chair", 5, ("floor",), (0.78, 1.0), (0.42, 0.75), seats=True),
     "table": Facts("table", 7, ("floor",), (0.7, 0.77), (0.7, 1.9), surfaces=True),
+    "sofa": Facts("sofa", 6, ("floor",), (0.68, 1.0), seats=True),
+    "armchair": Facts("armchair", 6, ("floor",), (0.68, 1.0), seats=True),
+    "stool": Facts("stool", 5, ("floor",), (0.34, 0.78), seats=True),
+    "shelf": Facts("shelf", 15, ("floor",), (0.6, 2.1), surfaces=True),
+    "cabinet": Facts("cabinet", 3, ("floor",), (0.55, 2.15), surfaces=True),
+    "nightstand": Facts("night stand", 32, ("floor",), (0.4, 0.62), surfaces=True),
+    "desk": Facts("desk", 14, ("floor",), (0.71, 0.77), surfaces=True),
+    "coffee_table": Facts("coffee table", 7, ("floor",), (0.34, 0.48), surfaces=True),
+    "bed": Facts("bed", 4, ("floor",), (0.7, 1.2), seats=True),
+    "cushion": Facts("cushion", 18, ("seat",), (0.25, 0.55)),
+    "curtain": Facts("curtain", 16, ("window",), (1.9, 2.4)),
+    "rug": Facts("rug", 20, ("floor",), (0.004, 0.02)),
+    "plate": Facts("plate", 40, ("on",), (0.01, 0.07)),
+    "cup": Facts("cup", 40, ("on",), (0.05, 0.1)),
+    "vase": Facts("vase", 40, ("on", "sill"), (0.13, 0.9)),
+    "basket": Facts("basket", 40, ("floor", "on"), (0.19, 0.46)),
+    "book": Facts("book", 23, ("on",), (0.009, 0.2)),
+    "books": Facts("books", 23, ("on",), (0.14, 0.31)),
+    "box": Facts("box", 29, ("floor", "on"), (0.1, 0.55)),
+    "picture": Facts("picture", 11, ("wall",), (0.15, 0.95)),
+    "screen": Facts("screen", 25, ("on",), (0.35, 0.85)),
+    "clock": Facts("clock", 40, ("wall",), (0.22, 0.42)),
+    "floor_lamp": Facts("floor lamp", 35, ("floor",), (1.4, 1.75), (0.32, 0.55)),
+    "pendant": Facts("pendant lamp", 35, ("hung",), (0.35, 1.0)),
+    "plant": Facts("plant", 40, ("on", "sill"), (0.15, 0.65)),
+    "tall_plant": Facts("tall plant", 40, ("floor",), (0.6, 1.8)),
 }
-# The materials of each role: of a part's name, or of all other parts ("").
+_CASE = {
+    "case": ("wood", "paint"),
+    "front": ("wood", "paint", "paint"),
+    "handle": ("metal",),
+    "feet": ("wood", "metal"),
+}
+# The materials of each role: of a part's name, or of all other parts (""). A part's name is a
+# material where the table lacks it; what follows a space tells materials of one kind apart.
 _ROLES: dict[str, dict[str, tuple[str, ...]]] = {
     "bowl": {"": ("ceramic", "ceramic", "wood", "metal", "plastic")},
     "mug": {"": ("ceramic",)},
@@ -68,6 +102,54 @@ _ROLES: dict[str, dict[str, tuple[str, ...]]] = {
         "tub": ("fabric", "leather"),
     },
     "table": {"top": ("wood", "wood", "wood", "stone", "paint"), "legs": ("wood", "metal")},
+    "sofa": {"cover": ("fabric", "fabric", "leather"), "feet": ("wood", "metal")},
+    "armchair": {"cover": ("fabric", "fabric", "leather"), "feet": ("wood", "metal")},
+    "stool": {
+        "seat": ("wood", "wood", "plastic"),
+        "cover": ("fabric", "leather"),
+        "legs": ("wood", "wood", "metal"),
+    },
+    "shelf": {"board": ("wood", "wood", "paint"), "back": ("wood", "paint")},
+    "cabinet": _CASE,
+    "nightstand": _CASE,
+    "desk": {
+        "top": ("wood", "wood", "paint"),
+        "case": ("paint", "wood"),
+        "front": ("paint", "wood"),
+        "handle": ("metal",),
+        "legs": ("wood", "metal"),
+    },
+    "coffee_table": {"top": ("wood", "wood", "stone"), "legs": ("wood", "metal")},
+    "bed": {
+        "frame": ("wood", "wood", "paint"),
+        "cover": ("fabric", "leather"),
+        "sheet": ("linen",),
+        "blanket": ("linen", "fabric", "fabric"),
+        "throw": ("fabric",),
+    },
+    "cushion": {"": ("fabric",)},
+    "curtain": {"cloth": ("linen", "fabric"), "rail": ("metal",)},
+    "rug": {"": ("rug",)},
+    "plate": {"": ("ceramic",)},
+    "cup": {"": ("ceramic",), "drink": ("drink",)},
+    "vase": {"": ("ceramic", "ceramic", "terracotta"), "stem": ("stem",)},
+    "basket": {"": ("wicker",)},
+    "book": {"pages": ("paper",)},
+    "books": {"pages": ("paper",)},
+    "box": {
+        "card": ("cardboard",),
+        "tape": ("plastic",),
+        "slats": ("wood",),
+        "body": ("cardboard", "print", "felt"),
+        "lid": ("cardboard", "print", "felt"),
+    },
+    "picture": {"frame": ("wood", "paint", "metal"), "mount": ("paper",)},
+    "screen": {"case": ("black",), "stand": ("black", "metal")},
+    "clock": {"rim": ("wood", "metal", "black"), "hand": ("black",)},
+    "floor_lamp": {"": ("wood", "metal", "metal"), "shade": ("glow",)},
+    "pendant": {"metal": ("metal",), "shade": ("glow",), "metal shade": ("paint", "metal", "plastic")},
+    "plant": {"pot": ("ceramic", "terracotta", "wicker")},
+    "tall_plant": {"pot": ("ceramic", "terracotta", "wicker"), "trunk": ("stem",)},
 }
 _SHARED = ("wood", "metal", "glow", "leather")  # all parts of one object are of the same one
 
@@ -119,6 +201,7 @@ def furnishing(family: str, number: int) -> Furnishing:
     vertices, faces, _ = joined(meshes)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
     vertices -= [(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]
+    vertices = rounded(vertices, POINT_STEP)  # cosines differ in their last bits between machines
     counts = [len(part.faces) for part in parts]
     pieces = [part.pieces for part in parts]
     sizes = np.repeat(np.divide(counts, pieces).astype(int), pieces)
@@ -157,7 +240,7 @@ def _materials(
     """Return the kinds of a member's materials, and the index of each part's."""
     roles, kinds, number_of = _ROLES.get(family, {}), [], {}
     for name in dict.fromkeys(names):
-        kind = pick(rng, roles.get(name, (name,)))
+        kind = pick(rng, roles.get(name, (name.split()[0] if name else name,)))
         if kind in _SHARED and kind in kinds:
             number_of[name] = kinds.index(kind)
             continue

@@ -28,14 +28,18 @@ def corner_uv(part: Part, vertices: Array, *, whole: bool = False) -> Array:
     piece = np.repeat(np.arange(part.pieces), len(part.faces) // part.pieces)
     corners = vertices[part.faces]
     if whole:
+        if part.sheet is not None and (high - low)[:, 2].min() > 1e-3 and part.pieces > 1:
+            return part.sheet[part.faces][..., :2]
         share = (corners - low[piece, None]) / np.maximum(high - low, 1e-9)[piece, None]
-        return np.asarray(share[..., :2])
+        flat = (high - low)[piece, 1] < (high - low)[piece, 2]
+        return np.where(flat[:, None, None], share[..., ::2], share[..., :2])
     longest = np.argmax(high - low, axis=1)[piece]
     uv = _papered(corners, longest)
     if part.sheet is not None:
         wrapped = _wrapped(part, corners, longest)
         least, most = stretches(corners, wrapped)
         fits = (least > LEAST_STRETCH) & (most < MOST_STRETCH)
+        fits &= (part.sheet[part.faces][..., 2] > 0.0).all(axis=1)
         uv = np.where(fits[:, None, None], wrapped, uv)
     return np.asarray(uv + (_SHIFT * piece[:, None])[:, None] % 1.0)
 

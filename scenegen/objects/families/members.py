@@ -7,7 +7,23 @@ import numpy as np
 
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
-from scenegen.objects.families import bags, bottles, cans, caps, chairs, lamps, tables, vessels
+from scenegen.objects.families import (
+    bags,
+    bottles,
+    cans,
+    caps,
+    chairs,
+    devices,
+    lamps,
+    paper,
+    plants,
+    seats,
+    storage,
+    tables,
+    tableware,
+    textiles,
+    vessels,
+)
 from scenegen.objects.families.parts.assembly import assemble
 from scenegen.objects.families.parts.surfaces import Part
 from scenegen.objects.solids import UnitShape
@@ -24,6 +40,32 @@ _BUILDERS: dict[str, Callable[[np.random.Generator], list[Part]]] = {
     "cap": caps.cap,
     "chair": chairs.chair,
     "table": tables.table,
+    "sofa": seats.sofa,
+    "armchair": seats.armchair,
+    "stool": seats.stool,
+    "shelf": storage.shelf,
+    "cabinet": storage.cabinet,
+    "nightstand": storage.nightstand,
+    "desk": storage.desk,
+    "coffee_table": storage.coffee_table,
+    "bed": textiles.bed,
+    "cushion": textiles.cushion,
+    "curtain": textiles.curtain,
+    "rug": textiles.rug,
+    "plate": tableware.plate,
+    "cup": tableware.cup,
+    "vase": tableware.vase,
+    "basket": tableware.basket,
+    "book": paper.book,
+    "books": paper.books,
+    "box": paper.box,
+    "picture": paper.picture,
+    "screen": devices.screen,
+    "clock": devices.clock,
+    "floor_lamp": devices.floor_lamp,
+    "pendant": devices.pendant,
+    "plant": plants.plant,
+    "tall_plant": plants.tall_plant,
 }
 _ENTROPY = 0x5E1F_0B7E  # part of every member's seed, so it must never change
 

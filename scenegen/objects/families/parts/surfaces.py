@@ -28,7 +28,7 @@ class Part:
         pieces: into how many blocks of equal length, each a closed surface, vertices and faces
             divide.
         sheet: where the vertices lie on a cloth that is wound about the part: how far around, how
-            far along, and the whole way around, (V, 3); None for flat sides.
+            far along, and the whole way around, (V, 3); None, or 0 all around, where it is flat.
         material: what the part is made of, or its role, from which that follows (`furnishing`).
     """
 
@@ -101,6 +101,7 @@ def loft(
     normals[..., 1] = -(section(growth, outward, quadrant) * outward).sum(axis=-1)
     normals[..., 1] -= (leans[:, None] * outward).sum(axis=-1)[:, None] * rise
     *mesh, sheet = strips(grid, normals)
+    sheet[np.abs(mesh[2][:, 1]) > 0.7, 2] = 0.0  # a lid or a flat top is not wound about the axis
     return Part(*mesh, hull.reshape(-1, 3), radii.reshape(-1), len(centers), sheet)
 
 
