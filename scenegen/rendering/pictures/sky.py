@@ -107,7 +107,10 @@ def _direction_key(direction: Array) -> tuple[float, float, float]:
 @lru_cache(maxsize=16)
 def _sky(sun: tuple[float, float, float]) -> Array:
     """Return the radiance of the sky without the sun's disc, (ROWS, COLUMNS, 3)."""
-    emitter, parameters = _sunsky(mi.variant())
+    # It is not kept: Dr.Jit compiles every emitter that there is into the kernels of paths.
+    emitter = mi.load_dict({"type": "sunsky", "sun_direction": [0, 0, 1], "turbidity": TURBIDITY,
+                            "sun_scale": 0.0})  # fmt: skip
+    parameters = mi.traverse(emitter)
     x, y, z = sun
     toward = mi.Vector3f(*(mi.Float([value]) for value in (x, -z, y)))
     dr.make_opaque(toward)  # so that all hours share a kernel
@@ -121,10 +124,3 @@ def _sky(sun: tuple[float, float, float]) -> Array:
     dr.eval(channels)
     found = np.stack([np.asarray(channel, np.float32) for channel in channels], -1)
     return found.reshape(ROWS, COLUMNS, 3)
-
-
-@lru_cache(maxsize=4)
-def _sunsky(variant: str) -> tuple[Any, Any]:  # noqa: ARG001 - part of the key
-    emitter = mi.load_dict({"type": "sunsky", "sun_direction": [0, 0, 1], "turbidity": TURBIDITY,
-                            "sun_scale": 0.0})  # fmt: skip
-    return emitter, mi.traverse(emitter)

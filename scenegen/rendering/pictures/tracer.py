@@ -4,6 +4,7 @@ Images are traced one at a time, with samples at `pixel_samples.sample_positions
 samples are added in a fixed order, so that the same command gives the same bytes.
 """
 
+import gc
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -41,7 +42,10 @@ MATTER_BSDF = "matter"
 def trace_pictures(batch: SceneBatch, names: Sequence[str], variant: str) -> dict[str, Array]:
     """Return pictures, (B, H, W, 3), in the spec's image type, and what else `names` ask for."""
     mi.set_variant(variant)
-    found = [_trace_one(batch, b, names) for b in range(len(batch))]
+    found = []
+    for b in range(len(batch)):
+        found.append(_trace_one(batch, b, names))
+        gc.collect()  # Dr.Jit compiles all materials and lights that there are into a kernel
     return {name: np.stack([one[name] for one in found]) for name in names}
 
 
