@@ -1,6 +1,6 @@
 """Materials by kind, drawn from a stream of random numbers and the palette of a room."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.random import Generator
@@ -8,6 +8,7 @@ from numpy.random import Generator
 from scenegen.common.names import check_choice
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.rendering.materials import patterns, pictures
+from scenegen.rendering.materials.folders import MapFiles, read_maps
 from scenegen.rendering.materials.material import Array, Material, lerp
 from scenegen.rendering.materials.palettes import Color, Palette, linear
 from scenegen.rendering.materials.patterns import Pattern
@@ -15,9 +16,24 @@ from scenegen.rendering.materials.patterns import Pattern
 VARIANTS = 6  # of each pattern; colours make more of them
 
 
-def material(kind: str, rng: Generator, palette: Palette) -> Material:
-    """Draw a material of a kind. Raises SpecError for a kind that is not in KINDS."""
+def material(
+    kind: str,
+    rng: Generator,
+    palette: Palette,
+    folder: Mapping[str, tuple[MapFiles, ...]] | None = None,
+) -> Material:
+    """Return a material of a kind: drawn, or one from a folder where that has some of the kind.
+
+    Args:
+        folder: as from `folders.from_folder`.
+
+    Raises:
+        SpecError: the kind is not in KINDS.
+        FileFormatError: a map of the folder cannot be read.
+    """
     check_choice("material", kind, KINDS)
+    if folder and kind in folder:
+        return read_maps(pick(rng, folder[kind]))
     return _DRAWN[kind](rng, palette)
 
 
@@ -209,7 +225,8 @@ def _cloth(
     base = np.asarray(color, np.float32)
     if other is not None:
         kind = pick(rng, ("stripes", "pin", "checks", "dots", "zigzag", "diamonds", "sprigs"))
-        figure = patterns.stripes(kind, pick(rng, (2, 3, 4)), _seed(rng))
+        count = pick(rng, (6, 8, 10)) if kind == "dots" else pick(rng, (3, 4, 5))
+        figure = patterns.stripes(kind, count, _seed(rng))
         base = lerp(color, other, figure)
     light = np.minimum((0.45 + 0.75 * pattern.share)[..., None] * base, 0.9)
     return Material(light, 0.95, pattern.height, specular=0.1, metres=metres)
