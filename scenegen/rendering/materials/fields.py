@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 Field = NDArray[Any]
 
 
-@lru_cache(maxsize=96)
+@lru_cache(maxsize=64)
 def noise(
     seed: int, size: int, falloff: float, stretch: tuple[float, float] = (1.0, 1.0),
     lowest: float = 0.0, highest: float = 1e9,
@@ -24,14 +24,17 @@ def noise(
         lowest, highest: bounds of the frequencies, in waves per repeat of the unstretched noise.
     """
     rng = np.random.default_rng((seed, size))
-    v = np.fft.fftfreq(size, 1 / size)[:, None] * stretch[0]
-    u = np.fft.rfftfreq(size, 1 / size)[None] * stretch[1]
+    v = np.fft.fftfreq(size, 1 / size).astype(np.float32)[:, None] * np.float32(stretch[0])
+    u = np.fft.rfftfreq(size, 1 / size).astype(np.float32)[None] * np.float32(stretch[1])
     frequency = np.hypot(u, v)
     frequency[0, 0] = 1.0
-    amplitude = frequency ** (-1.0 - falloff) * (frequency >= lowest) * (frequency <= highest)
+    amplitude = frequency ** np.float32(-1.0 - falloff)
+    amplitude *= (frequency >= lowest) & (frequency <= highest)
     amplitude[0, 0] = 0.0
-    phases = np.exp(2j * np.pi * rng.random(amplitude.shape, np.float32))
-    values = np.fft.irfft2(amplitude * phases, (size, size)).astype(np.float32)
+    angle = np.float32(2 * np.pi) * rng.random(amplitude.shape, np.float32)
+    waves = np.empty(angle.shape, np.complex64)
+    waves.real, waves.imag = amplitude * np.cos(angle), amplitude * np.sin(angle)
+    values = np.fft.irfft2(waves, (size, size))
     values /= values.std()
     values.flags.writeable = False
     return values
@@ -49,10 +52,18 @@ def smoothstep(low: float, high: float, values: Field) -> Field:
     return np.asarray(share * share * (3 - 2 * share), np.float32)
 
 
-def shifted(field: Field, u: Field, v: Field) -> Field:
-    """Return the field displaced by u and v, in repeats, at each pixel; nearest neighbour."""
+def sampled(field: Field, rows: Field, columns: Field) -> Field:
+    """Return the field at places in repeats, which may lie outside 0 to 1; nearest neighbour."""
     size = len(field)
-    x, y = grid(size)
-    columns = np.floor((x + u) * size).astype(np.int32) % size
-    rows = np.floor((y + v) * size).astype(np.int32) % size
-    return np.asarray(field[rows, columns])
+    i = (rows * size).astype(np.int32) % size
+    j = (columns * size).astype(np.int32) % size
+    return np.asarray(field.ravel()[i * size + j])
+
+
+def cell_numbers(rng_seed: int, *numbers: Field) -> Field:
+    """Return a number from 0 to 1 for each tuple of small integers: the same for the same tuple."""
+    table = np.random.default_rng(rng_seed).random(4096, np.float32)
+    index = np.int32(0)
+    for k, number in enumerate(numbers):
+        index = index + number.astype(np.int32) * np.int32((1, 61, 1009)[k])
+    return np.asarray(table[index % 4096])

@@ -66,6 +66,8 @@ def palette(rng: np.random.Generator) -> Palette:
     if chance(rng, 0.5):
         furniture = floor
     shade = span(rng, 0.9, 1.08)  # no two rooms have quite the same wall
+    if chance(rng, 0.3) and min(walls[1]) > 0.15:
+        walls = walls[::-1]
     first = tuple(min(shade * c, 0.86) for c in walls[0])
     white = span(rng, 0.76, 0.84)
     trim = (white, white, 0.97 * white)
