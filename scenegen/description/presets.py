@@ -5,7 +5,7 @@ from typing import Any
 
 from scenegen.common.names import check_choice
 from scenegen.common.records import check
-from scenegen.description.scenes import FAMILY_NAMES
+from scenegen.description.scenes import FAMILY_NAMES, FURNITURE_NAMES
 from scenegen.description.specs import DatasetSpec
 
 VESSELS = ("bag", "bottle", "bowl", "can", "cap", "lamp", "mug")
@@ -60,7 +60,7 @@ PRESETS = {
         {
             "interior": True,
             "source": "families",
-            "shapes": FAMILY_NAMES,
+            "shapes": FAMILY_NAMES + FURNITURE_NAMES,
             "objects": (12, 60),
             "shading": "path",
             "spp": 16,

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from scenegen.camera import Camera, Vector3
 from scenegen.common.names import check_choice
 from scenegen.common.records import check, check_range, from_json, normalise, to_json
-from scenegen.description.scenes import FAMILY_NAMES, SHAPE_NAMES
+from scenegen.description.scenes import FAMILY_NAMES, FURNITURE_NAMES, SHAPE_NAMES
 
 IMAGE_DTYPES = ("uint8", "float16", "float32")
-BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES}
+BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES + FURNITURE_NAMES}
 FOLDERS = ("shapenet-v1", "shapenet-v2", "folder")
 SPLITS = ("all", "train", "val", "test")
 TRUTHS = ("amodal", "coordinates", "flow", "albedo")

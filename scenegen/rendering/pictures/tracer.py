@@ -35,7 +35,7 @@ mi: Any = mitsuba
 MAX_DEPTH = 12  # segments of a path; in closed rooms light bounces often
 ROULETTE_DEPTH = 5  # segments after which a path may end at random
 RAYS_AT_ONCE = 2**21
-BRIGHTEST = 40.0  # radiance of one sample, in units of the sample median of its picture
+BRIGHTEST = 60.0  # radiance of one sample, in units of the mean of its picture
 MATTER_BSDF = "matter"
 
 
@@ -117,8 +117,7 @@ def _camera(batch: SceneBatch, b: int) -> tuple[Any, ...]:
 
 def _ceiling(radiance: Array) -> float:
     """Return the radiance at which single samples are cut, as few of them make bright specks."""
-    middle = float(np.median(radiance))
-    return BRIGHTEST * max(middle, 1e-6)
+    return BRIGHTEST * max(float(radiance.mean()), 1e-9)
 
 
 def _albedo(batch: SceneBatch, b: int, scene: Any, camera: Any) -> Array:
@@ -140,7 +139,7 @@ def _scene(interior: Interior, matter: Matter) -> Any:
     contents: dict[str, Any] = {
         "type": "scene",
         "matter": _mesh("matter", matter.soup, bsdf=matter_bsdf(matter.tables)),
-        "glow": _mesh("glow", matter.glowing, radiance=matter.radiance),
+        "glow": _mesh("glow", matter.glowing, radiance=matter.radiance, lit=interior.lit),
         "day": daylight(outside(interior), windows_of(interior)),
     }
     return mi.load_dict(contents)
@@ -163,13 +162,17 @@ def windows_of(interior: Interior) -> Array:
     return np.array(found, np.float64).reshape(-1, 3, 3)
 
 
-def _mesh(name: str, soup: Soup, bsdf: Any = None, radiance: Array | None = None) -> Any:
+def _mesh(name: str, soup: Soup, bsdf: Any = None, radiance: Array | None = None, lit: bool = False) -> Any:
     count = len(soup.corners)
     properties = mi.Properties()
     if bsdf is not None:
         properties["bsdf"] = bsdf
     if radiance is not None:
-        shines = {"type": "area", "radiance": {"type": "mesh_attribute", "name": "face_radiance"}}
+        shines = {
+            "type": "area",
+            "radiance": {"type": "mesh_attribute", "name": "face_radiance"},
+            "sampling_weight": 0.7 if lit else 1e-3,  # that of daylight is 1
+        }
         properties["emitter"] = mi.load_dict(shines)
     mesh = mi.Mesh(
         name, 3 * count, count, properties, has_vertex_normals=True, has_vertex_texcoords=True

@@ -35,24 +35,28 @@ FILL_TRIES = 400
 # What stands on what, by family and with weights; "sill" and "floor" are the room's.
 ON_TOP = {
     "table": {"plate": 2, "cup": 3, "mug": 3, "bowl": 3, "bottle": 2, "can": 1, "vase": 2,
-              "book": 3, "plant": 1, "lamp": 0.5, "cap": 0.3},
-    "desk": {"book": 4, "screen": 3, "lamp": 3, "mug": 3, "cup": 2, "clock": 1, "can": 1,
-             "plant": 1, "box": 1, "cap": 0.5, "bottle": 1},
-    "shelf": {"book": 10, "vase": 2, "box": 2, "plant": 1.5, "bowl": 1, "clock": 0.5, "cup": 1,
-              "bottle": 0.7, "can": 0.5, "picture": 0.0, "plate": 0.3},
-    "cabinet": {"lamp": 3, "vase": 3, "plant": 3, "book": 3, "clock": 1.5, "bowl": 2, "screen": 1,
-                "box": 1, "bottle": 1},
-    "sofa": {"cushion": 5, "book": 0.5, "bag": 0.3},
-    "bed": {"cushion": 5, "book": 0.5, "bag": 0.5},
-    "chair": {"cushion": 1, "bag": 0.7, "cap": 0.7, "book": 0.4},
-    "armchair": {"cushion": 2},
-    "stool": {"plant": 2, "book": 2, "mug": 1, "vase": 1, "lamp": 1},
-    "bench": {"cushion": 2, "bag": 1},
-    "box": {"book": 0.5, "cap": 0.5},
-    "sill": {"plant": 5, "vase": 2, "book": 1, "can": 0.5, "cup": 1, "bowl": 0.5},
-    "floor": {"bag": 2, "box": 2, "plant": 2},
+              "book": 2, "plant": 1, "cap": 0.3, "basket": 0.3},
+    "coffee_table": {"book": 4, "cup": 2, "mug": 2, "vase": 2, "bowl": 2, "plant": 1, "can": 0.5},
+    "desk": {"book": 4, "books": 3, "screen": 3, "lamp": 3, "mug": 3, "cup": 1, "can": 1,
+             "plant": 1, "box": 0.5, "cap": 0.3, "bottle": 0.5},
+    "shelf": {"books": 10, "book": 4, "vase": 2, "box": 1.5, "plant": 1.5, "bowl": 1, "cup": 1,
+              "bottle": 0.5, "can": 0.5, "plate": 0.3, "basket": 1, "cap": 0.2, "mug": 0.7},
+    "cabinet": {"lamp": 3, "vase": 3, "plant": 3, "books": 2, "book": 2, "bowl": 2, "screen": 1,
+                "box": 0.5, "bottle": 0.5, "basket": 0.5},
+    "nightstand": {"lamp": 4, "book": 3, "mug": 1, "cup": 1, "plant": 1, "bottle": 0.3},
+    "sofa": {"cushion": 5, "book": 0.3, "bag": 0.2},
+    "armchair": {"cushion": 2, "book": 0.2},
+    "bed": {"cushion": 3, "book": 0.3, "bag": 0.2},
+    "chair": {"bag": 0.5, "cap": 0.3, "book": 0.4},
+    "stool": {"plant": 2, "book": 2, "mug": 1, "vase": 1},
+    "sill": {"plant": 5, "vase": 2, "book": 0.5, "cup": 0.5, "bowl": 0.5},
+    "floor": {"bag": 2, "box": 2, "basket": 2, "stool": 0.5},
 }  # fmt: skip
-UPRIGHT_FRONT = ("book", "screen", "clock", "picture", "cushion", "lamp")  # look to the front
+SEATS = ("chair", "sofa", "armchair", "bed", "stool")
+INSIDE = ("shelf",)  # families on all of whose surfaces things stand; others have a top
+HIGHEST = 1.5  # metres of a top on which small things stand
+MOST_ON_FLOOR = 5  # small things on the floor
+UPRIGHT_FRONT = ("books", "screen", "cushion", "lamp")  # look to the front
 
 
 @dataclass
@@ -318,6 +322,52 @@ class Arranger:
         turns = place.turns + 0.5 + stepped_turn(self.draws.span(-0.05, 0.05))
         self.stand(chair, box_at(chair, *at, 0.0, turns), keep=False)
 
+    def beside(self, number: int, family: str, side: int) -> int:
+        """Put something beside furniture that stands along a wall; `side` is -1 or 1."""
+        place, piece = self.space.placed[number - 1].box, self.piece(family, 1)
+        if piece is None or self.space.full:
+            return 0
+        away = place.half[0] + piece.half[0] + self.draws.span(0.03, 0.1)
+        x, z = place.point(side * away, -place.half[1] + piece.half[1])
+        box = box_at(piece, x, z, 0.0, place.turns)
+        for wall in WALLS:  # nothing tall before a window or a door
+            if TURNS[wall] == place.turns and wall_length(self.space.size, wall) > 0:
+                along = z if wall in ("west", "east") else x
+                if not self.fits_wall(wall, along, piece.half[0], 0.0, piece.height):
+                    return 0
+        return self.stand(piece, box, keep=False)
+
+    def in_corner(self, family: str) -> int:
+        """Put something into a corner, turned towards the middle of the room."""
+        piece = self.piece(family, 2)
+        if piece is None or self.space.full:
+            return 0
+        width, _, depth = self.space.size
+        for sx, sz in self.draws.shuffled(((-1, -1), (-1, 1), (1, -1), (1, 1))):
+            away = max(piece.half) * 1.35 + self.draws.span(0.05, 0.3)
+            x, z = (away if sx < 0 else width - away), (away if sz < 0 else depth - away)
+            turns = facing(-sx, -sz) + stepped_turn(self.draws.span(-0.04, 0.04))
+            if number := self.stand(piece, box_at(piece, x, z, 0.0, turns)):
+                return number
+        return 0
+
+    def hang(self, family: str, x: float, z: float) -> int:
+        """Hang something from the ceiling; return its number, or 0."""
+        piece = self.piece(family, 1)
+        if piece is None or self.space.full:
+            return 0
+        bottom = self.space.size[1] - piece.height - 0.002
+        box = box_at(piece, x, z, bottom, 0.0)
+        return self.space.put(piece, box, 0) if self.space.free(box) and bottom > 1.45 else 0
+
+    def screen_on(self, number: int) -> int:
+        """Put a screen on furniture, looking to its front."""
+        screen, place = self.piece("screen", 1), self.space.placed[number - 1]
+        if screen is None or place.piece.height > 1.1:
+            return 0
+        at = place.box.point(self.draws.span(-0.15, 0.15), -0.3 * place.box.half[1])
+        return self.on_surface(screen, number, at, place.box.turns)
+
     # On surfaces
 
     def on_surface(
@@ -351,34 +401,36 @@ class Arranger:
             kind, parent, y, sides = self.draws.pick(
                 [surface for surface, _ in surfaces], [weight for _, weight in surfaces]
             )
-            choices = ON_TOP.get(kind, ON_TOP["cabinet"])
-            families = [family for family, weight in choices.items() if weight]
-            weights = [choices[family] for family in families]
-            family = self.draws.pick(families, weights)
+            family = self.draws.pick(tuple(ON_TOP[kind]), tuple(ON_TOP[kind].values()))
             if kind == "floor":
                 self.on_floor(family)
             elif kind == "sill":
                 self._on_sill(family, sides)
-            elif family == "book":
-                self._books(parent, y, sides)
             else:
                 self._small(family, parent, y, sides)
 
     def _surfaces(self) -> list[tuple[tuple[str, int, float, Sequence[float]], float]]:
         """Return surfaces as (family, number, height, sides), with weights."""
         found: list[tuple[tuple[str, int, float, Sequence[float]], float]] = []
+        carried = [thing.stands_on for thing in self.space.placed]
         for number, thing in enumerate(self.space.placed, start=1):
             family = thing.piece.family
-            taken = sum(other.stands_on == number for other in self.space.placed)
+            if family not in ON_TOP:
+                continue
+            top = max((surface[0] for surface in thing.piece.surfaces), default=0.0)
             for y, *sides in thing.piece.surfaces:
+                if family not in INSIDE and (y < top - 0.01 and family not in SEATS or y > HIGHEST):
+                    continue
                 area = (sides[1] - sides[0]) * (sides[3] - sides[2])
-                weight = min(area, 0.8) * (0.15 if family in ("chair", "sofa", "bed") else 1.0)
-                found.append(((family, number, y, sides), weight / (1 + 0.15 * taken)))
+                weight = min(area, 0.8) * (0.3 if family in SEATS else 1.0)
+                found.append(((family, number, y, sides), weight / (1 + 0.1 * carried.count(number))))
         for hole in self.room.openings:
             if hole.kind == "window":
                 sides = (hole.left, hole.right, hole.bottom, float(WALLS.index(hole.wall)))
-                found.append((("sill", 0, hole.bottom, sides), 0.12))
-        found.append((("floor", 0, 0.0, ()), 0.12))
+                found.append((("sill", 0, hole.bottom, sides), 0.08))
+        astray = sum(t.piece.family in ON_TOP["floor"] and not t.stands_on for t in self.space.placed)
+        if astray < MOST_ON_FLOOR:
+            found.append((("floor", 0, 0.0, ()), 0.06))
         return found
 
     def _small(self, family: str, parent: int, y: float, sides: Sequence[float]) -> int:
@@ -398,6 +450,8 @@ class Arranger:
             z = self.draws.span(z0 + reach[1], z1 - reach[1])
             if family == "cushion":
                 z = z0 + reach[1]
+            elif family == "books":
+                z = min(z, z0 + reach[1] + 0.03)
             at = place.point(x, z)
             box = box_at(piece, *at, place.bottom + y + ON, turns)
             if self._on(box, place, sides) and self.space.free(box, parent):
@@ -406,41 +460,13 @@ class Arranger:
 
     def _many(self, family: str, parent: int) -> bool:
         """Return whether an object carries enough of a family."""
-        most = {"screen": 1, "lamp": 2, "clock": 1, "bag": 1, "cap": 1, "box": 3, "cushion": 4}
+        most = {"screen": 1, "lamp": 2, "bag": 1, "cap": 1, "box": 3, "cushion": 4, "vase": 3,
+                "basket": 2, "books": 12}  # fmt: skip
         same = sum(
             thing.stands_on == parent and thing.piece.family == family
             for thing in self.space.placed
         )
         return same >= most.get(family, 6)
-
-    def _books(self, parent: int, y: float, sides: Sequence[float]) -> None:
-        """Put a row of books, or a pile, on a surface."""
-        place = self.space.placed[parent - 1].box
-        x0, x1, z0, z1 = sides
-        first = self.piece("book", 6)
-        if first is None:
-            return
-        upright = first.height > 2 * first.half[0]
-        x = self.draws.span(x0, max(x0, x1 - 0.25))
-        z = self.draws.span(z0 + first.half[1], max(z0 + first.half[1], z1 - first.half[1] - 0.02))
-        turns, base = place.turns, place.bottom + y + ON
-        if not upright:
-            turns = stepped_turn(place.turns + self.draws.span(-0.1, 0.1))
-        below = parent
-        for _ in range(self.draws.count(2, 7) if upright else self.draws.count(1, 3)):
-            piece = self.piece("book", 6)
-            if piece is None or self.space.full:
-                return
-            at = place.point(x + piece.half[0], z)
-            box = box_at(piece, *at, base, turns)
-            if not self._on(box, place, sides) or not self.space.free(box, below, gap=0.0005):
-                return
-            number = self.space.put(piece, box, below)
-            if upright:
-                x += 2 * piece.half[0] + 0.002
-            else:
-                below, base = number, box.top + ON
-                turns += stepped_turn(self.draws.span(-0.03, 0.03))
 
     def _on_sill(self, family: str, sides: Sequence[float]) -> int:
         left, right, height, wall = sides
@@ -483,59 +509,86 @@ def furnish(arranger: Arranger) -> None:
         arranger
     )
     arranger.curtains()
-    for step in draws.shuffled(("shelf", "cabinet", "picture", "plant", "clock", "floor", "shelf",
-                                "picture", "floor_lamp", "stool", "picture")):  # fmt: skip
-        if step in ("picture", "clock"):
-            if not any(p.piece.family == "clock" for p in space.placed) or step == "picture":
-                arranger.on_wall(step, 1.45, 1.75)
+    for step in draws.shuffled(
+        ("shelf", "cabinet", "picture", "tall_plant", "clock", "floor", "shelf", "picture",
+         "floor_lamp", "armchair", "picture", "rug", "picture")
+    ):  # fmt: skip
+        if step == "picture":
+            arranger.on_wall(step, 1.45, 1.75)
+        elif step == "clock" and draws.chance(0.5):
+            arranger.on_wall(step, 1.7, 2.0)
         elif step in ("shelf", "cabinet"):
             arranger.against_wall(step)
         elif step == "floor":
-            arranger.on_floor(draws.pick(("box", "bag")))
-        elif step in ("plant", "floor_lamp"):
+            arranger.on_floor(draws.pick(("box", "bag", "basket", "stool")))
+        elif step in ("tall_plant", "floor_lamp"):
             arranger.on_floor(step, corner=True)
-        else:
-            arranger.on_floor(step)
+        elif step == "armchair" and draws.chance(0.3):
+            arranger.in_corner(step)
+        elif step == "rug" and draws.chance(0.5):
+            width, _, depth = space.size
+            x, z = draws.span(0.3, 0.7) * width, draws.span(0.3, 0.7) * depth
+            arranger.rug(x, z, draws.pick((0.0, 0.25)))
     space.most = whole
     arranger.fill()
 
 
 def _living(arranger: Arranger) -> None:
-    """Put a sofa along a wall, with a rug before it, and a screen opposite."""
+    """Put a sofa along a wall, a table before it on a rug, and a screen opposite."""
+    draws, space = arranger.draws, arranger.space
     sofa = arranger.against_wall("sofa", front=0.9, middle=True)
-    if sofa:
-        box = arranger.space.placed[sofa - 1].box
-        if arranger.draws.chance(0.7):
-            arranger.space.kept.pop()
-            x, z = box.point(0.0, box.half[1] + 0.75)
-            arranger.rug(x, z, box.turns)
-        if arranger.draws.chance(0.5):
-            arranger.on_floor("floor_lamp", corner=True)
-        opposite = [w for w in WALLS if math.isclose(abs(TURNS[w] - box.turns), 0.5)]
-        cabinet = arranger.against_wall("cabinet", opposite, middle=True)
-        screen = arranger.piece("screen", 1)
-        if cabinet and screen is not None and arranger.draws.chance(0.7):
-            place = arranger.space.placed[cabinet - 1].box
-            arranger.on_surface(screen, cabinet, (place.x, place.z), place.turns)
-    else:
+    if not sofa:
         arranger.table_with_chairs()
-    if arranger.draws.chance(0.5):
+        return
+    box = space.placed[sofa - 1].box
+    space.kept.pop()
+    if draws.chance(0.7):
+        arranger.rug(*box.point(0.0, box.half[1] + 0.8), box.turns)
+    table = arranger.piece("coffee_table", 1)
+    if table is not None and draws.chance(0.85):
+        for away in (0.38, 0.5, 0.3, 0.65, 0.8):
+            x, z = box.point(draws.span(-0.1, 0.1), box.half[1] + away + table.half[1])
+            if arranger.stand(table, box_at(table, x, z, 0.0, box.turns)):
+                break
+    for side in draws.shuffled((-1, 1)):
+        if draws.chance(0.45):
+            arranger.beside(sofa, draws.pick(("floor_lamp", "tall_plant", "nightstand")), side)
+    opposite = [w for w in WALLS if math.isclose(abs(TURNS[w] - box.turns), 0.5)]
+    cabinet = arranger.against_wall("cabinet", opposite, middle=True)
+    if cabinet and draws.chance(0.7):
+        arranger.screen_on(cabinet)
+    if draws.chance(0.4):
+        arranger.in_corner("armchair")
+    if draws.chance(0.4):
         arranger.table_with_chairs()
 
 
 def _dining(arranger: Arranger) -> None:
-    arranger.table_with_chairs()
+    """Put a table with chairs below a lamp, and a cabinet along a wall."""
+    table = arranger.table_with_chairs()
+    if table and arranger.draws.chance(0.6):
+        box = arranger.space.placed[table - 1].box
+        arranger.hang("pendant", box.x, box.z)
     arranger.against_wall("cabinet", middle=True)
 
 
 def _bedroom(arranger: Arranger) -> None:
-    arranger.against_wall("bed", front=0.5, middle=True)
+    """Put a bed with its head to a wall, with night stands, and a cabinet."""
+    bed = arranger.against_wall("bed", front=0.5, middle=True)
+    if bed:
+        for side in (-1, 1):
+            if arranger.draws.chance(0.8):
+                arranger.beside(bed, "nightstand", side)
+        if arranger.draws.chance(0.4):
+            box = arranger.space.placed[bed - 1].box
+            arranger.rug(*box.point(0.0, box.half[1] + 0.7), box.turns)
     arranger.against_wall("cabinet")
     if arranger.draws.chance(0.5):
         _desk(arranger)
 
 
 def _study(arranger: Arranger) -> None:
+    """Put a desk with a chair along a wall, a shelf, and perhaps a sofa."""
     _desk(arranger)
     arranger.against_wall("shelf")
     if arranger.draws.chance(0.4):
@@ -545,11 +598,7 @@ def _study(arranger: Arranger) -> None:
 def _desk(arranger: Arranger) -> None:
     """Put a desk along a wall with a screen on it, and a chair before it."""
     desk = arranger.against_wall("desk", front=0.9)
-    if not desk:
-        return
-    place = arranger.space.placed[desk - 1].box
-    arranger.seat_at(desk)
-    screen = arranger.piece("screen", 1)
-    if screen is not None and arranger.draws.chance(0.7):
-        at = place.point(arranger.draws.span(-0.2, 0.2), -0.4 * place.half[1])
-        arranger.on_surface(screen, desk, at, place.turns)
+    if desk:
+        arranger.seat_at(desk)
+        if arranger.draws.chance(0.75):
+            arranger.screen_on(desk)
