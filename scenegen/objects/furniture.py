@@ -85,7 +85,9 @@ def piece(name: str) -> Piece:
         tuple(float(np.ceil(v / SIZE_STEP) * SIZE_STEP) for v in rectangle)
         for rectangle in supports(thing)
     )
-    boxes = np.stack([corners.min(axis=1), corners.max(axis=1)]) if surfaces else np.zeros((2, 0, 3))
+    boxes = (
+        np.stack([corners.min(axis=1), corners.max(axis=1)]) if surfaces else np.zeros((2, 0, 3))
+    )
     across, up, along = half.tolist()
     return Piece(name, (across, along), 2 * up, radius, surfaces, boxes)
 

@@ -4,6 +4,7 @@ Frame and lengths are those of `description.interiors`. Planes reach past the co
 meet, and boxes into the planes they are fixed to, so that no ray slips between them.
 """
 
+import itertools
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -63,13 +64,13 @@ class _Builder:
 
     def box(self, part: str, low: Any, high: Any) -> None:
         """Add a box between two opposite corners, in any order."""
-        (x, X), (y, Y), (z, Z) = (sorted(pair) for pair in zip(low, high, strict=True))
-        self.quad(part, (x, y, Z), (X, y, Z), (X, Y, Z), (x, Y, Z))
-        self.quad(part, (X, y, z), (x, y, z), (x, Y, z), (X, Y, z))
-        self.quad(part, (x, y, z), (x, y, Z), (x, Y, Z), (x, Y, z))
-        self.quad(part, (X, y, Z), (X, y, z), (X, Y, z), (X, Y, Z))
-        self.quad(part, (x, Y, Z), (X, Y, Z), (X, Y, z), (x, Y, z))
-        self.quad(part, (x, y, z), (X, y, z), (X, y, Z), (x, y, Z))
+        (x, x1), (y, y1), (z, z1) = (sorted(pair) for pair in zip(low, high, strict=True))
+        self.quad(part, (x, y, z1), (x1, y, z1), (x1, y1, z1), (x, y1, z1))
+        self.quad(part, (x1, y, z), (x, y, z), (x, y1, z), (x1, y1, z))
+        self.quad(part, (x, y, z), (x, y, z1), (x, y1, z1), (x, y1, z))
+        self.quad(part, (x1, y, z1), (x1, y, z), (x1, y1, z), (x1, y1, z1))
+        self.quad(part, (x, y1, z1), (x1, y1, z1), (x1, y1, z), (x, y1, z))
+        self.quad(part, (x, y, z), (x1, y, z), (x1, y, z1), (x, y, z1))
 
 
 class _Wall:
@@ -115,8 +116,8 @@ def _add_wall(build: _Builder, wall: _Wall, interior: Interior) -> None:
     height = interior.size[1]
     across = sorted({-PAST, wall.length + PAST, *(u for h in holes for u in (h.left, h.right))})
     up = sorted({-PAST, height + PAST, *(v for h in holes for v in (h.bottom, h.top))})
-    for u, u_end in zip(across, across[1:], strict=False):
-        for v, v_end in zip(up, up[1:], strict=False):
+    for u, u_end in itertools.pairwise(across):
+        for v, v_end in itertools.pairwise(up):
             middle = (u + u_end) / 2, (v + v_end) / 2
             if not any(_inside(hole, *middle) for hole in holes):
                 corners = [(u, v, 0.0), (u_end, v, 0.0), (u_end, v_end, 0.0), (u, v_end, 0.0)]
@@ -193,7 +194,10 @@ def _add_door(build: _Builder, wall: _Wall, hole: Opening) -> None:
         panel + 0.0078125),
     )  # fmt: skip
     wall.box(
-        build, "metal", (u - 0.0078125, 1.03125, panel), (u + 0.0078125, 1.0546875, panel + 0.0546875)
+        build,
+        "metal",
+        (u - 0.0078125, 1.03125, panel),
+        (u + 0.0078125, 1.0546875, panel + 0.0546875),
     )
     wall.box(
         build, "metal", (u - 0.125, 1.03125, panel + 0.0390625), (u + 0.0078125, 1.0546875,

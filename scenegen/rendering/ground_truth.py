@@ -54,6 +54,13 @@ def decode_image(image: Array) -> Array:
     return image.astype(np.float32)
 
 
+def undeveloped(image: Array) -> Array:
+    """Return the linear light, 0 to 1 float32, of an sRGB picture in 8 bits (IEC 61966-2-1)."""
+    levels = np.arange(256) / 255
+    curve = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
+    return np.asarray(curve.astype(np.float32)[image])
+
+
 def visible_pixels(object_id: Array, slots: int) -> NDArray[np.int32]:
     """Count the pixels of each object in each image, (B, H, W) -> (B, slots)."""
     counts = np.empty((len(object_id), slots), np.int32)

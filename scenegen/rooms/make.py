@@ -15,12 +15,12 @@ from scenegen.files.plan import Bundle, Mark, Part, Plan, Sheet
 from scenegen.files.row_file import writer_name
 from scenegen.files.sets import merge_file
 from scenegen.layout import (
-    CONVENTIONS,
     FORMAT_NAME,
     FORMAT_VERSION,
     SCORED,
     TRUTH_DIGEST,
     columns,
+    conventions,
 )
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE
@@ -111,7 +111,7 @@ def rooms_plan(
         "format_version": FORMAT_VERSION,
         "writer": writer_name(),
         "spec": spec.to_json(),
-        "conventions": CONVENTIONS,
+        "conventions": conventions(spec),
         "creation_command": command,
         **renderer,
     }

@@ -82,7 +82,11 @@ class ProposalQueue:
                 raise refusal(self._spec, item, self._taken[item])
             more = range(first, min(first + max(first, self._retries), MAX_ATTEMPTS))
             tries += [(item, attempt) for attempt in more]
-        room = min(self._ahead - len(tries), 2 * self._ahead - len(self._stock), len(self._items) - self._begun)
+        room = min(
+            self._ahead - len(tries),
+            2 * self._ahead - len(self._stock),
+            len(self._items) - self._begun,
+        )
         new = self._items[self._begun : self._begun + max(room, 0)]
         self._begun += len(new)
         tries += [(item, 0) for item in new]

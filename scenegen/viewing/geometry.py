@@ -12,7 +12,7 @@ from scenegen.camera import back_project, pixel_size, transform_points, transfor
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.description.scenes import PlacedObject, SceneSpec
 from scenegen.description.specs import BUILT_IN, DatasetSpec
-from scenegen.objects.scene_mesh import room_mesh, world_from_object
+from scenegen.objects.scene_mesh import room_triangles, world_from_object
 from scenegen.objects.sources import file_objects
 from scenegen.rooms.preview import depth_bytes, id_colors, normal_bytes, srgb_bytes
 from scenegen.rooms.reader import Room
@@ -171,7 +171,7 @@ def scene_meshes(scene: SceneSpec, shape_of: ShapeOf) -> tuple[list[Mesh], list[
     meshes, reasons = list[Mesh](), dict[str, None]()
     if scene.room_reflectance is not None:
         color = srgb_bytes(np.array(scene.room_reflectance))
-        meshes.append(Mesh(0, np.asarray(room_mesh().triangles), color))
+        meshes.append(Mesh(0, room_triangles(scene), color))
     for k, item in enumerate(scene.objects, start=1):
         try:
             triangles = shape_of(item)

@@ -17,6 +17,12 @@ def has_denoiser() -> bool:
     return importlib.util.find_spec("pyoidn") is not None
 
 
+def check_denoiser() -> None:
+    """Raise BackendError where pictures cannot be denoised here."""
+    if not has_denoiser():
+        raise BackendError("denoise", "no denoiser", hint=HOW_TO_GET)
+
+
 def denoised(radiance: Array, albedo: Array, normal: Array) -> Array:
     """Return radiance, (H, W, 3), without the noise of few samples.
 
@@ -25,8 +31,7 @@ def denoised(radiance: Array, albedo: Array, normal: Array) -> Array:
 
     Raises BackendError where the denoiser is not installed.
     """
-    if not has_denoiser():
-        raise BackendError("denoise", "no denoiser", hint=HOW_TO_GET)
+    check_denoiser()
     import pyoidn
 
     images = [np.ascontiguousarray(x, np.float32) for x in (radiance, albedo, normal)]

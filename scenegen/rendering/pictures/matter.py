@@ -1,5 +1,6 @@
-"""A furnished room as arrays of one form: triangles, and tables of the materials they are made of."""
+"""A furnished room as arrays of one form: triangles, and tables of their materials."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,12 +11,14 @@ from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.rotations import product
 from scenegen.objects.furniture import furnished
 from scenegen.objects.room_shell import KINDS, shell_name, shell_of
+from scenegen.rendering.materials.folders import MapFiles
 from scenegen.rendering.materials.kinds import material
 from scenegen.rendering.materials.material import Material
 from scenegen.rendering.materials.palettes import Palette, palette
 from scenegen.rendering.packing import SceneBatch
 
 Array = NDArray[Any]
+Folder = Mapping[str, tuple[MapFiles, ...]] | None
 TEXEL_RANGE = 255.0
 GLOW = "glow"
 LAMP_FLUX = 0.03  # of a lamp, in the units of the sky's radiance times square metres
@@ -71,7 +74,8 @@ class Matter:
 class _Collector:
     """Collects triangles and materials."""
 
-    def __init__(self, seed: int, index: int, colors: Palette) -> None:
+    def __init__(self, seed: int, index: int, colors: Palette, folder: Folder) -> None:
+        self.folder = folder
         self.seed, self.index, self.colors = seed, index, colors
         self.materials: list[Material] = []
         self.numbers: dict[tuple[str, int], int] = {}
@@ -85,7 +89,7 @@ class _Collector:
             self.numbers[key] = len(self.materials)
             stream = (self.seed, *owner.encode(), part)
             rng = item_rng(stream, self.index, Purpose.MATERIALS)
-            self.materials.append(material(kind, rng, self.colors))
+            self.materials.append(material(kind, rng, self.colors, self.folder))
         return self.numbers[key]
 
     def add(self, corners: Array, normals: Array, uv: Array, rows: Array) -> None:
@@ -105,14 +109,23 @@ def room_palette(seed: int, index: int) -> Palette:
     return palette(item_rng(seed, index, Purpose.MATERIALS))
 
 
-def gather_matter(batch: SceneBatch, b: int, lit: bool) -> Matter:
-    """Return what image `b` of a batch shows."""
+def room_kinds(seed: int, index: int) -> tuple[str, ...]:
+    """Return the kinds of materials of a shell's parts; in some rooms one wall stands out."""
+    rng = item_rng(seed, index, Purpose.MATERIALS, 1)
+    accent = WALLS[int(rng.random() * 8)] if rng.random() < ACCENT_SHARE else ""
+    return tuple("wall" if k in WALLS and k != accent else "accent" if k in WALLS else k
+                 for k in KINDS)  # fmt: skip
+
+
+def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -> Matter:
+    """Return what image `b` of a batch shows, of materials from a folder where that has some."""
     assert batch.interior is not None
     index, seed = int(batch.index[b]), batch.spec.seed
-    collected = _Collector(seed, index, room_palette(seed, index))
+    collected = _Collector(seed, index, room_palette(seed, index), folder)
     room = shell_of(shell_name(batch.interior[b]))
     flat = np.repeat(room.normals[:, None], 3, axis=1)
-    rows = np.array([collected.number(kind, "room", i) for i, kind in enumerate(KINDS)])
+    kinds = room_kinds(seed, index)
+    rows = np.array([collected.number(kind, "room", i) for i, kind in enumerate(kinds)])
     shines = (room.part == KINDS.index(GLOW)) & lit
     collected.add(*(x[~shines] for x in (room.corners, flat, room.uv, rows[room.part])))
     if shines.any():
@@ -131,13 +144,12 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool) -> Matter:
         collected.add(corners[dark], normals[dark], thing.corner_uv[dark], rows[thing.part[dark]])
         if glows.any():
             collected.shine(corners[glows], normals[glows], thing.corner_uv[glows], LAMP_FLUX)
-    corners, normals, uv, of_face = (
-        np.concatenate(x) for x in zip(*collected.parts, strict=True)
-    )
+    corners, normals, uv, of_face = (np.concatenate(x) for x in zip(*collected.parts, strict=True))
     # A kernel counts the triangles that shine by powers of two: so all have about as many.
     count = sum(len(part[0]) for part in collected.glowing)
     more = max(LEAST_SHINING, 1 << count.bit_length()) - count
-    triangle = np.array([[[0, 0, 0], [1e-3, 0, 0], [0, 0, 1e-3]]]) + [0, OUT_OF_SIGHT, 0]
+    triangle = np.array([[[0, 0, 0], [1e-3, 0, 0], [0, 0, 1e-3]]])
+    triangle[..., 1] = OUT_OF_SIGHT
     dark = (triangle, np.tile([0.0, 1.0, 0.0], (1, 3, 1)), np.zeros((1, 3, 2)), np.zeros((1, 3)))
     collected.glowing.append(tuple(np.repeat(part, more, axis=0) for part in dark))  # type: ignore[arg-type]
     shining, shining_normals, shining_uv, radiance = (
@@ -163,9 +175,7 @@ def _tables(materials: list[Material], of_face: Array) -> Tables:
             row[8:11] = first_height, one.height.shape[1], one.height.shape[0]
             heights.append(one.height.astype(np.float16).ravel())
             first_height += one.height.size
-    return Tables(
-        of_face.astype(np.uint32), rows, np.concatenate(texels), np.concatenate(heights)
-    )
+    return Tables(of_face.astype(np.uint32), rows, np.concatenate(texels), np.concatenate(heights))
 
 
 def _packed(one: Material) -> Array:

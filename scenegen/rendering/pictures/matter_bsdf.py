@@ -98,7 +98,12 @@ def _matter_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
             wi = frame.to_local(si.to_world(si.wi))
             out = frame.to_local(si.to_world(wo))
             side = dr.mulsign(mi.Float(1), si.wi.z)
-            return mi.Vector3f(wi.x, wi.y, wi.z * side), mi.Vector3f(out.x, out.y, out.z * side), frame, side
+            return (
+                mi.Vector3f(wi.x, wi.y, wi.z * side),
+                mi.Vector3f(out.x, out.y, out.z * side),
+                frame,
+                side,
+            )
 
         def _lobes(self, color: Any, rough: Any, row: list[Any]) -> tuple[Any, ...]:
             metallic, specular = row[4], row[5]

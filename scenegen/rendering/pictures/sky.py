@@ -20,7 +20,8 @@ from scenegen.description.interiors import Interior
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
-ROWS, COLUMNS = 128, 256
+ROWS, COLUMNS = 64, 128  # of the sky
+FINE = 6  # pixels of a map, along each side, for one of the sky
 LATITUDE = 47.0  # degrees, at an equinox: the sun rises at 6 and sets at 18
 SUNLESS = 2.0  # degrees of height below which there is no sun
 DUSK = 3.0  # degrees of height of the sun that lights the sky after sunset
@@ -67,7 +68,7 @@ def outside(interior: Interior) -> Outside:
     azimuth = math.radians(interior.facing_degrees + 15 * (interior.hour - 12))
     level, up = math.cos(math.radians(height)), math.sin(math.radians(height))
     sun = np.array([level * math.sin(azimuth), up, -level * math.cos(azimuth)])
-    night = height < -6
+    night = height < -4
     shown = np.array([math.sin(azimuth), math.tan(math.radians(max(height, DUSK))),
                       -math.cos(azimuth)])  # fmt: skip
     shown /= np.linalg.norm(shown)
@@ -82,21 +83,32 @@ def outside(interior: Interior) -> Outside:
         # Beer and Lambert through a clear atmosphere, by its optical depth in red, green and blue.
         mass = 1 / (up + 0.15 * (height + 3.9) ** -1.25)
         sunlight = SUN * np.exp(-np.array([0.16, 0.22, 0.36]) * mass)
-    above = view[..., 1] > 0
     weights = np.maximum(view[..., 1], 0) * np.sqrt(np.maximum(1 - view[..., 1] ** 2, 0))
     from_sky = np.pi * (radiance * weights[..., None]).sum((0, 1)) / weights.sum()
     light = (from_sky + sunlight * max(up, 0.0)) / np.pi
-    haze = radiance[ROWS // 2 - 3].mean(axis=0)
-    distance = np.clip(-view[..., 1:2] * 6, 0, 1)
-    ground = np.array(GROUND) * light * distance + (1 - distance) * 0.35 * haze
-    radiance = np.where(above[..., None], radiance, ground)
-    turn = (np.arange(COLUMNS) + 0.5) / COLUMNS * 2 * np.pi
-    phase = interior.facing_degrees
-    line = 0.05 + 0.04 * np.sin(3 * turn + phase) + 0.02 * np.sin(11 * turn + 2 * phase)
-    line += 0.012 * np.sin(37 * turn + 3 * phase) + 0.008 * np.sin(71 * turn + 5 * phase)
-    trees = above & (view[..., 1] < line)
-    radiance = np.where(trees[..., None], np.array(TREES) * light * 1.4, radiance)
-    return Outside(np.asarray(radiance, np.float32), sun, sunlight)
+    radiance = radiance.repeat(FINE, axis=0).repeat(FINE, axis=1)
+    return Outside(_with_ground(radiance, light, interior.facing_degrees), sun, sunlight)
+
+
+def _with_ground(radiance: Array, light: Array, seed: float) -> Array:
+    """Return a map of the sky with a meadow and trees in this light, (H, W, 3) float32."""
+    rows, columns = radiance.shape[:2]
+    height = directions(rows, columns)[..., 1]
+    turn = (np.arange(columns) + 0.5) / columns * 2 * np.pi
+    tops, shade = np.full(columns, 0.055), np.ones(columns)
+    for waves, size in ((2, 0.03), (5, 0.025), (13, 0.02), (31, 0.012), (67, 0.007), (131, 0.004)):
+        tops += size * np.sin(waves * turn + waves * seed)
+        shade += 4 * size * np.sin(1.7 * waves + 2 * waves * turn + seed)
+    meadow = height < 0
+    trees = ~meadow & (height < tops)
+    haze = radiance[rows // 2 - 4].mean(axis=0)
+    # Distant things take on the colour of the air.
+    far = np.exp(height.clip(-1, 0) * 14)[..., None] * 0.25
+    ground = (1 - far) * np.array(GROUND) * light + far * 0.5 * haze
+    lit = (0.55 + 0.45 * height / np.maximum(tops, 1e-3)).clip(0, 1) * shade
+    crowns = 0.8 * np.array(TREES) * light * lit[..., None] + 0.2 * 0.5 * haze
+    shown = np.where(meadow[..., None], ground, np.where(trees[..., None], crowns, radiance))
+    return np.asarray(shown, np.float32)
 
 
 def _direction_key(direction: Array) -> tuple[float, float, float]:

@@ -20,12 +20,13 @@ from scenegen.common.records import from_json
 from scenegen.description.interiors import Interior
 from scenegen.objects.room_shell import REVEAL
 from scenegen.rendering.packing import SceneBatch
+from scenegen.rendering.pictures.assets import environment_of, materials_of
 from scenegen.rendering.pictures.daylight import daylight
 from scenegen.rendering.pictures.denoiser import denoised
 from scenegen.rendering.pictures.development import develop
 from scenegen.rendering.pictures.matter import Matter, Soup, gather_matter
 from scenegen.rendering.pictures.matter_bsdf import matter_bsdf
-from scenegen.rendering.pictures.sky import outside
+from scenegen.rendering.pictures.sky import Outside, outside
 from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.tables import unit
 
@@ -53,8 +54,10 @@ def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Arr
     assert batch.interior is not None
     spec = batch.spec
     interior = from_json(Interior, batch.interior[b], "interior")
-    matter = gather_matter(batch, b, interior.lit)
-    scene = _scene(interior, matter)
+    matter = gather_matter(batch, b, interior.lit, materials_of(spec))
+    around = environment_of(spec)
+    lights = outside(interior) if around is None else Outside(around, np.eye(3)[1], np.zeros(3))
+    scene = _scene(interior, matter, lights)
     integrator = mi.load_dict({
         "type": "path", "max_depth": MAX_DEPTH, "rr_depth": ROULETTE_DEPTH,
     })  # fmt: skip
@@ -100,7 +103,7 @@ def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Arr
     image, exposure = develop(radiance, albedo, hit[..., 0] > 0.5, spec.image_dtype, noise)
     found = {"image": image, "exposure": exposure}
     if "albedo" in names:
-        found["albedo"] = _albedo(batch, b, scene, camera)
+        found["albedo"] = _albedo(batch, scene, camera)
     return found
 
 
@@ -120,7 +123,7 @@ def _ceiling(radiance: Array) -> float:
     return BRIGHTEST * max(float(radiance.mean()), 1e-9)
 
 
-def _albedo(batch: SceneBatch, b: int, scene: Any, camera: Any) -> Array:
+def _albedo(batch: SceneBatch, scene: Any, camera: Any) -> Array:
     """Return the base colour where the ray through each pixel's centre hits; NaN for nothing."""
     spec = batch.spec
     right, up, back, origin, size = camera
@@ -134,13 +137,13 @@ def _albedo(batch: SceneBatch, b: int, scene: Any, camera: Any) -> Array:
     return values.reshape(spec.height, spec.width, 3)
 
 
-def _scene(interior: Interior, matter: Matter) -> Any:
+def _scene(interior: Interior, matter: Matter, lights: Outside) -> Any:
     """Return the scene, of the same form for all rooms."""
     contents: dict[str, Any] = {
         "type": "scene",
         "matter": _mesh("matter", matter.soup, bsdf=matter_bsdf(matter.tables)),
         "glow": _mesh("glow", matter.glowing, radiance=matter.radiance, lit=interior.lit),
-        "day": daylight(outside(interior), windows_of(interior)),
+        "day": daylight(lights, windows_of(interior)),
     }
     return mi.load_dict(contents)
 
@@ -162,7 +165,9 @@ def windows_of(interior: Interior) -> Array:
     return np.array(found, np.float64).reshape(-1, 3, 3)
 
 
-def _mesh(name: str, soup: Soup, bsdf: Any = None, radiance: Array | None = None, lit: bool = False) -> Any:
+def _mesh(
+    name: str, soup: Soup, bsdf: Any = None, radiance: Array | None = None, lit: bool = False
+) -> Any:
     count = len(soup.corners)
     properties = mi.Properties()
     if bsdf is not None:

@@ -103,9 +103,7 @@ class Arranger:
             "south": (along, depth - away),
         }[wall]
 
-    def wall_box(
-        self, piece: Piece, wall: str, along: float, bottom: float, behind: float
-    ) -> Box:
+    def wall_box(self, piece: Piece, wall: str, along: float, bottom: float, behind: float) -> Box:
         """Return the box of a piece with its back to a wall."""
         x, z = self.wall_place(wall, along, piece.half[1] + behind)
         return box_at(piece, x, z, bottom, TURNS[wall])
@@ -234,7 +232,7 @@ class Arranger:
 
     def _toward_wall(self, length: float, margin: float, near: bool | None) -> float:
         share = self.draws.unit()
-        if near or near is None and self.draws.chance(0.6):
+        if near or (near is None and self.draws.chance(0.6)):
             share = 0.15 * share if self.draws.chance(0.5) else 1 - 0.15 * share
         return margin + share * max(length - 2 * margin, 0.0)
 
@@ -280,9 +278,8 @@ class Arranger:
         a, b = place.half
         seats = []
         for side in (-1, 1):
-            count = max(1, int(2 * a / (2 * chair.half[0] + 0.12)))
-            for i in range(min(count, 3)):
-                seats.append(((2 * i + 1 - count) * a / count, side * b, 0.0, side))
+            count = max(1, min(int(2 * a / (2 * chair.half[0] + 0.12)), 3))
+            seats += [((2 * i + 1 - count) * a / count, side * b, 0.0, side) for i in range(count)]
             if 2 * b > 2 * chair.half[0] + 0.1 and 2 * a > 1.1:
                 seats.append((side * a, 0.0, side, 0.0))
         wanted = self.draws.count(2, max(2, len(seats)))
@@ -309,7 +306,10 @@ class Arranger:
         self.on_surface(plate, table, across)
         cup = self.piece(self.draws.pick(("cup", "mug")), 1)
         if cup is not None:
-            beside = (across[0] + self.draws.span(-0.2, 0.2), across[1] + self.draws.span(-0.2, 0.2))
+            beside = (
+                across[0] + self.draws.span(-0.2, 0.2),
+                across[1] + self.draws.span(-0.2, 0.2),
+            )
             self.on_surface(cup, table, beside)
 
     def seat_at(self, desk: int) -> None:
@@ -390,7 +390,9 @@ class Arranger:
         x0, x1, z0, z1 = sides
         x, z = place.local(box.x, box.z)
         reach = Box(x, z, box.half, 0.0, 1.0, box.turns - place.turns).reach()
-        return x0 <= x - reach[0] and x + reach[0] <= x1 and z0 <= z - reach[1] and z + reach[1] <= z1
+        return (
+            x0 <= x - reach[0] and x + reach[0] <= x1 and z0 <= z - reach[1] and z + reach[1] <= z1
+        )
 
     def fill(self) -> None:
         """Put small things on surfaces until the room holds what it should."""
@@ -419,16 +421,22 @@ class Arranger:
                 continue
             top = max((surface[0] for surface in thing.piece.surfaces), default=0.0)
             for y, *sides in thing.piece.surfaces:
-                if family not in INSIDE and (y < top - 0.01 and family not in SEATS or y > HIGHEST):
+                if family not in INSIDE and (
+                    (y < top - 0.01 and family not in SEATS) or y > HIGHEST
+                ):
                     continue
                 area = (sides[1] - sides[0]) * (sides[3] - sides[2])
                 weight = min(area, 0.8) * (0.3 if family in SEATS else 1.0)
-                found.append(((family, number, y, sides), weight / (1 + 0.1 * carried.count(number))))
+                found.append(
+                    ((family, number, y, sides), weight / (1 + 0.1 * carried.count(number)))
+                )
         for hole in self.room.openings:
             if hole.kind == "window":
                 sides = (hole.left, hole.right, hole.bottom, float(WALLS.index(hole.wall)))
                 found.append((("sill", 0, hole.bottom, sides), 0.08))
-        astray = sum(t.piece.family in ON_TOP["floor"] and not t.stands_on for t in self.space.placed)
+        astray = sum(
+            t.piece.family in ON_TOP["floor"] and not t.stands_on for t in self.space.placed
+        )
         if astray < MOST_ON_FLOOR:
             found.append((("floor", 0, 0.0, ()), 0.06))
         return found
