@@ -2,8 +2,8 @@
 
 A part that was lofted or swept is wrapped in its sheet, as in cloth. Where that would be stretched,
 and on flat sides, it is papered: each triangle is projected along the axis that it faces most,
-which shortens lengths by 1 / sqrt(3) at most. The second coordinate runs along the longest side of
-a piece, as the grain of wood does.
+which shortens lengths by 1 / sqrt(3) at most. The second coordinate runs along a sheet or, on flat
+sides, along the longest side of a piece, as the grain of wood does.
 """
 
 import numpy as np
@@ -36,7 +36,7 @@ def corner_uv(part: Part, vertices: Array, *, whole: bool = False) -> Array:
     longest = np.argmax(high - low, axis=1)[piece]
     uv = _papered(corners, longest)
     if part.sheet is not None:
-        wrapped = _wrapped(part, corners, longest)
+        wrapped = _wrapped(part, corners)
         least, most = stretches(corners, wrapped)
         fits = (least > LEAST_STRETCH) & (most < MOST_STRETCH)
         fits &= (part.sheet[part.faces][..., 2] > 0.0).all(axis=1)
@@ -55,7 +55,8 @@ def _papered(corners: Array, longest: Array) -> Array:
     return np.take_along_axis(corners, pick, axis=2)
 
 
-def _wrapped(part: Part, corners: Array, longest: Array) -> Array:
+def _wrapped(part: Part, corners: Array) -> Array:
+    """Return coordinates around and along; exchanged for a low rim, such as a table top's edge."""
     assert part.sheet is not None
     sheet = part.sheet[part.faces]
     around, along, whole = sheet[..., 0], sheet[..., 1], sheet[..., 2]
@@ -69,9 +70,10 @@ def _wrapped(part: Part, corners: Array, longest: Array) -> Array:
     e, f = sides.T @ lengths
     determinant = max(a * d - b * c, 1e-30)
     factors = np.array([d * e - b * f, a * f - c * e]) / determinant
-    flat = flat * np.sqrt(np.maximum(factors, 1e-12))
-    tall = (longest == 1)[:, None, None]
-    return np.where(tall, flat, flat[..., ::-1])
+    factors = np.maximum(factors, 1e-12)
+    flat = flat * np.sqrt(factors)
+    low = whole.max() * factors[0] ** 0.5 > 4 * np.ptp(along) * factors[1] ** 0.5
+    return flat[..., ::-1] if low else flat
 
 
 def stretches(corners: Array, uv: Array) -> tuple[Array, Array]:

@@ -6,9 +6,9 @@ from numpy.random import Generator
 
 from scenegen.objects.families import lamps
 from scenegen.objects.families.parts.draws import chance, pick, span
-from scenegen.objects.families.parts.moves import moved, turn_about_x, turn_about_z
+from scenegen.objects.families.parts.moves import buried, moved, turn_about_x, turn_about_z
 from scenegen.objects.families.parts.profiles import arc, bezier, join, line
-from scenegen.objects.families.parts.soft import bevelled, pad
+from scenegen.objects.families.parts.soft import bevelled, close_fitting, pad
 from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 from scenegen.objects.families.parts.walls import ring
 
@@ -49,7 +49,7 @@ def clock(rng: Generator) -> list[Part]:
     face = loft(line((inside, 0.002), (inside, deep - 0.014)), segments=64, **shape)  # type: ignore[arg-type]
     up = turn_about_x(math.pi / 2)
     place = (0.0, r, 0.0)
-    parts = made_of("rim", moved(rim, place, up)) + made_of("dial", moved(face, place, up))
+    parts = made_of("rim", close_fitting(moved(rim, place, up))) + made_of("dial", buried(moved(face, place, up)))
     level = deep - 0.014
     hands = []
     minute, hour = 6.283 * rng.random(), 6.283 * rng.random()

@@ -91,10 +91,10 @@ def _case(rng: Generator, size: Size, foot: float) -> list[Part]:
     lid = bevelled([((-x - over, high - top, -z), (x + over, high, z + over))], 0.004)
     parts += made_of("case", lid)
     style = pick(rng, ("plinth", "tapered", "tapered", "block"))
-    if style == "plinth":
+    if style == "plinth" and foot < 0.1:
         return parts + made_of("case", bevelled([((-x + 0.02, 0.0, -z + 0.02), (x - 0.02, foot, z - 0.05))], 0.002))
     at = [(sx * (x - 0.06), sz * (z - 0.06)) for sx in (1, -1) for sz in (1, -1)]
-    if style == "block":
+    if style != "tapered":
         feet = [((cx - 0.025, 0.0, cz - 0.025), (cx + 0.025, foot + 0.005, cz + 0.025)) for cx, cz in at]
         return parts + made_of("feet", bevelled(feet, 0.003))
     lean = [(-0.25 * cx / abs(cx), -0.2 * cz / abs(cz)) for cx, cz in at]

@@ -73,7 +73,7 @@ def vase(rng: Generator) -> list[Part]:
         wall = join(arc((foot - 0.008, 0.008), 0.008, -90, 0, 4), line((foot, 0.008), (foot * span(rng, 0.9, 1.3), high), strips=3))
         neck = foot
     else:
-        rise = 0.5 if style == "bottle" else span(rng, 0.75, 0.95)
+        rise = max(0.5 if style == "bottle" else span(rng, 0.75, 0.95), 0.8 * at + 0.1)
         wall = join(
             bezier((foot, 0.0), (belly, 0.1 * at * high), (belly, 0.5 * at * high), (belly, at * high * 0.8), 8),
             bezier((belly, at * high * 0.8), (belly, rise * high), (neck, rise * high), (neck, high - 0.006), 12),

@@ -177,8 +177,9 @@ def _wood(rng: Generator, palette: Palette) -> Material:
 
 def _paint(rng: Generator, palette: Palette) -> Material:
     """Draw lacquer: mostly white or neutral, sometimes a colour of the room."""
-    options = (palette.neutrals[0], palette.neutrals[0], palette.neutrals[1], palette.neutrals[3])
-    color = pick(rng, (*options, palette.fabrics[2], palette.accents[1], palette.walls[1]))
+    white, grey, dark = palette.neutrals[0], palette.neutrals[1], palette.neutrals[3]
+    colors = (palette.fabrics[2], palette.accents[1])
+    color = pick(rng, (white, white, white, grey, dark, *colors, palette.fabrics[1]))
     pattern = patterns.roller(_seed(rng))
     rough = span(rng, 0.25, 0.5)
     dark, light = _scaled(color, 0.97), _scaled(color, 1.0)
@@ -296,6 +297,13 @@ def _plastic(rng: Generator, palette: Palette) -> Material:
     return Material(np.array(color), span(rng, 0.2, 0.5))
 
 
+def _bottle(rng: Generator, palette: Palette) -> Material:
+    """Draw glass so dark or full that nothing shows through it."""
+    del palette
+    color = linear(pick(rng, ("16261a", "1f3a22", "3a1e0e", "141416", "5a1f1c", "c9d2cc")))
+    return Material(np.array(color), span(rng, 0.04, 0.12), specular=0.6)
+
+
 def _black(rng: Generator, palette: Palette) -> Material:
     return Material(np.array(palette.neutrals[4]), span(rng, 0.3, 0.5))
 
@@ -363,7 +371,7 @@ _DRAWN: dict[str, Callable[[Generator, Palette], Material]] = {
     "wood": _wood, "paint": _paint, "stone": _marble, "metal": _metal,
     "fabric": _fabric, "linen": _linen, "felt": _felt, "leather": _leather, "rug": _rug,
     "wicker": _wicker, "ceramic": _ceramic, "terracotta": _terracotta, "plastic": _plastic,
-    "black": _black, "cardboard": _cardboard, "paper": _mount, "pages": _pages, "print": _print,
+    "black": _black, "bottle": _bottle, "cardboard": _cardboard, "paper": _mount, "pages": _pages, "print": _print,
     "leaf": _leaf, "stem": _stem, "soil": _soil, "glow": _glow, "drink": _drink,
     "picture": pictures.picture, "screen": pictures.screen, "dial": pictures.dial,
 }  # fmt: skip

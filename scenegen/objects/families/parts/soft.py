@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -93,7 +94,9 @@ def pad(
         end = (-edge - 0.75 * (room - edge), high[1])
         bend = (r - 0.3 * (r - end[0]), y + 0.3 * (r - end[0]) * float(way[1] / abs(way[0])))
         side = join(side, bezier((r, y), (bend[0], min(bend[1], high[1])), (0.5 * (r + end[0]), high[1]), end, 5))
-    base = (x, z, radius)
+    # Profiles are radii, and so not negative: they count from the innermost row.
+    side = side[0] + (room, 0.0), side[1]
+    base = (x - room, z - room, radius - room * is_round)
     at = ((low[0] + high[0]) / 2, (low[2] + high[2]) / 2)
     return loft(side, base=base, corner=float(is_round), at=at, lean=lift, segments=12 if radius < 0.1 else 32)
 
@@ -117,8 +120,17 @@ def pillow(width: float, height: float, thick: float, cells: int = 14) -> Part:
     both = np.concatenate([points.reshape(-1, 3), points.reshape(-1, 3) * (1, 1, -1)])
     used, index = np.unique(faces, return_inverse=True)
     vertices, faces = both[used], index.reshape(faces.shape)
+    sheet = np.stack([_length(points, 1), _length(points, 0), np.full(a.shape, 9.0)], axis=-1)
+    sheet = np.concatenate([sheet.reshape(-1, 3)] * 2)[used]
     normals = vertex_normals(vertices, faces)
-    return Part(vertices, faces, normals, *_hull(vertices))
+    return Part(vertices, faces, normals, *_hull(vertices), 1, sheet)
+
+
+def _length(points: Array, axis: int) -> Array:
+    """Return how far points of a grid, (rows, columns, 3), lie from its middle along an axis."""
+    steps = np.linalg.norm(np.diff(points, axis=axis), axis=2)
+    far = np.cumsum(np.concatenate([0 * steps.take([0], axis), steps], axis=axis), axis=axis)
+    return np.asarray(far - far.take([far.shape[axis] // 2], axis))
 
 
 def _cells(number: Array) -> Array:
@@ -170,6 +182,12 @@ def blades(
     sheet = np.tile(np.column_stack([side, np.full(half, 9.0)]), (2 * count, 1))
     normals = vertex_normals(vertices, faces)
     return Part(vertices, faces, normals, *_hull(vertices), count, sheet)
+
+
+def close_fitting(part: Part) -> Part:
+    """Return a part whose body for placing is the hull of its vertices, as after a turn."""
+    hull_points, hull_discs = _hull(part.vertices)
+    return replace(part, hull_points=hull_points, hull_discs=hull_discs)
 
 
 def _hull(vertices: Array) -> tuple[Array, Array]:
