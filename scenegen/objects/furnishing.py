@@ -151,14 +151,24 @@ _ROLES: dict[str, dict[str, tuple[str, ...]]] = {
         "lid": ("cardboard", "print", "felt"),
     },
     "picture": {"frame": ("wood", "paint", "metal"), "mount": ("paper",)},
-    "screen": {"case": ("black",), "stand": ("black", "metal")},
+    "screen": {"case": ("black",), "stand": ("black",)},
     "clock": {"rim": ("wood", "metal", "black"), "hand": ("black",)},
     "floor_lamp": {"": ("wood", "metal", "metal"), "shade": ("glow",)},
-    "pendant": {"metal": ("metal",), "shade": ("glow",), "metal shade": ("paint", "metal", "plastic")},
+    "pendant": {
+        "metal": ("metal",),
+        "shade": ("glow",),
+        "metal shade": ("paint", "metal", "plastic"),
+    },
     "plant": {"pot": ("ceramic", "terracotta", "wicker")},
     "tall_plant": {"pot": ("ceramic", "terracotta", "wicker"), "trunk": ("stem",)},
 }
-_SHARED = ("wood", "metal", "paint", "glow", "leather")  # all parts of one object are of the same one
+_SHARED = (
+    "wood",
+    "metal",
+    "paint",
+    "glow",
+    "leather",
+)  # all parts of one object are of the same one
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,9 @@ def _book(rng: Generator, high: float, deep: float, thick: float) -> list[Part]:
     ]
     color = 1 + int(COLORS * rng.random())
     pages = ((board, over, -deep / 2 + over), (thick - board, high - over, deep / 2 - board))
-    return made_of(f"print {color}", bevelled(cover, 0.001)) + made_of("pages", bevelled([pages], 0.0005))
+    return made_of(f"print {color}", bevelled(cover, 0.001)) + made_of(
+        "pages", bevelled([pages], 0.0005)
+    )
 
 
 def book(rng: Generator) -> list[Part]:
@@ -84,7 +86,14 @@ def box(rng: Generator) -> list[Part]:
             low, top = i * high / rows + 0.002, i * high / rows + slat
             slats += [((-x, low, s * z - thick / 2), (x, top, s * z + thick / 2)) for s in (1, -1)]
             slats += [((s * x - thick / 2, low, -z), (s * x + thick / 2, top, z)) for s in (1, -1)]
-        posts = [((sx * (x - 0.015) - 0.012, 0.0, sz * (z - 0.015) - 0.012), (sx * (x - 0.015) + 0.012, high, sz * (z - 0.015) + 0.012)) for sx in (1, -1) for sz in (1, -1)]
+        posts = [
+            (
+                (sx * (x - 0.015) - 0.012, 0.0, sz * (z - 0.015) - 0.012),
+                (sx * (x - 0.015) + 0.012, high, sz * (z - 0.015) + 0.012),
+            )
+            for sx in (1, -1)
+            for sz in (1, -1)
+        ]
         posts.append(((-x, 0.004, -z), (x, 0.012, z)))
         return made_of("slats", bevelled(slats, 0.0015), bevelled(posts, 0.0015))
     sides: list[Box] = [((-x, 0.0, -z), (x, wall, z))]
@@ -123,5 +132,8 @@ def picture(rng: Generator) -> list[Part]:
     board = ((-x + inner, inner, 0.001), (x - inner, high - inner, deep - 0.008))
     parts += made_of("mount", bevelled([board], 0.0005))
     side = inner + mount
-    sheet = ((-x + side, side, 0.002), (x - side, high - side, deep - 0.0075 if mount else deep - 0.006))
+    sheet = (
+        (-x + side, side, 0.002),
+        (x - side, high - side, deep - 0.0075 if mount else deep - 0.006),
+    )
     return parts + made_of("picture", bevelled([sheet], 0.0004))

@@ -93,12 +93,22 @@ def pad(
         (r, y), way = side[0][-1].tolist(), side[1][-1]
         end = (-edge - 0.75 * (room - edge), high[1])
         bend = (r - 0.3 * (r - end[0]), y + 0.3 * (r - end[0]) * float(way[1] / abs(way[0])))
-        side = join(side, bezier((r, y), (bend[0], min(bend[1], high[1])), (0.5 * (r + end[0]), high[1]), end, 5))
+        side = join(
+            side,
+            bezier((r, y), (bend[0], min(bend[1], high[1])), (0.5 * (r + end[0]), high[1]), end, 5),
+        )
     # Profiles are radii, and so not negative: they count from the innermost row.
     side = side[0] + (room, 0.0), side[1]
     base = (x - room, z - room, radius - room * is_round)
     at = ((low[0] + high[0]) / 2, (low[2] + high[2]) / 2)
-    return loft(side, base=base, corner=float(is_round), at=at, lean=lift, segments=12 if radius < 0.1 else 32)
+    return loft(
+        side,
+        base=base,
+        corner=float(is_round),
+        at=at,
+        lean=lift,
+        segments=12 if radius < 0.1 else 32,
+    )
 
 
 def pillow(width: float, height: float, thick: float, cells: int = 14) -> Part:
