@@ -255,7 +255,8 @@ def _materials(
     family: str, names: list[str], rng: np.random.Generator
 ) -> tuple[tuple[str, ...], list[int]]:
     """Return the kinds of a member's materials, and the index of each part's."""
-    roles, kinds, number_of = _ROLES.get(family, {}), [], {}
+    roles, number_of = _ROLES.get(family, {}), dict[str, int]()
+    kinds: list[str] = []
     for name in dict.fromkeys(names):
         kind = pick(rng, roles.get(name, (name.split()[0] if name else name,)))
         if kind in _SHARED and kind in kinds:
@@ -287,7 +288,7 @@ def supports(thing: Furnishing) -> list[Rectangle]:
     level = (np.ptp(corners[..., 1], axis=1) < 1e-6) & (normal[:, 1] > 0.0)
     patches = thing.patch[level]
     heights = np.round(corners[level, 0, 1], 4)
-    found = []
+    found: list[Rectangle] = []
     for patch, y in sorted({*zip(patches.tolist(), heights.tolist(), strict=True)}):
         points = corners[level][(patches == patch) & (heights == y)].reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
@@ -297,9 +298,10 @@ def supports(thing: Furnishing) -> list[Rectangle]:
                 continue
             first, last = _free(corners, middle - share * half, middle + share * half, top)
             if (last - first).min() > LEAST_SIDE:
-                found.append((top, first[0], last[0], first[1], last[1]))
+                (x0, z0), (x1, z1) = first.tolist(), last.tolist()
+                found.append((top, x0, x1, z0, z1))
             break
-    return sorted(tuple(map(float, rectangle)) for rectangle in found)
+    return sorted(found)
 
 
 def _is_on(corners: Array, places: Array, y: float) -> bool:
@@ -309,7 +311,7 @@ def _is_on(corners: Array, places: Array, y: float) -> bool:
     def side(p: Array, q: Array) -> Array:
         """Return on which side of the lines p-q the places lie, seen from above, (F, P)."""
         ahead, across = q - p, places[None] - p[:, None]
-        return ahead[:, :1] * across[..., 1] - ahead[:, 1:] * across[..., 0]
+        return np.asarray(ahead[:, :1] * across[..., 1] - ahead[:, 1:] * across[..., 0])
 
     u, v, w = side(b, c), side(c, a), side(a, b)
     inside = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0))

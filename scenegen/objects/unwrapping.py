@@ -29,10 +29,10 @@ def corner_uv(part: Part, vertices: Array, *, whole: bool = False) -> Array:
     corners = vertices[part.faces]
     if whole:
         if part.sheet is not None and (high - low)[:, 2].min() > 1e-3 and part.pieces > 1:
-            return part.sheet[part.faces][..., :2]
+            return np.asarray(part.sheet[part.faces][..., :2])
         share = (corners - low[piece, None]) / np.maximum(high - low, 1e-9)[piece, None]
         flat = (high - low)[piece, 1] < (high - low)[piece, 2]
-        return np.where(flat[:, None, None], share[..., ::2], share[..., :2])
+        return np.asarray(np.where(flat[:, None, None], share[..., ::2], share[..., :2]))
     longest = np.argmax(high - low, axis=1)[piece]
     uv = _papered(corners, longest)
     if part.sheet is not None:
@@ -73,7 +73,7 @@ def _wrapped(part: Part, corners: Array) -> Array:
     factors = np.maximum(factors, 1e-12)
     flat = flat * np.sqrt(factors)
     low = whole.max() * factors[0] ** 0.5 > 4 * np.ptp(along) * factors[1] ** 0.5
-    return flat[..., ::-1] if low else flat
+    return np.asarray(flat[..., ::-1] if low else flat)
 
 
 def stretches(corners: Array, uv: Array) -> tuple[Array, Array]:

@@ -8,7 +8,7 @@ from numpy.random import Generator
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import moved, turn_about_x
 from scenegen.objects.families.parts.profiles import line
-from scenegen.objects.families.parts.soft import bevelled, pad
+from scenegen.objects.families.parts.soft import bevelled, four, pad, posts
 from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 
 
@@ -55,11 +55,9 @@ def _upholstered(rng: Generator, seats: int, wide: float) -> list[Part]:
         parts.append(moved(body, (0.0, seat - 0.005, -z + back + 0.09), tilt))
     a, b = x - 0.07, z - 0.08
     style = pick(rng, ("tapered", "block", "metal"))
-    at = [(sx * a, sz * b) for sx in (1, -1) for sz in (1, -1)]
+    at = four(a, b)
     if style == "block":
-        feet = bevelled(
-            [((cx - 0.03, 0.0, cz - 0.03), (cx + 0.03, foot + 0.02, cz + 0.03)) for cx, cz in at]
-        )
+        feet = bevelled(posts(at, 0.03, 0.0, foot + 0.02))
     else:
         thin = 0.012 if style == "metal" else 0.024
         feet = loft(line((0.6 * thin, 0.0), (thin, foot + 0.02)), at=at, segments=16)

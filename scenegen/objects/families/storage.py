@@ -7,7 +7,7 @@ from numpy.random import Generator
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import moved, turn_about_x
 from scenegen.objects.families.parts.profiles import arc, fillet, join, line
-from scenegen.objects.families.parts.soft import Box, bevelled, pad
+from scenegen.objects.families.parts.soft import Box, bevelled, four, pad, posts
 from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 from scenegen.objects.families.parts.sweeps import tube
 
@@ -99,12 +99,10 @@ def _case(rng: Generator, size: Size, foot: float) -> list[Part]:
         return parts + made_of(
             "case", bevelled([((-x + 0.02, 0.0, -z + 0.02), (x - 0.02, foot, z - 0.05))], 0.002)
         )
-    at = [(sx * (x - 0.06), sz * (z - 0.06)) for sx in (1, -1) for sz in (1, -1)]
+    at = four(x - 0.06, z - 0.06)
     if style != "tapered":
-        feet = [
-            ((cx - 0.025, 0.0, cz - 0.025), (cx + 0.025, foot + 0.005, cz + 0.025)) for cx, cz in at
-        ]
-        return parts + made_of("feet", bevelled(feet, 0.003))
+        blocks = posts(at, 0.025, 0.0, foot + 0.005)
+        return parts + made_of("feet", bevelled(blocks, 0.003))
     lean = [(-0.25 * cx / abs(cx), -0.2 * cz / abs(cz)) for cx, cz in at]
     feet = [(cx - a * foot, cz - b * foot) for (cx, cz), (a, b) in zip(at, lean, strict=True)]
     return parts + made_of(
@@ -199,12 +197,10 @@ def desk(rng: Generator) -> list[Part]:
         )
         parts += [moved(part, (cx, 0.0, 0.0)) for part in shell + case]
     if style == "panels":
-        sides = [
-            ((s * (x - 0.03) - 0.014, 0.0, -z + 0.02), (s * (x - 0.03) + 0.014, under, z - 0.02))
-            for s in (1, -1)
-        ]
-        sides.append(((-x + 0.04, under - 0.3, -z + 0.06), (x - 0.04, under, -z + 0.08)))
-        return parts + made_of("legs", bevelled(sides, 0.002))
+        boards: list[Box] = [((-x + 0.04, under - 0.3, -z + 0.06), (x - 0.04, under, -z + 0.08))]
+        ends = (x - 0.03, -x + 0.03)
+        boards += [((a - 0.014, 0.0, -z + 0.02), (a + 0.014, under, z - 0.02)) for a in ends]
+        return parts + made_of("legs", bevelled(boards, 0.002))
     ways = (-1,) if style == "drawers" else (1, -1)
     at = [(sx * (x - 0.06), sz * (z - 0.06)) for sx in ways for sz in (1, -1)]
     corner = pick(rng, (0.1, 1.0))
@@ -248,8 +244,8 @@ def coffee_table(rng: Generator) -> list[Part]:
             for s in (1, -1)
         ]
         return parts + made_of("legs", *bars)
-    at = [(sx * a, sz * b) for sx in (1, -1) for sz in (1, -1)]
-    lean = [(-0.12 * sx, -0.12 * sz) for sx in (1, -1) for sz in (1, -1)]
+    at = four(a, b)
+    lean = four(-0.12, -0.12)
     feet = loft(line((0.6 * thin, 0.0), (thin, under + 0.002)), at=at, lean=lean, segments=16)
     parts += made_of("legs", feet)
     if style != "round" and chance(rng, 0.4):

@@ -8,7 +8,7 @@ from numpy.random import Generator
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import moved, turn_about_x
 from scenegen.objects.families.parts.profiles import line
-from scenegen.objects.families.parts.soft import bevelled, pad, pillow
+from scenegen.objects.families.parts.soft import bevelled, four, pad, pillow, posts
 from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 from scenegen.objects.families.parts.sweeps import tube
 
@@ -36,26 +36,17 @@ def bed(rng: Generator) -> list[Part]:
             panel = pad((left, 0.0, back - 0.05), (left + step, head, back + 0.05), 0.025, 0.0)
             parts += made_of("cover", panel)
     elif style == "slats":
-        posts = [
-            ((s * x - 0.025, 0.0, back - 0.025), (s * x + 0.025, head, back + 0.025))
-            for s in (1, -1)
-        ]
-        posts += [((-x, y, back - 0.012), (x, y + 0.06, back + 0.012)) for y in (head - 0.1, under)]
         count = round(wide / 0.12)
-        for i in range(count):
-            cx = -x + wide * (i + 0.5) / count
-            posts.append(
-                ((cx - 0.012, under, back - 0.008), (cx + 0.012, head - 0.05, back + 0.008))
-            )
-        parts += made_of("frame", bevelled(posts, 0.003))
-    else:
-        parts += made_of(
-            "frame",
-            bevelled([((-x - 0.03, 0.0, back - 0.02), (x + 0.03, head, back + 0.02))], 0.008),
+        slats = [(-x + wide * (i + 0.5) / count, back) for i in range(count)]
+        bars = posts([(x, back), (-x, back)], 0.025, 0.0, head) + posts(
+            slats, 0.01, under, head - 0.05
         )
-    feet = [(s * (x - 0.03) - 0.03, s * (x - 0.03) + 0.03) for s in (1, -1)]
-    ends = (z - 0.06, -z + 0.06)
-    legs = [((a, 0.0, cz - 0.03), (b, low + 0.02, cz + 0.03)) for a, b in feet for cz in ends]
+        bars += [((-x, y, back - 0.012), (x, y + 0.06, back + 0.012)) for y in (head - 0.1, under)]
+        parts += made_of("frame", bevelled(bars, 0.003))
+    else:
+        board = ((-x - 0.03, 0.0, back - 0.02), (x + 0.03, head, back + 0.02))
+        parts += made_of("frame", bevelled([board], 0.008))
+    legs = posts(four(x - 0.03, z - 0.06), 0.03, 0.0, low + 0.02)
     parts += made_of("frame", bevelled(legs, 0.003))
     return parts + _bedding(rng, wide, long, under, top)
 

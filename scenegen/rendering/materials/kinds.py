@@ -73,8 +73,8 @@ def _granite(seed: int) -> Pattern:
     return patterns.speckles(seed, 110)
 
 
-def _tile(columns: int, rows: int, running: bool = False) -> Callable[[int], Pattern]:
-    return lambda seed: patterns.tiles(seed, columns, rows, running)
+def _tile(columns: int, rows: int) -> Callable[[int], Pattern]:
+    return lambda seed: patterns.tiles(seed, columns, rows)
 
 
 _GLAZE = "neutrals0 neutrals0 neutrals0 neutrals3 accents"
@@ -88,8 +88,8 @@ _STONES = tuple(
     for stone, vein in _MARBLES
 )
 _TILES = tuple(
-    Recipe(_QUIET, (0.1, 0.4), _tile(*laid), (0.8, 1.08), 0.08, _GROUT, 0.9, metres=metres)
-    for *laid, metres in ((4, 4, 1.2), (2, 2, 1.2), (2, 4, True, 1.6), (8, 8, 1.2))
+    Recipe(_QUIET, (0.1, 0.4), _tile(across, along), (0.8, 1.08), 0.08, _GROUT, 0.9, metres=metres)
+    for across, along, metres in ((4, 4, 1.2), (2, 2, 1.2), (2, 4, 1.6), (8, 8, 1.2))
 )
 _CARPET = Recipe(
     "neutrals1 neutrals2 fabrics1 fabrics3", (0.95, 0.95), patterns.pile, (0.5, 0.95),
@@ -130,7 +130,7 @@ _RECIPES: dict[str, tuple[Recipe, ...]] = {
                specular=0.15),
     ),
     "soil": (
-        Recipe("3a2c22", (0.95, 0.95), patterns.pile, (0.3, 1.3), bumps=2.0, metres=0.25,
+        Recipe("3a2c22", (0.95, 0.95), patterns.pile, (0.3, 1.3), bumps=0.5, metres=0.25,
                specular=0.05),
     ),
     "plastic": (Recipe("neutrals0 neutrals4 accents", (0.2, 0.5)),),

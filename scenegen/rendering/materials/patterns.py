@@ -93,12 +93,12 @@ def herringbone(seed: int, ratio: int) -> Pattern:
 
 
 @lru_cache(maxsize=12)
-def tiles(seed: int, columns: int, rows: int, running: bool) -> Pattern:
-    """Return tiles with grout; `running` shifts every other row by half a tile."""
+def tiles(seed: int, columns: int, rows: int) -> Pattern:
+    """Return tiles with grout; long ones are shifted by half a tile in every other row."""
     u, v = grid(SIZE)
     y = v * rows + 0 * u
     row = np.minimum(y.astype(np.int32), rows - 1)
-    x = (u * columns + (0.5 * (row % 2) if running else 0.0)) % columns
+    x = (u * columns + (0.5 * (row % 2) if columns < rows else 0.0)) % columns
     column = np.minimum(x.astype(np.int32), columns - 1)
     gap = np.minimum(np.minimum(x % 1, 1 - x % 1) / columns, np.minimum(y % 1, 1 - y % 1) / rows)
     seam = 1.0 - smoothstep(0.0025, 0.0045, gap)
@@ -170,7 +170,7 @@ def pile(seed: int) -> Pattern:
     tuft = noise(seed, SIZE, -0.1, lowest=40, highest=150)
     tread = noise(seed + 1, SIZE, 1.3, highest=10)
     share = np.clip(0.55 + 0.17 * tuft + 0.07 * tread, 0.0, 1.0)
-    return _kept(share, 0.0009 * tuft, smoothstep(-1.0, 1.0, tuft))
+    return _kept(share, 0.00018 * tuft, smoothstep(-1.0, 1.0, tuft))
 
 
 @lru_cache(maxsize=6)
@@ -241,7 +241,7 @@ def wickerwork(seed: int) -> Pattern:
     j = y.astype(np.int32)
     wave = np.cos(np.pi * (x + j))  # the weaver goes in front of every other stake
     body = np.sqrt(np.maximum(1 - (2 * (y % 1) - 1) ** 2, 0.0))
-    shade = cell_numbers(seed, j, x.astype(np.int32) // 4)
+    shade = cell_numbers(seed, j)
     fibre = noise(seed, SIZE, 0.2, (1.0, 20.0), lowest=20)
     share = np.clip(
         0.15 + 0.55 * body * (0.65 + 0.35 * wave) + 0.2 * (shade - 0.5) + 0.06 * fibre, 0, 1

@@ -65,6 +65,16 @@ def bevelled(boxes: Sequence[Box], edge: float = 0.004) -> Part:
     return Part(*mesh, hull, np.zeros(len(hull)), len(boxes))
 
 
+def four(x: float, z: float) -> list[Point]:
+    """Return four places (x, z), one in each quadrant."""
+    return [(sx * x, sz * z) for sx in (1, -1) for sz in (1, -1)]
+
+
+def posts(at: Sequence[Point], half: float, low: float, high: float) -> list[Box]:
+    """Return upright square bars at places (x, z), of half the width `half`."""
+    return [((x - half, low, z - half), (x + half, high, z + half)) for x, z in at]
+
+
 def pad(
     low: Corner, high: Corner, edge: float, crown: float = 0.0, corner: float | None = None,
     lift: Point = (0.0, 0.0),
