@@ -101,7 +101,7 @@ def _case(rng: Generator, size: Size, foot: float) -> list[Part]:
         )
     at = four(x - 0.06, z - 0.06)
     if style != "tapered":
-        blocks = posts(at, 0.025, 0.0, foot + 0.005)
+        blocks = posts(at, 0.018, 0.0, foot + 0.005)
         return parts + made_of("feet", bevelled(blocks, 0.003))
     lean = [(-0.25 * cx / abs(cx), -0.2 * cz / abs(cz)) for cx, cz in at]
     feet = [(cx - a * foot, cz - b * foot) for (cx, cz), (a, b) in zip(at, lean, strict=True)]

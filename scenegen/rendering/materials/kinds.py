@@ -55,6 +55,7 @@ class Recipe:
         rough_seam: roughness of the seams.
         bumps: factor of the pattern's heights.
         metres, specular: as of `Material`.
+        every: pixel of the pattern that is kept; 2 where things are small or a wall is smooth.
     """
 
     colors: str
@@ -67,6 +68,7 @@ class Recipe:
     bumps: float = 1.0
     metres: float = 1.0
     specular: float = 0.5
+    every: int = 1
 
 
 def _granite(seed: int) -> Pattern:
@@ -105,7 +107,7 @@ _RECIPES: dict[str, tuple[Recipe, ...]] = {
     "stone": _STONES,
     "paint": (
         Recipe("neutrals0 neutrals0 neutrals0 neutrals1 neutrals3 fabrics1 fabrics2 accents1",
-               (0.25, 0.5), patterns.roller, (0.97, 1.0), 0.08, bumps=0.3, metres=0.6),
+               (0.25, 0.5), patterns.roller, (0.97, 1.0), 0.08, bumps=0.3, metres=0.6, every=2),
     ),
     "leather": (
         Recipe("5a3a26 8a5a34 2b2522 a98a66 6b2f22 fabrics2", (0.35, 0.5), patterns.hide,
@@ -116,22 +118,24 @@ _RECIPES: dict[str, tuple[Recipe, ...]] = {
                specular=0.05),
     ),
     "ceramic": (
-        Recipe(_GLAZE, (0.06, 0.3), lambda s: patterns.speckles(s, 80), (0.86, 1.0), metres=0.4),
-        Recipe(_GLAZE, (0.06, 0.3), lambda s: patterns.speckles(s, 40), (0.9, 1.0), metres=0.4),
+        Recipe(_GLAZE, (0.06, 0.3), lambda s: patterns.speckles(s, 80), (0.86, 1.0), metres=0.4,
+               every=2),
+        Recipe(_GLAZE, (0.06, 0.3), lambda s: patterns.speckles(s, 40), (0.9, 1.0), metres=0.4,
+               every=2),
         Recipe(_GLAZE, (0.15, 0.4), lambda s: patterns.speckles(s, 160), (0.86, 1.0),
-               seam="5a4632", metres=0.4),
+               seam="5a4632", metres=0.4, every=2),
     ),
     "terracotta": (
         Recipe("b5623f a9583a c9a48a neutrals2", (0.85, 0.9), patterns.trowel, (0.75, 1.1),
-               bumps=0.2, metres=0.8, specular=0.1),
+               bumps=0.2, metres=0.8, specular=0.1, every=2),
     ),
     "cardboard": (
         Recipe("b48a5e a97f55 c29c72", (0.85, 0.9), patterns.roller, (0.85, 1.05), metres=0.5,
-               specular=0.15),
+               specular=0.15, every=2),
     ),
     "soil": (
         Recipe("3a2c22", (0.95, 0.95), patterns.pile, (0.3, 1.3), bumps=0.5, metres=0.25,
-               specular=0.05),
+               specular=0.05, every=2),
     ),
     "plastic": (Recipe("neutrals0 neutrals4 accents", (0.2, 0.5)),),
     "black": (Recipe("neutrals4", (0.3, 0.5)),),
@@ -157,13 +161,16 @@ def _shaded(
     palette: Palette,
 ) -> Material:  # fmt: skip
     """Colour a pattern from dark to light, and its seams in their own colour."""
-    share, joint = pattern.share, pattern.seam
+    share, bumps, joint = (
+        field[:: recipe.every, :: recipe.every]
+        for field in (pattern.share, pattern.height, pattern.seam)
+    )
     color, roughness = lerp(dark, light, share), rough + recipe.rougher * (1.0 - share)
     if recipe.seam:
         seam = np.asarray(pick(rng, _options(recipe.seam, palette)), np.float32)
         color += joint[..., None] * (seam - color)
         roughness = roughness + joint * (recipe.rough_seam - roughness)
-    height = recipe.bumps * pattern.height if pattern.height.any() else None
+    height = recipe.bumps * bumps if bumps.any() else None
     roughness = np.clip(roughness, 0.05, 1.0).astype(np.float32)
     return Material(color, roughness, height, specular=recipe.specular, metres=recipe.metres)
 
@@ -246,7 +253,7 @@ def _wood(rng: Generator, palette: Palette) -> Material:
 
 
 def _metal(rng: Generator, palette: Palette) -> Material:
-    brushed = patterns.weave(0, 64, "plain").share  # any fine field does
+    brushed = patterns.weave(0, 64, "plain").share[::2, ::2]  # any fine field does
     rough = (span(rng, 0.12, 0.4) + 0.05 * (brushed - 0.5)).astype(np.float32)
     return Material(np.array(palette.metal), rough, metallic=1.0, metres=0.1)
 
@@ -302,7 +309,7 @@ def _rug(rng: Generator, palette: Palette) -> Material:
 def _pages(rng: Generator, palette: Palette) -> Material:
     """Draw the edges of pages: lines along v."""
     lines = np.random.default_rng(_seed(rng)).random(patterns.SIZE, np.float32)
-    share = np.broadcast_to(lines, (patterns.SIZE, patterns.SIZE))
+    share = np.broadcast_to(lines, (8, patterns.SIZE))
     color = np.array(pick(rng, _options("ece4d0 e3d8bf f0ece2", palette)))
     return Material(lerp(0.7 * color, color, share), 0.95, specular=0.1, metres=0.2)
 

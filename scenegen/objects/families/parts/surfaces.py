@@ -102,8 +102,8 @@ def loft(
     normals[..., 1] -= (leans[:, None] * outward).sum(axis=-1)[:, None] * rise
     vertices, faces, units, sheet = strips(grid, normals)
     sheet[np.abs(units[:, 1]) > 0.7, 2] = 0.0  # a lid or a flat top is not wound about the axis
-    hull, radii = hull.reshape(-1, 3), radii.reshape(-1)
-    return Part(vertices, faces, units, hull, radii, len(centers), sheet)
+    hull_points, hull_discs = hull.reshape(-1, 3), radii.reshape(-1)
+    return Part(vertices, faces, units, hull_points, hull_discs, len(centers), sheet)
 
 
 def _with_lids(rows: Array) -> Array:
