@@ -77,7 +77,7 @@ FAMILIES_FACTS = {
     "floor_lamp": Facts("floor lamp", 35, ("floor",), (1.4, 1.75), (0.32, 0.55)),
     "pendant": Facts("pendant lamp", 35, ("hung",), (0.35, 1.0)),
     "plant": Facts("plant", 40, ("on", "sill"), (0.15, 0.65)),
-    "tall_plant": Facts("tall plant", 40, ("floor",), (0.6, 1.8)),
+    "tall_plant": Facts("tall plant", 40, ("floor",), (0.55, 1.8)),
 }
 _CASE = {
     "case": ("wood", "paint"),
@@ -131,10 +131,10 @@ _ROLES: dict[str, dict[str, tuple[str, ...]]] = {
         "frame": ("wood", "wood", "paint"),
         "cover": ("fabric", "leather"),
         "sheet": ("linen",),
-        "blanket": ("linen", "fabric", "fabric"),
-        "throw": ("fabric",),
+        "blanket": ("linen", "fabric", "fabric", "printed"),
+        "throw": ("fabric", "printed"),
     },
-    "cushion": {"": ("fabric",)},
+    "cushion": {"": ("fabric", "printed", "printed")},
     "curtain": {"cloth": ("linen", "linen", "fabric"), "rail": ("metal",)},
     "rug": {"": ("rug",)},
     "plate": {"": ("ceramic",)},

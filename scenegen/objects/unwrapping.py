@@ -64,8 +64,9 @@ def _wrapped(part: Part, corners: Array) -> Array:
     around = around + np.where(crosses[:, None] & (around < 0.5 * whole), whole, 0.0)
     flat = np.stack([around, along], axis=2)
     # Parts are scaled differently along y, so distances on the sheet are fitted to the edges.
-    sides = np.square(np.roll(flat, 1, axis=1) - flat).reshape(-1, 2)
-    lengths = np.square(np.roll(corners, 1, axis=1) - corners).sum(axis=2).ravel()
+    wound = (whole > 0.0).all(axis=1)
+    sides = np.square(np.roll(flat, 1, axis=1) - flat)[wound].reshape(-1, 2)
+    lengths = np.square(np.roll(corners, 1, axis=1) - corners)[wound].sum(axis=2).ravel()
     (a, b), (c, d) = sides.T @ sides
     e, f = sides.T @ lengths
     determinant = max(a * d - b * c, 1e-30)

@@ -13,7 +13,7 @@ from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import hollow
 from scenegen.objects.solids import Array
 
-ROWS = 8  # points along a leaf
+ROWS = 7  # points along a leaf
 
 
 def plant(rng: Generator) -> list[Part]:
@@ -38,7 +38,7 @@ def _pot(rng: Generator, r: float, high: float) -> list[Part]:
     at = 0.86 * high
     room = float(np.interp(at, wall[0][:, 1], wall[0][:, 0])) - 0.5 * thick
     earth = loft(line((room - 0.02 * r, at - 0.15 * high), (room, at)), segments=32)
-    return made_of("pot", loft(hollow(wall, thick))) + made_of("soil", earth)
+    return made_of("pot", loft(hollow(wall, thick), segments=32)) + made_of("soil", earth)
 
 
 def _leaves(

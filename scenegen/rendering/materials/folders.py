@@ -33,7 +33,7 @@ _WORDS: tuple[tuple[str, tuple[str, ...], float], ...] = (
     ("tile|terrazzo", ("floor",), 1.2),
     ("carpet|rug", ("floor", "felt"), 1.0),
     ("leather", ("leather",), 0.5),
-    ("fabric|cloth|linen|wool|denim|cotton|velour|jersey", ("fabric", "linen"), 0.4),
+    ("fabric|cloth|linen|wool|denim|cotton|velour|jersey", ("fabric", "linen", "printed"), 0.4),
     ("wicker|rattan|basket", ("wicker",), 0.3),
     ("cardboard", ("cardboard",), 0.6),
     ("plastic|rubber", ("plastic",), 0.3),

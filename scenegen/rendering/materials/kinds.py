@@ -265,14 +265,19 @@ def _wicker(rng: Generator, palette: Palette) -> Material:
     return _shaded(recipe, pattern, 0.35 * dark, 1.1 * light, 0.6, rng, palette)
 
 
+_QUIET_FIGURES = ("stripes", "pin", "checks")
+_FIGURES = (*_QUIET_FIGURES, "dots", "zigzag", "diamonds", "sprigs")
+
+
 def _cloth(
-    rng: Generator, color: Color, other: Color | None, style: str, threads: int, metres: float
-) -> Material:
+    rng: Generator, color: Color, other: Color | None, style: str, threads: int, metres: float,
+    kinds: tuple[str, ...] = _QUIET_FIGURES,
+) -> Material:  # fmt: skip
     """Weave a cloth of one colour, or print or weave a figure of another colour into it."""
     pattern = patterns.weave(_seed(rng), threads, style)
     base = np.asarray(color, np.float32)
     if other is not None:
-        kind = pick(rng, ("stripes", "pin", "checks", "dots", "zigzag", "diamonds", "sprigs"))
+        kind = pick(rng, kinds)
         count = pick(rng, (6, 8, 10)) if kind == "dots" else pick(rng, (3, 4, 5))
         base = lerp(color, other, patterns.figure(kind, count, _seed(rng)))
     light = np.minimum((0.45 + 0.75 * pattern.share)[..., None] * base, 0.88)
@@ -280,12 +285,19 @@ def _cloth(
 
 
 def _fabric(rng: Generator, palette: Palette) -> Material:
+    """Draw upholstery, mostly of one colour."""
     color = pick(rng, (*palette.fabrics, palette.fabrics[0]))
     style = pick(rng, ("plain", "twill", "basket"))
-    if chance(rng, 0.65):
+    if chance(rng, 0.85):
         return _cloth(rng, color, None, style, 64, 0.2)
+    return _cloth(rng, color, palette.fabrics[1], style, 128, 0.4)
+
+
+def _printed(rng: Generator, palette: Palette) -> Material:
+    """Draw cloth with figures, of cushions and throws."""
+    color = pick(rng, palette.fabrics)
     others = tuple(c for c in (*palette.fabrics, *palette.accents) if c != color)
-    return _cloth(rng, color, pick(rng, others), style, 128, 0.4)
+    return _cloth(rng, color, pick(rng, others), "plain", 128, 0.4, _FIGURES)
 
 
 def _linen(rng: Generator, palette: Palette) -> Material:
@@ -330,6 +342,7 @@ _DRAWN: dict[str, Callable[[Generator, Palette], Material]] = {
     "metal": _metal,
     "fabric": _fabric,
     "linen": _linen,
+    "printed": _printed,
     "rug": _rug,
     "wicker": _wicker,
     "pages": _pages,
