@@ -51,7 +51,7 @@ FAMILIES_FACTS = {
     "bag": Facts("bag", 37, ("floor", "on"), (0.25, 0.5), (0.2, 0.5)),
     "cap": Facts("cap", 40, ("on",), (0.1, 0.2), (0.17, 0.32)),
     "chair": Facts("chair", 5, ("floor",), (0.78, 1.0), (0.42, 0.75), seats=True),
-    "table": Facts("table", 7, ("floor",), (0.7, 0.77), (0.7, 1.9), surfaces=True),
+    "table": Facts("table", 7, ("floor",), (0.7, 0.77), (0.9, 1.8), surfaces=True),
     "sofa": Facts("sofa", 6, ("floor",), (0.68, 1.0), seats=True),
     "armchair": Facts("armchair", 6, ("floor",), (0.68, 1.0), seats=True),
     "stool": Facts("stool", 5, ("floor",), (0.34, 0.78), seats=True),
@@ -77,7 +77,7 @@ FAMILIES_FACTS = {
     "floor_lamp": Facts("floor lamp", 35, ("floor",), (1.4, 1.75), (0.32, 0.55)),
     "pendant": Facts("pendant lamp", 35, ("hung",), (0.35, 1.0)),
     "plant": Facts("plant", 40, ("on", "sill"), (0.15, 0.65)),
-    "tall_plant": Facts("tall plant", 40, ("floor",), (0.6, 1.8)),
+    "tall_plant": Facts("tall plant", 40, ("floor",), (0.55, 1.8)),
 }
 _CASE = {
     "case": ("wood", "paint"),
@@ -90,9 +90,13 @@ _CASE = {
 _ROLES: dict[str, dict[str, tuple[str, ...]]] = {
     "bowl": {"": ("ceramic", "ceramic", "wood", "metal", "plastic")},
     "mug": {"": ("ceramic",)},
-    "bottle": {"": ("plastic", "ceramic"), "closure": ("metal", "plastic")},
+    "bottle": {"": ("bottle", "bottle", "ceramic", "plastic"), "closure": ("metal", "plastic")},
     "can": {"": ("print", "metal")},
-    "lamp": {"": ("wood", "metal", "ceramic", "metal"), "shade": ("glow",)},
+    "lamp": {
+        "": ("metal", "metal", "paint"),
+        "body": ("ceramic", "ceramic", "wood", "terracotta"),
+        "shade": ("glow",),
+    },
     "bag": {"": ("fabric", "leather"), "strap": ("leather",)},
     "cap": {"": ("fabric", "felt")},
     "chair": {
@@ -101,7 +105,10 @@ _ROLES: dict[str, dict[str, tuple[str, ...]]] = {
         "legs": ("wood", "wood", "metal"),
         "tub": ("fabric", "leather"),
     },
-    "table": {"top": ("wood", "wood", "wood", "stone", "paint"), "legs": ("wood", "metal")},
+    "table": {
+        "top": ("wood", "wood", "wood", "wood", "stone", "paint"),
+        "legs": ("wood", "wood", "wood", "paint", "metal"),
+    },
     "sofa": {"cover": ("fabric", "fabric", "leather"), "feet": ("wood", "metal")},
     "armchair": {"cover": ("fabric", "fabric", "leather"), "feet": ("wood", "metal")},
     "stool": {
@@ -124,11 +131,11 @@ _ROLES: dict[str, dict[str, tuple[str, ...]]] = {
         "frame": ("wood", "wood", "paint"),
         "cover": ("fabric", "leather"),
         "sheet": ("linen",),
-        "blanket": ("linen", "fabric", "fabric"),
-        "throw": ("fabric",),
+        "blanket": ("linen", "fabric", "fabric", "printed"),
+        "throw": ("fabric", "printed"),
     },
-    "cushion": {"": ("fabric",)},
-    "curtain": {"cloth": ("linen", "fabric"), "rail": ("metal",)},
+    "cushion": {"": ("fabric", "printed", "printed")},
+    "curtain": {"cloth": ("linen", "linen", "fabric"), "rail": ("metal",)},
     "rug": {"": ("rug",)},
     "plate": {"": ("ceramic",)},
     "cup": {"": ("ceramic",), "drink": ("drink",)},
@@ -144,14 +151,24 @@ _ROLES: dict[str, dict[str, tuple[str, ...]]] = {
         "lid": ("cardboard", "print", "felt"),
     },
     "picture": {"frame": ("wood", "paint", "metal"), "mount": ("paper",)},
-    "screen": {"case": ("black",), "stand": ("black", "metal")},
+    "screen": {"case": ("black",), "stand": ("black",)},
     "clock": {"rim": ("wood", "metal", "black"), "hand": ("black",)},
     "floor_lamp": {"": ("wood", "metal", "metal"), "shade": ("glow",)},
-    "pendant": {"metal": ("metal",), "shade": ("glow",), "metal shade": ("paint", "metal", "plastic")},
+    "pendant": {
+        "metal": ("metal",),
+        "shade": ("glow",),
+        "metal shade": ("paint", "metal", "plastic"),
+    },
     "plant": {"pot": ("ceramic", "terracotta", "wicker")},
     "tall_plant": {"pot": ("ceramic", "terracotta", "wicker"), "trunk": ("stem",)},
 }
-_SHARED = ("wood", "metal", "glow", "leather")  # all parts of one object are of the same one
+_SHARED = (
+    "wood",
+    "metal",
+    "paint",
+    "glow",
+    "leather",
+)  # all parts of one object are of the same one
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +255,8 @@ def _materials(
     family: str, names: list[str], rng: np.random.Generator
 ) -> tuple[tuple[str, ...], list[int]]:
     """Return the kinds of a member's materials, and the index of each part's."""
-    roles, kinds, number_of = _ROLES.get(family, {}), [], {}
+    roles, number_of = _ROLES.get(family, {}), dict[str, int]()
+    kinds: list[str] = []
     for name in dict.fromkeys(names):
         kind = pick(rng, roles.get(name, (name.split()[0] if name else name,)))
         if kind in _SHARED and kind in kinds:
@@ -252,7 +270,7 @@ def _materials(
 Rectangle = tuple[float, float, float, float, float]
 CLEAR = 0.12  # metres of free height above a support
 LEAST_SIDE = 0.08  # metres, of a support
-_GRID = np.linspace(-1.0, 1.0, 9)
+_GRID = np.stack(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, 9)]), axis=-1).reshape(-1, 2)
 
 
 def supports(thing: Furnishing) -> list[Rectangle]:
@@ -270,39 +288,51 @@ def supports(thing: Furnishing) -> list[Rectangle]:
     level = (np.ptp(corners[..., 1], axis=1) < 1e-6) & (normal[:, 1] > 0.0)
     patches = thing.patch[level]
     heights = np.round(corners[level, 0, 1], 4)
-    found = []
+    found: list[Rectangle] = []
     for patch, y in sorted({*zip(patches.tolist(), heights.tolist(), strict=True)}):
         points = corners[level][(patches == patch) & (heights == y)].reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
-        middle, half = (low + high) / 2, (high - low) / 2
+        middle, half, top = (low + high)[::2] / 2, (high - low)[::2] / 2, float(points[0, 1])
         for share in (0.97, 0.85, 0.7, 0.55):
-            x, z = share * half[0], share * half[2]
-            if min(x, z) < LEAST_SIDE / 2:
-                break
-            grid = np.stack(np.meshgrid(x * _GRID, z * _GRID), axis=-1).reshape(-1, 2)
-            if _is_free(corners, grid + middle[::2], float(points[0, 1])):
-                found.append((float(points[0, 1]), middle[0] - x, middle[0] + x,
-                              middle[2] - z, middle[2] + z))  # fmt: skip
-                break
-    return sorted(tuple(map(float, rectangle)) for rectangle in found)
+            if not _is_on(corners, middle + share * half * _GRID, top):
+                continue
+            first, last = _free(corners, middle - share * half, middle + share * half, top)
+            if (last - first).min() > LEAST_SIDE:
+                (x0, z0), (x1, z1) = first.tolist(), last.tolist()
+                found.append((top, x0, x1, z0, z1))
+            break
+    return sorted(found)
 
 
-def _is_free(corners: Array, places: Array, y: float) -> bool:
-    """Return whether all places (x, z), (P, 2), are on a surface at y, with nothing above them."""
-    near = (corners[..., 1].max(axis=1) > y - 1e-6) & (corners[..., 1].min(axis=1) < y + CLEAR)
-    a, b, c = corners[near].swapaxes(0, 1)
+def _is_on(corners: Array, places: Array, y: float) -> bool:
+    """Return whether all places (x, z), (P, 2), are on a horizontal surface at y."""
+    a, b, c = corners[np.abs(corners[..., 1] - y).max(axis=1) < 1e-6][..., ::2].swapaxes(0, 1)
 
     def side(p: Array, q: Array) -> Array:
         """Return on which side of the lines p-q the places lie, seen from above, (F, P)."""
-        ahead, across = q[:, ::2] - p[:, ::2], places[None] - p[:, None, ::2]
-        return ahead[:, :1] * across[..., 1] - ahead[:, 1:] * across[..., 0]
+        ahead, across = q - p, places[None] - p[:, None]
+        return np.asarray(ahead[:, :1] * across[..., 1] - ahead[:, 1:] * across[..., 0])
 
     u, v, w = side(b, c), side(c, a), side(a, b)
-    total = u + v + w
     inside = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0))
-    inside &= np.abs(total) > 1e-12
-    share = np.stack([u, v, w]) / np.where(inside, total, 1.0)
-    height = np.einsum("kfp,kf->fp", share, np.stack([a[:, 1], b[:, 1], c[:, 1]]))
-    on = inside & (np.abs(height - y) < 1e-5)
-    above = inside & (height > y + 1e-4) & (height < y + CLEAR)
-    return bool(on.any(axis=0).all() and not above.any())
+    return bool(inside.any(axis=0).all())
+
+
+def _free(corners: Array, first: Array, last: Array, y: float) -> tuple[Array, Array]:
+    """Cut a rectangle (x, z) until no triangle's box is above it within CLEAR; keep most area."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    near = (high[:, 1] > y + 1e-4) & (low[:, 1] < y + CLEAR)
+    low, high = low[near][:, ::2], high[near][:, ::2]
+    while (last > first).all():
+        above = ((low < last - 1e-9) & (high > first + 1e-9)).all(axis=1)
+        if not above.any():
+            break
+        k = int(np.argmax(above))
+        cuts = []
+        for axis in (0, 1):
+            for start, end in ((high[k, axis], last[axis]), (first[axis], low[k, axis])):
+                a, b = first.copy(), last.copy()
+                a[axis], b[axis] = start, end
+                cuts.append((float(np.prod(np.maximum(b - a, 0.0))), a, b))
+        _, first, last = max(cuts, key=lambda cut: cut[0])
+    return first, last

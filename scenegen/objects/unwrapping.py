@@ -2,8 +2,8 @@
 
 A part that was lofted or swept is wrapped in its sheet, as in cloth. Where that would be stretched,
 and on flat sides, it is papered: each triangle is projected along the axis that it faces most,
-which shortens lengths by 1 / sqrt(3) at most. The second coordinate runs along the longest side of
-a piece, as the grain of wood does.
+which shortens lengths by 1 / sqrt(3) at most. The second coordinate runs along a sheet or, on flat
+sides, along the longest side of a piece, as the grain of wood does.
 """
 
 import numpy as np
@@ -29,14 +29,14 @@ def corner_uv(part: Part, vertices: Array, *, whole: bool = False) -> Array:
     corners = vertices[part.faces]
     if whole:
         if part.sheet is not None and (high - low)[:, 2].min() > 1e-3 and part.pieces > 1:
-            return part.sheet[part.faces][..., :2]
+            return np.asarray(part.sheet[part.faces][..., :2])
         share = (corners - low[piece, None]) / np.maximum(high - low, 1e-9)[piece, None]
         flat = (high - low)[piece, 1] < (high - low)[piece, 2]
-        return np.where(flat[:, None, None], share[..., ::2], share[..., :2])
+        return np.asarray(np.where(flat[:, None, None], share[..., ::2], share[..., :2]))
     longest = np.argmax(high - low, axis=1)[piece]
     uv = _papered(corners, longest)
     if part.sheet is not None:
-        wrapped = _wrapped(part, corners, longest)
+        wrapped = _wrapped(part, corners)
         least, most = stretches(corners, wrapped)
         fits = (least > LEAST_STRETCH) & (most < MOST_STRETCH)
         fits &= (part.sheet[part.faces][..., 2] > 0.0).all(axis=1)
@@ -55,7 +55,8 @@ def _papered(corners: Array, longest: Array) -> Array:
     return np.take_along_axis(corners, pick, axis=2)
 
 
-def _wrapped(part: Part, corners: Array, longest: Array) -> Array:
+def _wrapped(part: Part, corners: Array) -> Array:
+    """Return coordinates around and along; exchanged for a low rim, such as a table top's edge."""
     assert part.sheet is not None
     sheet = part.sheet[part.faces]
     around, along, whole = sheet[..., 0], sheet[..., 1], sheet[..., 2]
@@ -63,15 +64,17 @@ def _wrapped(part: Part, corners: Array, longest: Array) -> Array:
     around = around + np.where(crosses[:, None] & (around < 0.5 * whole), whole, 0.0)
     flat = np.stack([around, along], axis=2)
     # Parts are scaled differently along y, so distances on the sheet are fitted to the edges.
-    sides = np.square(np.roll(flat, 1, axis=1) - flat).reshape(-1, 2)
-    lengths = np.square(np.roll(corners, 1, axis=1) - corners).sum(axis=2).ravel()
+    wound = (whole > 0.0).all(axis=1)
+    sides = np.square(np.roll(flat, 1, axis=1) - flat)[wound].reshape(-1, 2)
+    lengths = np.square(np.roll(corners, 1, axis=1) - corners)[wound].sum(axis=2).ravel()
     (a, b), (c, d) = sides.T @ sides
     e, f = sides.T @ lengths
     determinant = max(a * d - b * c, 1e-30)
     factors = np.array([d * e - b * f, a * f - c * e]) / determinant
-    flat = flat * np.sqrt(np.maximum(factors, 1e-12))
-    tall = (longest == 1)[:, None, None]
-    return np.where(tall, flat, flat[..., ::-1])
+    factors = np.maximum(factors, 1e-12)
+    flat = flat * np.sqrt(factors)
+    low = whole.max() * factors[0] ** 0.5 > 4 * np.ptp(along) * factors[1] ** 0.5
+    return np.asarray(flat[..., ::-1] if low else flat)
 
 
 def stretches(corners: Array, uv: Array) -> tuple[Array, Array]:

@@ -71,9 +71,9 @@ def _stand(rng: Generator, height: float, shade: float) -> list[Part]:
         depth = span(rng, 0.6, 1.0)
         side = line((wide, 0.0), (wide * span(rng, 0.5, 1.1), top))
         corner = pick(rng, (0.0, 0.2))
-        return [loft(side, size=(1.0, depth), corner=corner, segments=24), rod]
+        return [*made_of("body", loft(side, size=(1.0, depth), corner=corner, segments=24)), rod]
     if style == "balls":
-        return [*_balls(rng, top, wide), rod]
+        return [*made_of("body", *_balls(rng, top, wide)), rod]
     neck, foot = wide * span(rng, 0.15, 0.45), wide * span(rng, 0.4, 0.9)
     if style == "vase":
         belly, high = wide * span(rng, 0.9, 1.5), span(rng, 0.2, 0.9)
@@ -86,7 +86,7 @@ def _stand(rng: Generator, height: float, shade: float) -> list[Part]:
             bezier((foot, 0.04), (1.4 * wide, 0.1 * top), (1.4 * wide, at), (waist, at), 9),
             bezier((waist, at), (1.3 * upper, at), (1.3 * upper, top), (neck, top), 9),
         )
-    return [loft(join(line((foot, 0.0), (foot, 0.04)), side)), rod]
+    return [*made_of("body", loft(join(line((foot, 0.0), (foot, 0.04)), side))), rod]
 
 
 def _tripod(rng: Generator, top: float, wide: float) -> list[Part]:

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.random import Generator
 
 from scenegen.objects.families.parts.draws import chance, pick, span
-from scenegen.objects.families.parts.moves import moved, turn_about_z
-from scenegen.objects.families.parts.soft import Box, bevelled
+from scenegen.objects.families.parts.moves import moved, turn_about_x, turn_about_z
+from scenegen.objects.families.parts.soft import Box, bevelled, four, posts
 from scenegen.objects.families.parts.surfaces import Part, made_of
 
 COLORS = 4  # of books in a row
@@ -23,7 +23,9 @@ def _book(rng: Generator, high: float, deep: float, thick: float) -> list[Part]:
     ]
     color = 1 + int(COLORS * rng.random())
     pages = ((board, over, -deep / 2 + over), (thick - board, high - over, deep / 2 - board))
-    return made_of(f"print {color}", bevelled(cover, 0.001)) + made_of("pages", bevelled([pages], 0.0005))
+    return made_of(f"print {color}", bevelled(cover, 0.001)) + made_of(
+        "pages", bevelled([pages], 0.0005)
+    )
 
 
 def book(rng: Generator) -> list[Part]:
@@ -84,29 +86,27 @@ def box(rng: Generator) -> list[Part]:
             low, top = i * high / rows + 0.002, i * high / rows + slat
             slats += [((-x, low, s * z - thick / 2), (x, top, s * z + thick / 2)) for s in (1, -1)]
             slats += [((s * x - thick / 2, low, -z), (s * x + thick / 2, top, z)) for s in (1, -1)]
-        posts = [((sx * (x - 0.015) - 0.012, 0.0, sz * (z - 0.015) - 0.012), (sx * (x - 0.015) + 0.012, high, sz * (z - 0.015) + 0.012)) for sx in (1, -1) for sz in (1, -1)]
-        posts.append(((-x, 0.004, -z), (x, 0.012, z)))
-        return made_of("slats", bevelled(slats, 0.0015), bevelled(posts, 0.0015))
+        slats += [
+            *posts(four(x - 0.015, z - 0.015), 0.012, 0.0, high),
+            ((-x, 0.004, -z), (x, 0.012, z)),
+        ]
+        return made_of("slats", bevelled(slats, 0.0015))
     sides: list[Box] = [((-x, 0.0, -z), (x, wall, z))]
     sides += [((-x, 0.0, s * z - wall / 2), (x, high, s * z + wall / 2)) for s in (1, -1)]
     sides += [((s * x - wall / 2, 0.0, -z), (s * x + wall / 2, high, z)) for s in (1, -1)]
     if style == "lid":
         deep = span(rng, 0.04, 0.07)
         lid = ((-x - 0.004, high - deep, -z - 0.004), (x + 0.004, high + 0.003, z + 0.004))
-        body = ((-x, 0.0, -z), (x, high, z))
-        return made_of("body", bevelled([body], 0.004)) + made_of("lid", bevelled([lid], 0.004))
+        return made_of("body", bevelled([((-x, 0.0, -z), (x, high, z))], 0.004)) + made_of(
+            "lid", bevelled([lid], 0.004)
+        )
     parts = made_of("card", bevelled(sides, 0.001))
     for s in (1.0, -1.0):  # flaps hang out
         flap = bevelled([((-x, -0.002, 0.0), (x, 0.002, 0.9 * z))], 0.001)
         tilt = span(rng, -0.9, 0.5)
-        turn = _about_x(-tilt) if s > 0 else _about_x(tilt) @ np.diag([-1.0, 1.0, -1.0])
+        turn = turn_about_x(-tilt) if s > 0 else turn_about_x(tilt) @ np.diag([-1.0, 1.0, -1.0])
         parts += made_of("card", moved(flap, (0.0, high, s * z), turn))
     return parts
-
-
-def _about_x(angle: float) -> np.ndarray:  # type: ignore[type-arg]
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
 
 
 def picture(rng: Generator) -> list[Part]:
@@ -123,5 +123,8 @@ def picture(rng: Generator) -> list[Part]:
     board = ((-x + inner, inner, 0.001), (x - inner, high - inner, deep - 0.008))
     parts += made_of("mount", bevelled([board], 0.0005))
     side = inner + mount
-    sheet = ((-x + side, side, 0.002), (x - side, high - side, deep - 0.0075 if mount else deep - 0.006))
+    sheet = (
+        (-x + side, side, 0.002),
+        (x - side, high - side, deep - 0.0075 if mount else deep - 0.006),
+    )
     return parts + made_of("picture", bevelled([sheet], 0.0004))

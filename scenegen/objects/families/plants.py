@@ -13,7 +13,7 @@ from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import hollow
 from scenegen.objects.solids import Array
 
-ROWS = 8  # points along a leaf
+ROWS = 7  # points along a leaf
 
 
 def plant(rng: Generator) -> list[Part]:
@@ -38,7 +38,7 @@ def _pot(rng: Generator, r: float, high: float) -> list[Part]:
     at = 0.86 * high
     room = float(np.interp(at, wall[0][:, 1], wall[0][:, 0])) - 0.5 * thick
     earth = loft(line((room - 0.02 * r, at - 0.15 * high), (room, at)), segments=32)
-    return made_of("pot", loft(hollow(wall, thick))) + made_of("soil", earth)
+    return made_of("pot", loft(hollow(wall, thick), segments=32)) + made_of("soil", earth)
 
 
 def _leaves(
@@ -76,20 +76,34 @@ def _upright(rng: Generator, r: float, level: float, tall: float) -> list[Part]:
     count = 9 + int(9 * rng.random())
     angles = _around(rng, count)
     reach = 0.55 * r * np.sqrt(np.linspace(0.05, 1.0, count))
-    starts = np.stack([reach * np.cos(angles), 0 * reach + 0.8 * level, reach * np.sin(angles)], axis=1)
+    starts = np.stack(
+        [reach * np.cos(angles), 0 * reach + 0.8 * level, reach * np.sin(angles)], axis=1
+    )
     steep = np.array([span(rng, 1.3, 1.5) for _ in angles])
     lengths = tall * np.array([span(rng, 0.55, 1.0) for _ in angles])
-    return made_of("leaf", _leaves(rng, starts, angles, steep, lengths, span(rng, -0.05, 0.1), span(rng, 0.05, 0.075), 0.75))
+    return made_of(
+        "leaf",
+        _leaves(
+            rng, starts, angles, steep, lengths, span(rng, -0.05, 0.1), span(rng, 0.05, 0.075), 0.75
+        ),
+    )
 
 
 def _arching(rng: Generator, r: float, level: float, tall: float) -> list[Part]:
     """Build a tuft of long narrow leaves that arch over, as of a spider plant or dracaena."""
     count = 26 + int(22 * rng.random())
     angles = _around(rng, count)
-    starts = np.stack([0.25 * r * np.cos(angles), np.full(count, 0.8 * level), 0.25 * r * np.sin(angles)], axis=1)
+    starts = np.stack(
+        [0.25 * r * np.cos(angles), np.full(count, 0.8 * level), 0.25 * r * np.sin(angles)], axis=1
+    )
     steep = 1.45 - 0.9 * np.linspace(0.0, 1.0, count)[::-1] ** 1.5
     lengths = tall * np.array([span(rng, 0.8, 1.25) for _ in angles])
-    return made_of("leaf", _leaves(rng, starts, angles, steep, lengths, span(rng, 1.2, 2.1), span(rng, 0.022, 0.035), 0.7))
+    return made_of(
+        "leaf",
+        _leaves(
+            rng, starts, angles, steep, lengths, span(rng, 1.2, 2.1), span(rng, 0.022, 0.035), 0.7
+        ),
+    )
 
 
 def _broad(rng: Generator, r: float, level: float, tall: float) -> list[Part]:
@@ -101,30 +115,55 @@ def _broad(rng: Generator, r: float, level: float, tall: float) -> list[Part]:
     for i, angle in enumerate(angles.tolist()):
         share = (i + 0.5) / count
         out, up = tall * (0.42 - 0.3 * share), level + tall * (0.15 + 0.6 * share)
-        path = bezier((0.1 * r, 0.75 * level), (0.2 * r, 0.5 * (level + up)), (0.6 * out, up - 0.05 * tall), (out, up), 6)
+        path = bezier(
+            (0.1 * r, 0.75 * level),
+            (0.2 * r, 0.5 * (level + up)),
+            (0.6 * out, up - 0.05 * tall),
+            (out, up),
+            6,
+        )
         c, s = math.cos(angle), math.sin(angle)
         stalks.append(tube(path, 0.007 * tall + 0.0008, across=(c, 0.0, s), segments=4))
         starts.append((c * (out - 0.004), up, s * (out - 0.004)))
     steep = np.array([span(rng, 0.1, 0.7) for _ in angles])
     lengths = size * np.array([span(rng, 0.75, 1.1) for _ in angles])
-    leaves = _leaves(rng, np.array(starts), angles, steep, lengths, span(rng, 0.6, 1.2), span(rng, 0.22, 0.34), 0.8)
+    leaves = _leaves(
+        rng,
+        np.array(starts),
+        angles,
+        steep,
+        lengths,
+        span(rng, 0.6, 1.2),
+        span(rng, 0.22, 0.34),
+        0.8,
+    )
     return made_of("stem", *stalks) + made_of("leaf", leaves)
 
 
 def _shrub(rng: Generator, r: float, level: float, tall: float) -> list[Part]:
     """Build a small bush of many little leaves."""
+    del r
     count = 45 + int(25 * rng.random())
     angles = _around(rng, count)
     height = np.array([span(rng, 0.0, 1.0) for _ in angles])
     wide = 0.42 * tall * np.sqrt(np.maximum(1.0 - (height - 0.35) ** 2 / 0.5, 0.05))
     reach = wide * np.array([span(rng, 0.35, 1.0) for _ in angles])
-    starts = np.stack([reach * np.cos(angles), level + 0.05 * tall + 0.7 * tall * height, reach * np.sin(angles)], axis=1)
+    starts = np.stack(
+        [reach * np.cos(angles), level + 0.05 * tall + 0.7 * tall * height, reach * np.sin(angles)],
+        axis=1,
+    )
     steep = np.array([span(rng, 0.0, 0.9) for _ in angles])
     lengths = tall * np.array([span(rng, 0.2, 0.29) for _ in angles])
     leaves = _leaves(rng, starts, angles, steep, lengths, 0.8, span(rng, 0.26, 0.36), 0.8)
     twigs = []
     for angle in angles[:14].tolist():
-        path = bezier((0.0, 0.75 * level), (0.02, level + 0.2 * tall), (0.15 * tall, level + 0.3 * tall), (0.3 * tall, level + 0.6 * tall), 5)
+        path = bezier(
+            (0.0, 0.75 * level),
+            (0.02, level + 0.2 * tall),
+            (0.15 * tall, level + 0.3 * tall),
+            (0.3 * tall, level + 0.6 * tall),
+            5,
+        )
         twigs.append(tube(path, 0.0022, across=(math.cos(angle), 0.0, math.sin(angle)), segments=4))
     return made_of("stem", *twigs) + made_of("leaf", leaves)
 

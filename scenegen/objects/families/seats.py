@@ -8,7 +8,7 @@ from numpy.random import Generator
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import moved, turn_about_x
 from scenegen.objects.families.parts.profiles import line
-from scenegen.objects.families.parts.soft import bevelled, pad
+from scenegen.objects.families.parts.soft import bevelled, four, pad, posts
 from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 
 
@@ -55,9 +55,9 @@ def _upholstered(rng: Generator, seats: int, wide: float) -> list[Part]:
         parts.append(moved(body, (0.0, seat - 0.005, -z + back + 0.09), tilt))
     a, b = x - 0.07, z - 0.08
     style = pick(rng, ("tapered", "block", "metal"))
-    at = [(sx * a, sz * b) for sx in (1, -1) for sz in (1, -1)]
+    at = four(a, b)
     if style == "block":
-        feet = bevelled([((cx - 0.03, 0.0, cz - 0.03), (cx + 0.03, foot + 0.02, cz + 0.03)) for cx, cz in at])
+        feet = bevelled(posts(at, 0.03, 0.0, foot + 0.02))
     else:
         thin = 0.012 if style == "metal" else 0.024
         feet = loft(line((0.6 * thin, 0.0), (thin, foot + 0.02)), at=at, segments=16)
@@ -70,13 +70,17 @@ def stool(rng: Generator) -> list[Part]:
     style = pick(rng, ("round", "round", "square", "pouf"))
     if style == "pouf":
         r, high = span(rng, 0.2, 0.28), span(rng, 0.36, 0.44)
-        return made_of("cover", pad((-r, 0.0, -r), (r, high, r), 0.05, 0.02, corner=pick(rng, (r, 0.06))))
+        return made_of(
+            "cover", pad((-r, 0.0, -r), (r, high, r), 0.05, 0.02, corner=pick(rng, (r, 0.06)))
+        )
     thick = span(rng, 0.025, 0.05)
     corner = 0.03 if style == "square" else r
     seat = pad((-r, high - thick, -r), (r, high, r), 0.008, corner=corner)
     parts = made_of("seat", seat)
     if chance(rng, 0.35):
-        parts += made_of("cover", pad((-r, high - 0.004, -r), (r, high + 0.045, r), 0.02, 0.008, corner=corner))
+        parts += made_of(
+            "cover", pad((-r, high - 0.004, -r), (r, high + 0.045, r), 0.02, 0.008, corner=corner)
+        )
     count, thin = pick(rng, (3, 4, 4)) if style == "round" else 4, span(rng, 0.012, 0.02)
     out = span(rng, 0.9, 1.25)
     angles = [2 * math.pi * (i + 0.5) / count for i in range(count)]
@@ -84,7 +88,10 @@ def stool(rng: Generator) -> list[Part]:
     feet = [(out * reach * math.cos(a), out * reach * math.sin(a)) for a in angles]
     heads = [(reach * math.cos(a) * 0.9, reach * math.sin(a) * 0.9) for a in angles]
     lean = np.subtract(heads, feet) / (high - thick)
-    parts += made_of("legs", loft(line((0.7 * thin, 0.0), (thin, high - 0.6 * thick)), at=feet, lean=lean, segments=16))
+    parts += made_of(
+        "legs",
+        loft(line((0.7 * thin, 0.0), (thin, high - 0.6 * thick)), at=feet, lean=lean, segments=16),
+    )
     if high > 0.55 or chance(rng, 0.3):  # a ring or rails for the feet
         y = 0.35 * high
         ring = reach * (out + (0.9 - out) * y / high)

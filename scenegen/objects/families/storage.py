@@ -7,7 +7,7 @@ from numpy.random import Generator
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import moved, turn_about_x
 from scenegen.objects.families.parts.profiles import arc, fillet, join, line
-from scenegen.objects.families.parts.soft import Box, bevelled, pad
+from scenegen.objects.families.parts.soft import Box, bevelled, four, pad, posts
 from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 from scenegen.objects.families.parts.sweeps import tube
 
@@ -36,8 +36,8 @@ def shelf(rng: Generator) -> list[Part]:
     levels = [foot + i * step for i in range(rows + 1)]
     cell = (2 * inner - (columns - 1) * board) / columns
     lefts = [-inner + i * (cell + board) for i in range(columns)]
-    for left in lefts[1:]:
-        parts.append(((left - board, foot + board, -z + 0.004), (left, high - board, z - 0.004)))
+    low, top = foot + board, high - board
+    parts += [((x0 - board, low, -z + 0.004), (x0, top, z - 0.004)) for x0 in lefts[1:]]
     for y in levels:
         if y in (levels[0], levels[-1]):
             parts.append(((-inner, y, -z), (inner, y + board, z)))
@@ -45,9 +45,13 @@ def shelf(rng: Generator) -> list[Part]:
         parts += [((left, y, -z + 0.006), (left + cell, y + board, z - 0.006)) for left in lefts]
     boards = made_of("board", bevelled(parts, 0.002))
     if foot:
-        boards += made_of("board", bevelled([((-inner, 0.0, -z + 0.02), (inner, foot, z - 0.03))], 0.002))
+        boards += made_of(
+            "board", bevelled([((-inner, 0.0, -z + 0.02), (inner, foot, z - 0.03))], 0.002)
+        )
     if style != "open":
-        back = bevelled([((-inner, foot + board, -z + 0.002), (inner, high - board, -z + 0.008))], 0.001)
+        back = bevelled(
+            [((-inner, foot + board, -z + 0.002), (inner, high - board, -z + 0.008))], 0.001
+        )
         boards += made_of("back", back)
     return boards
 
@@ -91,15 +95,19 @@ def _case(rng: Generator, size: Size, foot: float) -> list[Part]:
     lid = bevelled([((-x - over, high - top, -z), (x + over, high, z + over))], 0.004)
     parts += made_of("case", lid)
     style = pick(rng, ("plinth", "tapered", "tapered", "block"))
-    if style == "plinth":
-        return parts + made_of("case", bevelled([((-x + 0.02, 0.0, -z + 0.02), (x - 0.02, foot, z - 0.05))], 0.002))
-    at = [(sx * (x - 0.06), sz * (z - 0.06)) for sx in (1, -1) for sz in (1, -1)]
-    if style == "block":
-        feet = [((cx - 0.025, 0.0, cz - 0.025), (cx + 0.025, foot + 0.005, cz + 0.025)) for cx, cz in at]
-        return parts + made_of("feet", bevelled(feet, 0.003))
+    if style == "plinth" and foot < 0.1:
+        return parts + made_of(
+            "case", bevelled([((-x + 0.02, 0.0, -z + 0.02), (x - 0.02, foot, z - 0.05))], 0.002)
+        )
+    at = four(x - 0.06, z - 0.06)
+    if style != "tapered":
+        blocks = posts(at, 0.018, 0.0, foot + 0.005)
+        return parts + made_of("feet", bevelled(blocks, 0.003))
     lean = [(-0.25 * cx / abs(cx), -0.2 * cz / abs(cz)) for cx, cz in at]
     feet = [(cx - a * foot, cz - b * foot) for (cx, cz), (a, b) in zip(at, lean, strict=True)]
-    return parts + made_of("feet", loft(line((0.01, 0.0), (0.02, foot + 0.005)), at=feet, lean=lean, segments=16))
+    return parts + made_of(
+        "feet", loft(line((0.01, 0.0), (0.02, foot + 0.005)), at=feet, lean=lean, segments=16)
+    )
 
 
 def _fronts(rng: Generator, size: Size, foot: float, rows: list[int]) -> list[Part]:
@@ -110,13 +118,20 @@ def _fronts(rng: Generator, size: Size, foot: float, rows: list[int]) -> list[Pa
     style = pick(rng, ("bar", "bar", "knob", "edge"))
     panels, handles, knobs = [], [], []
     for i, count in enumerate(rows):
-        left, right = -wide / 2 + 0.004 + i * step + GAP / 2, -wide / 2 + 0.004 + (i + 1) * step - GAP / 2
+        left, right = (
+            -wide / 2 + 0.004 + i * step + GAP / 2,
+            -wide / 2 + 0.004 + (i + 1) * step - GAP / 2,
+        )
         for j in range(count):
             gap = (top - low) / count
             bottom, upper = low + j * gap + GAP / 2, low + (j + 1) * gap - GAP / 2
             panels.append(((left, bottom, z - 0.021), (right, upper, z)))
             door = count == 1 and upper - bottom > 0.3
-            x = (right - 0.05 if i % 2 == 0 and len(rows) > 1 else left + 0.05) if door else (left + right) / 2
+            x = (
+                (right - 0.05 if i % 2 == 0 and len(rows) > 1 else left + 0.05)
+                if door
+                else (left + right) / 2
+            )
             y = (bottom + upper) / 2 if not door or high > 1.3 else upper - 0.12
             if style == "knob":
                 knobs.append((x, y))
@@ -131,7 +146,9 @@ def _fronts(rng: Generator, size: Size, foot: float, rows: list[int]) -> list[Pa
         return parts
     bars: list[Box] = []
     for x, y, a, b in handles:
-        bars.append(((x - a - 0.005, y - b - 0.005, z + 0.018), (x + a + 0.005, y + b + 0.005, z + 0.028)))
+        bars.append(
+            ((x - a - 0.005, y - b - 0.005, z + 0.018), (x + a + 0.005, y + b + 0.005, z + 0.028))
+        )
         for s in (1, -1):
             cx, cy = x + s * 0.8 * a, y + s * 0.8 * b
             bars.append(((cx - 0.004, cy - 0.004, z - 0.002), (cx + 0.004, cy + 0.004, z + 0.02)))
@@ -154,8 +171,20 @@ def desk(rng: Generator) -> list[Part]:
     style = pick(rng, ("legs", "legs", "frame", "panels", "drawers"))
     if style == "frame":
         bar = 0.018
-        path = fillet([(z - 0.06, under), (z - 0.06, bar), (-z + 0.06, bar), (-z + 0.06, under)], 0.02, 3)
-        sides = [tube(path, bar, bar, origin=(s * (x - 0.08), 0.0, 0.0), across=(0.0, 0.0, 1.0), corner=0.004) for s in (1, -1)]
+        path = fillet(
+            [(z - 0.06, under), (z - 0.06, bar), (-z + 0.06, bar), (-z + 0.06, under)], 0.02, 3
+        )
+        sides = [
+            tube(
+                path,
+                bar,
+                bar,
+                origin=(s * (x - 0.08), 0.0, 0.0),
+                across=(0.0, 0.0, 1.0),
+                corner=0.004,
+            )
+            for s in (1, -1)
+        ]
         beam = bevelled([((-x + 0.08, under - 0.04, -z + 0.07), (x - 0.08, under, -z + 0.09))])
         return parts + made_of("legs", *sides, beam)
     if style == "drawers":
@@ -163,12 +192,15 @@ def desk(rng: Generator) -> list[Part]:
         count = pick(rng, (2, 3, 3))
         cx = x - box / 2 - 0.02
         case = _fronts(rng, (box, under + 0.028, 2 * z - 0.03), 0.04, [count])
-        shell = made_of("case", bevelled([((-box / 2, 0.0, -z + 0.03), (box / 2, under, z - 0.037))], 0.002))
+        shell = made_of(
+            "case", bevelled([((-box / 2, 0.0, -z + 0.03), (box / 2, under, z - 0.037))], 0.002)
+        )
         parts += [moved(part, (cx, 0.0, 0.0)) for part in shell + case]
     if style == "panels":
-        sides = [((s * (x - 0.03) - 0.014, 0.0, -z + 0.02), (s * (x - 0.03) + 0.014, under, z - 0.02)) for s in (1, -1)]
-        sides.append(((-x + 0.04, under - 0.3, -z + 0.06), (x - 0.04, under, -z + 0.08)))
-        return parts + made_of("legs", bevelled(sides, 0.002))
+        boards: list[Box] = [((-x + 0.04, under - 0.3, -z + 0.06), (x - 0.04, under, -z + 0.08))]
+        ends = (x - 0.03, -x + 0.03)
+        boards += [((a - 0.014, 0.0, -z + 0.02), (a + 0.014, under, z - 0.02)) for a in ends]
+        return parts + made_of("legs", bevelled(boards, 0.002))
     ways = (-1,) if style == "drawers" else (1, -1)
     at = [(sx * (x - 0.06), sz * (z - 0.06)) for sx in ways for sz in (1, -1)]
     corner = pick(rng, (0.1, 1.0))
@@ -198,20 +230,27 @@ def coffee_table(rng: Generator) -> list[Part]:
     legs = pick(rng, ("four", "four", "sled", "drum" if style == "round" else "panels"))
     if legs == "drum":
         r = span(rng, 0.4, 0.75) * x
-        return parts + made_of("legs", loft(join(line((r, 0.0), (r, 0.01)), line((r, 0.01), (0.8 * r, under)))))
+        return parts + made_of(
+            "legs", loft(join(line((r, 0.0), (r, 0.01)), line((r, 0.01), (0.8 * r, under))))
+        )
     if legs == "panels":
         boards: list[Box] = [((s * a - 0.012, 0.0, -b), (s * a + 0.012, under, b)) for s in (1, -1)]
         boards.append(((-a, 0.1, -b + 0.01), (a, 0.12, b - 0.01)))
         return parts + made_of("legs", bevelled(boards, 0.002))
     if legs == "sled":
         path = fillet([(b, under), (b, thin), (-b, thin), (-b, under)], 0.03, 4)
-        bars = [tube(path, thin, origin=(s * a, 0.0, 0.0), across=(0.0, 0.0, 1.0), corner=0.3 * thin) for s in (1, -1)]
+        bars = [
+            tube(path, thin, origin=(s * a, 0.0, 0.0), across=(0.0, 0.0, 1.0), corner=0.3 * thin)
+            for s in (1, -1)
+        ]
         return parts + made_of("legs", *bars)
-    at = [(sx * a, sz * b) for sx in (1, -1) for sz in (1, -1)]
-    lean = [(-0.12 * sx, -0.12 * sz) for sx in (1, -1) for sz in (1, -1)]
+    at = four(a, b)
+    lean = four(-0.12, -0.12)
     feet = loft(line((0.6 * thin, 0.0), (thin, under + 0.002)), at=at, lean=lean, segments=16)
     parts += made_of("legs", feet)
     if style != "round" and chance(rng, 0.4):
         y = 0.35 * under
-        parts += made_of("top", bevelled([((-a + 0.02, y, -b + 0.02), (a - 0.02, y + 0.014, b - 0.02))], 0.002))
+        parts += made_of(
+            "top", bevelled([((-a + 0.02, y, -b + 0.02), (a - 0.02, y + 0.014, b - 0.02))], 0.002)
+        )
     return parts

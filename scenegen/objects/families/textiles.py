@@ -8,7 +8,7 @@ from numpy.random import Generator
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import moved, turn_about_x
 from scenegen.objects.families.parts.profiles import line
-from scenegen.objects.families.parts.soft import bevelled, pad, pillow
+from scenegen.objects.families.parts.soft import bevelled, four, pad, pillow, posts
 from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 from scenegen.objects.families.parts.sweeps import tube
 
@@ -36,31 +36,50 @@ def bed(rng: Generator) -> list[Part]:
             panel = pad((left, 0.0, back - 0.05), (left + step, head, back + 0.05), 0.025, 0.0)
             parts += made_of("cover", panel)
     elif style == "slats":
-        posts = [((s * x - 0.025, 0.0, back - 0.025), (s * x + 0.025, head, back + 0.025)) for s in (1, -1)]
-        posts += [((-x, y, back - 0.012), (x, y + 0.06, back + 0.012)) for y in (head - 0.1, under)]
         count = round(wide / 0.12)
-        for i in range(count):
-            cx = -x + wide * (i + 0.5) / count
-            posts.append(((cx - 0.012, under, back - 0.008), (cx + 0.012, head - 0.05, back + 0.008)))
-        parts += made_of("frame", bevelled(posts, 0.003))
+        slats = [(-x + wide * (i + 0.5) / count, back) for i in range(count)]
+        bars = posts([(x, back), (-x, back)], 0.025, 0.0, head) + posts(
+            slats, 0.01, under, head - 0.05
+        )
+        bars += [((-x, y, back - 0.012), (x, y + 0.06, back + 0.012)) for y in (head - 0.1, under)]
+        parts += made_of("frame", bevelled(bars, 0.003))
     else:
-        parts += made_of("frame", bevelled([((-x - 0.03, 0.0, back - 0.02), (x + 0.03, head, back + 0.02))], 0.008))
-    feet = [(s * (x - 0.03) - 0.03, s * (x - 0.03) + 0.03) for s in (1, -1)]
-    ends = (z - 0.06, -z + 0.06)
-    legs = [((a, 0.0, cz - 0.03), (b, low + 0.02, cz + 0.03)) for a, b in feet for cz in ends]
+        board = ((-x - 0.03, 0.0, back - 0.02), (x + 0.03, head, back + 0.02))
+        parts += made_of("frame", bevelled([board], 0.008))
+    legs = posts(four(x - 0.03, z - 0.06), 0.03, 0.0, low + 0.02)
     parts += made_of("frame", bevelled(legs, 0.003))
+    return parts + _bedding(rng, wide, long, under, top)
+
+
+def _bedding(rng: Generator, wide: float, long: float, under: float, top: float) -> list[Part]:
+    """Build mattress, blanket, sheet, sometimes a throw, and pillows."""
+    x, z = wide / 2, long / 2
     inset = 0.02
     mattress = pad((-x + inset, under, -z + 0.01), (x - inset, top, z - 0.05), 0.04)
-    parts += made_of("sheet", mattress)
+    parts = made_of("sheet", mattress)
     fold = -z + span(rng, 0.55, 0.75)  # where the blanket begins
     side = span(rng, 0.0, 0.04)
-    blanket = pad((-x - side, top - 0.14, fold), (x + side, top + 0.05, z - 0.02), 0.035, 0.02, corner=0.06)
+    blanket = pad(
+        (-x - side, top - 0.14, fold), (x + side, top + 0.05, z - 0.02), 0.035, 0.02, corner=0.06
+    )
     parts += made_of("blanket", blanket)
-    cuff = pad((-x - side - 0.004, top - 0.12, fold - 0.02), (x + side + 0.004, top + 0.062, fold + 0.22), 0.03, 0.006, corner=0.03)
+    cuff = pad(
+        (-x - side - 0.004, top - 0.12, fold - 0.02),
+        (x + side + 0.004, top + 0.062, fold + 0.22),
+        0.03,
+        0.006,
+        corner=0.03,
+    )
     parts += made_of("sheet", cuff)
     if chance(rng, 0.5):  # a throw across the foot
         start = z - span(rng, 0.55, 0.7)
-        cloth = pad((-x - side - 0.008, top - 0.16, start), (x + side + 0.008, top + 0.06, start + 0.45), 0.03, 0.01, corner=0.02)
+        cloth = pad(
+            (-x - side - 0.008, top - 0.16, start),
+            (x + side + 0.008, top + 0.06, start + 0.45),
+            0.03,
+            0.01,
+            corner=0.02,
+        )
         parts += made_of("throw", cloth)
     count = 1 if wide < 1.2 else 2
     step = wide / count
@@ -94,8 +113,12 @@ def curtain(rng: Generator) -> list[Part]:
     slope = np.gradient(z, x)
     path = np.stack([x, z], axis=1), np.stack([np.ones_like(x), slope], axis=1)
     middle = (0.0, (high - 0.03) / 2, 0.0)
-    cloth = tube(path, (high - 0.03) / 2, 0.0016, origin=middle, up=(0.0, 0.0, 1.0), corner=0.001, segments=4)
-    rail = bevelled([((-wide / 2 - 0.02, high - 0.035, -0.014), (wide / 2 + 0.02, high, 0.014))], 0.003)
+    cloth = tube(
+        path, (high - 0.03) / 2, 0.0016, origin=middle, up=(0.0, 0.0, 1.0), corner=0.001, segments=4
+    )
+    rail = bevelled(
+        [((-wide / 2 - 0.02, high - 0.035, -0.014), (wide / 2 + 0.02, high, 0.014))], 0.003
+    )
     return made_of("cloth", cloth) + made_of("rail", rail)
 
 

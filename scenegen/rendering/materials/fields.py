@@ -63,7 +63,7 @@ def sampled(field: Field, rows: Field, columns: Field) -> Field:
 def cell_numbers(rng_seed: int, *numbers: Field) -> Field:
     """Return a number from 0 to 1 for each tuple of small integers: the same for the same tuple."""
     table = np.random.default_rng(rng_seed).random(4096, np.float32)
-    index = np.int32(0)
-    for k, number in enumerate(numbers):
-        index = index + number.astype(np.int32) * np.int32((1, 61, 1009)[k])
-    return np.asarray(table[index % 4096])
+    index = sum(
+        number.astype(np.int32) * k for number, k in zip(numbers, (1, 61, 1009), strict=False)
+    )
+    return np.asarray(table[np.asarray(index) % 4096])

@@ -33,7 +33,7 @@ _WORDS: tuple[tuple[str, tuple[str, ...], float], ...] = (
     ("tile|terrazzo", ("floor",), 1.2),
     ("carpet|rug", ("floor", "felt"), 1.0),
     ("leather", ("leather",), 0.5),
-    ("fabric|cloth|linen|wool|denim|cotton|velour|jersey", ("fabric", "linen"), 0.4),
+    ("fabric|cloth|linen|wool|denim|cotton|velour|jersey", ("fabric", "linen", "printed"), 0.4),
     ("wicker|rattan|basket", ("wicker",), 0.3),
     ("cardboard", ("cardboard",), 0.6),
     ("plastic|rubber", ("plastic",), 0.3),
@@ -160,16 +160,14 @@ def _pixels(path: Path) -> Array:
         values = values[..., None].repeat(3, axis=2) if values.ndim == 2 else values[..., :3]
         step = -(-max(values.shape) // KEPT_PIXELS)
         return np.ascontiguousarray(values[::-step, ::step])
-    with Image.open(path) as picture:
-        deep = picture.mode.startswith("I")  # 16 bits
-        if deep:
-            values = np.asarray(picture, np.float32) / 65535
-            picture = Image.fromarray(values)  # noqa: PLW2901
+    with Image.open(path) as opened:
+        if opened.mode.startswith("I"):  # 16 bits
+            picture, most = Image.fromarray(np.asarray(opened, np.float32)), 65535.0
         else:
-            picture = picture.convert("RGB")  # noqa: PLW2901
-        if max(picture.size) > KEPT_PIXELS:
-            picture = picture.reduce(-(-max(picture.size) // KEPT_PIXELS))  # noqa: PLW2901
-        values = np.asarray(picture, np.float32) / (1.0 if deep else 255.0)
+            picture, most = opened.convert("RGB"), 255.0
+    if max(picture.size) > KEPT_PIXELS:
+        picture = picture.reduce(-(-max(picture.size) // KEPT_PIXELS))
+    values = np.asarray(picture, np.float32) / np.float32(most)
     values = values[..., None].repeat(3, axis=2) if values.ndim == 2 else values
     return np.ascontiguousarray(values[::-1])
 

@@ -1,6 +1,6 @@
-"""Patterns, drawn as shares between two colours and heights in metres. They know no colours.
+"""Patterns: shares between two colours, and heights in metres. They know no colours.
 
-Each is a pure function of small integers and computed once a process, so nobody may write into them.
+Each is a pure function of small integers. It is kept in memory, so nobody may write into it.
 """
 
 from functools import lru_cache
@@ -93,16 +93,14 @@ def herringbone(seed: int, ratio: int) -> Pattern:
 
 
 @lru_cache(maxsize=12)
-def tiles(seed: int, columns: int, rows: int, running: bool) -> Pattern:
-    """Return tiles with grout; `running` shifts every other row by half a tile."""
+def tiles(seed: int, columns: int, rows: int) -> Pattern:
+    """Return tiles with grout; long ones are shifted by half a tile in every other row."""
     u, v = grid(SIZE)
     y = v * rows + 0 * u
     row = np.minimum(y.astype(np.int32), rows - 1)
-    x = (u * columns + (0.5 * (row % 2) if running else 0.0)) % columns
+    x = (u * columns + (0.5 * (row % 2) if columns < rows else 0.0)) % columns
     column = np.minimum(x.astype(np.int32), columns - 1)
-    gap = np.minimum(
-        np.minimum(x % 1, 1 - x % 1) / columns, np.minimum(y % 1, 1 - y % 1) / rows
-    )
+    gap = np.minimum(np.minimum(x % 1, 1 - x % 1) / columns, np.minimum(y % 1, 1 - y % 1) / rows)
     seam = 1.0 - smoothstep(0.0025, 0.0045, gap)
     shade = cell_numbers(seed, column, row)
     cloud = noise(seed, SIZE, 1.0, highest=60)
@@ -146,7 +144,10 @@ def hide(seed: int) -> Pattern:
 def weave(seed: int, threads: int, style: str) -> Pattern:
     """Return woven cloth of uneven threads: "plain", "twill" or "basket"."""
     u, v = grid(SIZE)
-    slub = noise(seed, SIZE, 0.3, (1.0, 24.0), lowest=8), noise(seed, SIZE, 0.3, (24.0, 1.0), lowest=8)
+    slub = (
+        noise(seed, SIZE, 0.3, (1.0, 24.0), lowest=8),
+        noise(seed, SIZE, 0.3, (24.0, 1.0), lowest=8),
+    )
     x, y = u * threads + 0 * v, v * threads + 0 * u
     i, j = x.astype(np.int32), y.astype(np.int32)
     over = {
@@ -169,7 +170,7 @@ def pile(seed: int) -> Pattern:
     tuft = noise(seed, SIZE, -0.1, lowest=40, highest=150)
     tread = noise(seed + 1, SIZE, 1.3, highest=10)
     share = np.clip(0.55 + 0.17 * tuft + 0.07 * tread, 0.0, 1.0)
-    return _kept(share, 0.0009 * tuft, smoothstep(-1.0, 1.0, tuft))
+    return _kept(share, 0.00018 * tuft, smoothstep(-1.0, 1.0, tuft))
 
 
 @lru_cache(maxsize=6)
@@ -191,7 +192,7 @@ def trowel(seed: int) -> Pattern:
 
 
 @lru_cache(maxsize=16)
-def stripes(kind: str, count: int, seed: int) -> Field:
+def figure(kind: str, count: int, seed: int) -> Field:
     """Return the ground (0) and the figure (1) of a print or of coloured threads."""
     u, v = grid(SIZE)
     x, y = u * count + 0 * v, v * count + 0 * u
@@ -199,20 +200,22 @@ def stripes(kind: str, count: int, seed: int) -> Field:
     i, j = x.astype(np.int32), y.astype(np.int32)
     soft = 0.5 * count / SIZE + 0.004
     if kind == "stripes":
-        figure = smoothstep(-soft, soft, 0.18 - np.abs(a))
+        shape = smoothstep(-soft, soft, 0.18 - np.abs(a))
     elif kind == "pin":
-        figure = smoothstep(-soft, soft, 0.05 - np.abs(a))
+        shape = smoothstep(-soft, soft, 0.05 - np.abs(a))
     elif kind == "checks":
-        figure = 0.5 * smoothstep(-soft, soft, 0.25 - np.abs(a)) + 0.5 * smoothstep(-soft, soft, 0.25 - np.abs(b))
+        shape = 0.5 * smoothstep(-soft, soft, 0.25 - np.abs(a)) + 0.5 * smoothstep(
+            -soft, soft, 0.25 - np.abs(b)
+        )
     elif kind == "dots":
         shift = np.where(j % 2 == 0, 0.0, 0.5)
         a = (x + shift) % 1 - 0.5
-        figure = smoothstep(-soft, soft, 0.24 - np.hypot(a, b))
+        shape = smoothstep(-soft, soft, 0.24 - np.hypot(a, b))
     elif kind == "zigzag":
-        figure = smoothstep(-2 * soft, 2 * soft, 0.25 - np.abs((y + 0.8 * np.abs(a)) % 1 - 0.5))
+        shape = smoothstep(-2 * soft, 2 * soft, 0.25 - np.abs((y + 0.8 * np.abs(a)) % 1 - 0.5))
     elif kind == "diamonds":
-        figure = smoothstep(-soft, soft, 0.09 - np.abs(0.5 - np.abs(a) - np.abs(b)))
-        figure = np.maximum(figure, smoothstep(-soft, soft, 0.14 - np.abs(a) - np.abs(b)))
+        shape = smoothstep(-soft, soft, 0.09 - np.abs(0.5 - np.abs(a) - np.abs(b)))
+        shape = np.maximum(shape, smoothstep(-soft, soft, 0.14 - np.abs(a) - np.abs(b)))
     else:  # sprigs: leaves to both sides of a stalk, turned from cell to cell
         turn = (cell_numbers(seed, i, j) * 2 - 1) * 1.2
         c, s = np.cos(turn), np.sin(turn)
@@ -223,10 +226,10 @@ def stripes(kind: str, count: int, seed: int) -> Field:
         away = np.abs(p) - 0.1
         rise = q - nearest - 0.4 * np.abs(p)
         leaf = smoothstep(-0.2, 0.2, 1 - (away / 0.1) ** 2 - (rise / 0.035) ** 2)
-        figure = np.maximum(stalk, leaf)
-    figure = np.asarray(figure, np.float32)
-    figure.flags.writeable = False
-    return figure
+        shape = np.maximum(stalk, leaf)
+    shape = np.asarray(shape, np.float32)
+    shape.flags.writeable = False
+    return shape
 
 
 @lru_cache(maxsize=3)
@@ -238,9 +241,11 @@ def wickerwork(seed: int) -> Pattern:
     j = y.astype(np.int32)
     wave = np.cos(np.pi * (x + j))  # the weaver goes in front of every other stake
     body = np.sqrt(np.maximum(1 - (2 * (y % 1) - 1) ** 2, 0.0))
-    shade = cell_numbers(seed, j, x.astype(np.int32) // 4)
+    shade = cell_numbers(seed, j)
     fibre = noise(seed, SIZE, 0.2, (1.0, 20.0), lowest=20)
-    share = np.clip(0.15 + 0.55 * body * (0.65 + 0.35 * wave) + 0.2 * (shade - 0.5) + 0.06 * fibre, 0, 1)
+    share = np.clip(
+        0.15 + 0.55 * body * (0.65 + 0.35 * wave) + 0.2 * (shade - 0.5) + 0.06 * fibre, 0, 1
+    )
     return _kept(share, 0.002 * body * (0.6 + 0.4 * wave), 1.0 - body)
 
 

@@ -3,6 +3,8 @@
 Row 0 is the lower edge.
 """
 
+import itertools
+
 import numpy as np
 from numpy.random import Generator
 
@@ -20,7 +22,7 @@ def _over(canvas: Array, color: Array | Color, share: Field) -> None:
 
 
 def picture(rng: Generator, palette: Palette) -> Material:
-    """Draw a picture in the room's colours: shapes, hills, a still life of arches, strokes, leaves."""
+    """Draw a picture in the room's colours: shapes, hills, arches, strokes, blocks or a twig."""
     style = pick(rng, (_shapes, _hills, _hills, _arches, _strokes, _field, _twig))
     paper = pick(rng, (palette.neutrals[0], palette.neutrals[1], linear("efe6d4")))
     canvas = np.empty((SIZE, SIZE, 3), np.float32)
@@ -45,7 +47,9 @@ def _shapes(rng: Generator, canvas: Array, colors: Colors) -> None:
         elif kind == "ring":
             share = smoothstep(-0.004, 0.004, 0.02 - np.abs(away - r))
         elif kind == "bar":
-            share = smoothstep(-0.004, 0.004, np.minimum(r - np.abs(u - x), 0.25 * r - np.abs(v - y)))
+            share = smoothstep(
+                -0.004, 0.004, np.minimum(r - np.abs(u - x), 0.25 * r - np.abs(v - y))
+            )
         _over(canvas, pick(rng, colors), share)
 
 
@@ -84,7 +88,9 @@ def _strokes(rng: Generator, canvas: Array, colors: Colors) -> None:
         rough = noise(int(6 * rng.random()), SIZE, 0.5, (1.0, 8.0))
         bend = at + angle * (u - 0.5) + span(rng, -0.4, 0.4) * (u - 0.5) ** 2
         share = smoothstep(-0.01, 0.01, wide - np.abs(v - bend) + 0.01 * rough)
-        ends = smoothstep(0.0, 0.05, u - span(rng, 0.02, 0.3)) * smoothstep(0.0, 0.05, span(rng, 0.7, 0.98) - u)
+        ends = smoothstep(0.0, 0.05, u - span(rng, 0.02, 0.3)) * smoothstep(
+            0.0, 0.05, span(rng, 0.7, 0.98) - u
+        )
         _over(canvas, pick(rng, colors), share * ends)
 
 
@@ -94,7 +100,7 @@ def _field(rng: Generator, canvas: Array, colors: Colors) -> None:
     canvas[:] = np.array(pick(rng, colors)) * 0.7
     edges = sorted([0.06, 0.94, *(span(rng, 0.25, 0.75) for _ in range(1 + chance(rng, 0.5)))])
     rough = 0.012 * noise(int(6 * rng.random()), SIZE, 0.6)
-    for low, high in zip(edges[:-1], edges[1:], strict=True):
+    for low, high in itertools.pairwise(edges):
         inside = np.minimum(np.minimum(u - 0.07, 0.93 - u), np.minimum(v - low, high - v)) - 0.015
         _over(canvas, pick(rng, colors), 0.92 * smoothstep(-0.012, 0.02, inside + rough))
 
@@ -104,7 +110,9 @@ def _twig(rng: Generator, canvas: Array, colors: Colors) -> None:
     ink = np.array(pick(rng, (linear("3f4f3a"), linear("2f3b3a"), colors[0]))) * 0.9
     curve = span(rng, -0.3, 0.3)
     stalk = 0.5 + curve * (v - 0.1) * (v - 0.9)
-    _over(canvas, ink, smoothstep(-0.004, 0.004, 0.004 - np.abs(u - stalk)) * ((v > 0.1) & (v < 0.88)))
+    _over(
+        canvas, ink, smoothstep(-0.004, 0.004, 0.004 - np.abs(u - stalk)) * ((v > 0.1) & (v < 0.88))
+    )
     for k in range(9):
         y = 0.22 + 0.075 * k
         for way in (1.0, -1.0):
@@ -174,35 +182,52 @@ def rug(rng: Generator, ground: Color, colors: Colors, pile: Pattern) -> Materia
         r, turn = np.hypot(1.2 * x, y), np.arctan2(y, x)
         star = r * (1 + 0.12 * np.cos(8 * turn))
         for k in range(4):
-            _over(canvas, (first, second, ground, first)[k], smoothstep(-soft, soft, 0.62 - 0.14 * k - star))
+            _over(
+                canvas,
+                (first, second, ground, first)[k],
+                smoothstep(-soft, soft, 0.62 - 0.14 * k - star),
+            )
         corner = np.hypot(1 - x, 1 - y)
         _over(canvas, second, smoothstep(-soft, soft, 0.4 - corner))
     if style != "plain":
         for low, high, color in ((0.0, 0.09, second), (0.02, 0.035, ground), (0.055, 0.07, first)):
-            _over(canvas, color, smoothstep(-soft, soft, edge - low) * smoothstep(-soft, soft, high - edge))
+            _over(
+                canvas,
+                color,
+                smoothstep(-soft, soft, edge - low) * smoothstep(-soft, soft, high - edge),
+            )
     canvas *= (0.62 + 0.55 * pile.share)[..., None]
     height = np.ascontiguousarray(pile.height / 2)  # the map spans metres, not half a metre
     return Material(np.minimum(canvas, 0.85), 0.98, height, specular=0.05)
 
 
-def leaf(rng: Generator) -> Material:
+def leaf(rng: Generator, palette: Palette) -> Material:
     """Draw a leaf: the middle rib along v at u = 0.5, ribs to both sides, paler or darker edges."""
+    del palette
     u, v = grid(SIZE)
-    green = np.array(linear(pick(rng, ("3f6b33", "2f5a2e", "5a7f3c", "46703f", "6a8f4a", "35583f"))))
+    green = np.array(
+        linear(pick(rng, ("3f6b33", "2f5a2e", "5a7f3c", "46703f", "6a8f4a", "35583f")))
+    )
     side = np.abs(u - 0.5)
-    canvas = lerp(0.75 * green, 1.1 * green, np.clip(0.5 + 0.2 * noise(int(6 * rng.random()), SIZE, 0.8), 0, 1))
+    canvas = lerp(
+        0.75 * green,
+        1.1 * green,
+        np.clip(0.5 + 0.2 * noise(int(6 * rng.random()), SIZE, 0.8), 0, 1),
+    )
     ribs = smoothstep(-0.12, 0.12, 0.1 - np.abs((9 * (v - 0.9 * side)) % 1 - 0.5))
     _over(canvas, 1.35 * green, 0.35 * ribs)
     if chance(rng, 0.3):
         pale = np.array(linear(pick(rng, ("d9dba0", "b9c98a", "c9cfae"))))
         stripe = pick(rng, (0.34, -0.12))
-        _over(canvas, pale, smoothstep(-0.05, 0.05, (side - stripe) if stripe > 0 else (0.12 - side)))
+        _over(
+            canvas, pale, smoothstep(-0.05, 0.05, (side - stripe) if stripe > 0 else (0.12 - side))
+        )
     _over(canvas, 1.7 * green, smoothstep(-0.012, 0.012, 0.022 - side) + 0 * v)
     return Material(np.clip(canvas, 0.0, 0.8), span(rng, 0.3, 0.55))
 
 
 def bands(rng: Generator, color: Color, other: Color, rough: float) -> Material:
-    """Draw a colour with a few bands across v and rows of marks like letters; 0.3 m a repeat."""
+    """Draw a colour with a few bands across v and, on some, a line of letters; 0.3 m a repeat."""
     u, v = grid(SIZE)
     canvas = np.empty((SIZE, SIZE, 3), np.float32)
     canvas[:] = color
@@ -210,8 +235,9 @@ def bands(rng: Generator, color: Color, other: Color, rough: float) -> Material:
         at, wide = rng.random(), span(rng, 0.006, 0.05)
         away = np.abs((v - at + 0.5) % 1 - 0.5)
         _over(canvas, other, smoothstep(-0.004, 0.004, wide - away) + 0 * u)
-    letters = noise(int(6 * rng.random()), SIZE, -0.5, (1.0, 1.0), lowest=40, highest=90)
-    lines = (np.abs((v * 6) % 1 - 0.5) < 0.1) & ((v * 6 % 6).astype(int) % 3 == 1)
-    ink = 0.8 if sum(color) < 0.6 else 0.05
-    _over(canvas, (ink, ink, ink), 0.8 * smoothstep(0.2, 0.6, letters) * lines)
+    if chance(rng, 0.4):  # a line of letters
+        letters = noise(int(6 * rng.random()), SIZE, -0.5, lowest=40, highest=90)
+        line = np.abs((v - rng.random() + 0.5) % 1 - 0.5) < 0.012
+        ink = 0.8 if sum(color) < 0.6 else 0.05
+        _over(canvas, (ink, ink, ink), 0.7 * smoothstep(0.2, 0.6, letters) * line)
     return Material(canvas, rough, metres=0.3)

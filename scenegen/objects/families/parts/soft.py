@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -64,6 +65,16 @@ def bevelled(boxes: Sequence[Box], edge: float = 0.004) -> Part:
     return Part(*mesh, hull, np.zeros(len(hull)), len(boxes))
 
 
+def four(x: float, z: float) -> list[Point]:
+    """Return four places (x, z), one in each quadrant."""
+    return [(sx * x, sz * z) for sx in (1, -1) for sz in (1, -1)]
+
+
+def posts(at: Sequence[Point], half: float, low: float, high: float) -> list[Box]:
+    """Return upright square bars at places (x, z), of half the width `half`."""
+    return [((x - half, low, z - half), (x + half, high, z + half)) for x, z in at]
+
+
 def pad(
     low: Corner, high: Corner, edge: float, crown: float = 0.0, corner: float | None = None,
     lift: Point = (0.0, 0.0),
@@ -92,10 +103,22 @@ def pad(
         (r, y), way = side[0][-1].tolist(), side[1][-1]
         end = (-edge - 0.75 * (room - edge), high[1])
         bend = (r - 0.3 * (r - end[0]), y + 0.3 * (r - end[0]) * float(way[1] / abs(way[0])))
-        side = join(side, bezier((r, y), (bend[0], min(bend[1], high[1])), (0.5 * (r + end[0]), high[1]), end, 5))
-    base = (x, z, radius)
+        side = join(
+            side,
+            bezier((r, y), (bend[0], min(bend[1], high[1])), (0.5 * (r + end[0]), high[1]), end, 5),
+        )
+    # Profiles are radii, and so not negative: they count from the innermost row.
+    side = side[0] + (room, 0.0), side[1]
+    base = (x - room, z - room, radius - room * is_round)
     at = ((low[0] + high[0]) / 2, (low[2] + high[2]) / 2)
-    return loft(side, base=base, corner=float(is_round), at=at, lean=lift, segments=12 if radius < 0.1 else 32)
+    return loft(
+        side,
+        base=base,
+        corner=float(is_round),
+        at=at,
+        lean=lift,
+        segments=12 if radius < 0.1 else 32,
+    )
 
 
 def pillow(width: float, height: float, thick: float, cells: int = 14) -> Part:
@@ -117,8 +140,17 @@ def pillow(width: float, height: float, thick: float, cells: int = 14) -> Part:
     both = np.concatenate([points.reshape(-1, 3), points.reshape(-1, 3) * (1, 1, -1)])
     used, index = np.unique(faces, return_inverse=True)
     vertices, faces = both[used], index.reshape(faces.shape)
+    sheet = np.stack([_length(points, 1), _length(points, 0), np.full(a.shape, 9.0)], axis=-1)
+    sheet = np.concatenate([sheet.reshape(-1, 3)] * 2)[used]
     normals = vertex_normals(vertices, faces)
-    return Part(vertices, faces, normals, *_hull(vertices))
+    return Part(vertices, faces, normals, *_hull(vertices), 1, sheet)
+
+
+def _length(points: Array, axis: int) -> Array:
+    """Return how far points of a grid, (rows, columns, 3), lie from its middle along an axis."""
+    steps = np.linalg.norm(np.diff(points, axis=axis), axis=2)
+    far = np.cumsum(np.concatenate([0 * steps.take([0], axis), steps], axis=axis), axis=axis)
+    return np.asarray(far - far.take([far.shape[axis] // 2], axis))
 
 
 def _cells(number: Array) -> Array:
@@ -170,6 +202,12 @@ def blades(
     sheet = np.tile(np.column_stack([side, np.full(half, 9.0)]), (2 * count, 1))
     normals = vertex_normals(vertices, faces)
     return Part(vertices, faces, normals, *_hull(vertices), count, sheet)
+
+
+def close_fitting(part: Part) -> Part:
+    """Return a part whose body for placing is the hull of its vertices, as after a turn."""
+    hull_points, hull_discs = _hull(part.vertices)
+    return replace(part, hull_points=hull_points, hull_discs=hull_discs)
 
 
 def _hull(vertices: Array) -> tuple[Array, Array]:

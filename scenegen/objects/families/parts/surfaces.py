@@ -100,9 +100,10 @@ def loft(
     normals[..., ::2] = outward * rise[:, None]
     normals[..., 1] = -(section(growth, outward, quadrant) * outward).sum(axis=-1)
     normals[..., 1] -= (leans[:, None] * outward).sum(axis=-1)[:, None] * rise
-    *mesh, sheet = strips(grid, normals)
-    sheet[np.abs(mesh[2][:, 1]) > 0.7, 2] = 0.0  # a lid or a flat top is not wound about the axis
-    return Part(*mesh, hull.reshape(-1, 3), radii.reshape(-1), len(centers), sheet)
+    vertices, faces, units, sheet = strips(grid, normals)
+    sheet[np.abs(units[:, 1]) > 0.7, 2] = 0.0  # a lid or a flat top is not wound about the axis
+    hull_points, hull_discs = hull.reshape(-1, 3), radii.reshape(-1)
+    return Part(vertices, faces, units, hull_points, hull_discs, len(centers), sheet)
 
 
 def _with_lids(rows: Array) -> Array:

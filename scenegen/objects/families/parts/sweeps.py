@@ -62,5 +62,5 @@ def tube(
         way = np.array(origin) + flat[:, :1] * u + flat[:, 1:] * v
         hull += [way + sideways * side, way - sideways * side]
     rows = np.concatenate(hull)
-    *mesh, sheet = strips(grid[None], normals[None])
-    return Part(*mesh, rows, np.zeros(len(rows)), 1, sheet)
+    vertices, faces, normals, sheet = strips(grid[None], normals[None])
+    return Part(vertices, faces, normals, rows, np.zeros(len(rows)), 1, sheet)
