@@ -14,6 +14,7 @@ import click
 
 from scenegen.command_line.groups import EXAMPLE, creation_command
 from scenegen.command_line.options import (
+    ASSETS,
     COMPRESSION,
     DEVICE,
     IMAGE_DTYPE,
@@ -112,6 +113,7 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
               help="Whether pictures of interiors are denoised [if the extra `denoise` is there].")
 @click.option("--sensor-noise", type=float,
               help="Noise of the camera of interiors, as a share of white [0].")
+@ASSETS
 @IMAGE_DTYPE
 @COMPRESSION
 @click.option("--batch", type=int, default=64, show_default=True,
@@ -163,6 +165,11 @@ def render(
     if size is not None:
         chosen["height"], chosen["width"] = size
     chosen = _with_denoiser(preset, chosen)
+    assets = [chosen.pop(name, None) for name in ("materials", "environment")]
+    if any(assets):
+        from scenegen.rendering.pictures.assets import use_assets
+
+        chosen |= use_assets(*assets)
     source = object_source(preset, **objects)
     spec = preset_spec(preset, **chosen, **source.settings)
     images = count * len(spec.views)

@@ -18,8 +18,8 @@ from scenegen.description.interiors import WALLS, Interior, Opening, wall_length
 from scenegen.objects.solids import Mesh, UnitShape
 
 Array = NDArray[Any]
-KINDS = (
-    "floor", "wall", "ceiling", "skirting", "door", "frame", "sill", "metal", "glow",
+PARTS = (
+    "floor", *WALLS, "ceiling", "skirting", "door", "frame", "sill", "metal", "glow",
 )  # fmt: skip
 PREFIX = "room/"  # of the names of shells, which go on with the interior's JSON
 PAST = 0.0625  # metres by which planes reach past corners
@@ -41,7 +41,7 @@ class Shell:
         corners: metres, (F, 3, 3), counter-clockwise seen from the side that shows.
         normals: unit normals of the triangles, (F, 3).
         uv: texture coordinates of the corners, in metres, (F, 3, 2).
-        part: index into KINDS, (F,).
+        part: index into PARTS, (F,).
     """
 
     corners: Array
@@ -60,7 +60,7 @@ class _Builder:
     def quad(self, part: str, a: Any, b: Any, c: Any, d: Any) -> None:
         """Add a quadrilateral, counter-clockwise seen from the side that shows."""
         self.quads.append((a, b, c, d))
-        self.parts.append(KINDS.index(part))
+        self.parts.append(PARTS.index(part))
 
     def box(self, part: str, low: Any, high: Any) -> None:
         """Add a box between two opposite corners, in any order."""
@@ -121,7 +121,7 @@ def _add_wall(build: _Builder, wall: _Wall, interior: Interior) -> None:
             middle = (u + u_end) / 2, (v + v_end) / 2
             if not any(_inside(hole, *middle) for hole in holes):
                 corners = [(u, v, 0.0), (u_end, v, 0.0), (u_end, v_end, 0.0), (u, v_end, 0.0)]
-                wall.quad(build, "wall", *corners)
+                wall.quad(build, wall.name, *corners)
     doors = [hole for hole in holes if hole.kind == "door"]
     for hole in holes:
         (_add_door if hole.kind == "door" else _add_window)(build, wall, hole)
@@ -148,7 +148,7 @@ def _reveal(build: _Builder, wall: _Wall, hole: Opening, depth: float, part: str
 
 
 def _add_window(build: _Builder, wall: _Wall, hole: Opening) -> None:
-    _reveal(build, wall, hole, REVEAL, "wall")
+    _reveal(build, wall, hole, REVEAL, wall.name)
     a, b, c, d = hole.left, hole.right, hole.bottom, hole.top
     wide, deep = BAR
     near = -REVEAL + deep

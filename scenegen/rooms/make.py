@@ -25,6 +25,7 @@ from scenegen.layout import (
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.rendering.backend import select_variant, versions
+from scenegen.rendering.pictures.places import ASSETS
 from scenegen.rendering.renderer import useful_workers
 from scenegen.rooms.reader import RoomsFile
 from scenegen.rooms.render import RoomsWork
@@ -85,7 +86,8 @@ def make_dataset(
     check_writable(place, overwrite=True)
     renderer = {"variant": variant, **versions()}
     plan = rooms_plan(place.name, spec, count, renderer, compression, command)
-    work = RoomsWork(spec, batch, device, objects, compression, MEMBER_STORE.folder)
+    work = RoomsWork(spec, batch, device, objects, compression, MEMBER_STORE.folder,
+                     (ASSETS.materials, ASSETS.environment))  # fmt: skip
     make_set(
         manifest_path(place), plan, work, shard_size,
         workers=workers or useful_workers(count * views, variant),

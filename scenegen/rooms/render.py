@@ -23,6 +23,7 @@ from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.rendering.amodal import amodal_masks
 from scenegen.rendering.ground_truth import visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack_arrays
+from scenegen.rendering.pictures.places import ASSETS
 from scenegen.rendering.renderer import (
     launch_fields,
     picture_fields,
@@ -52,6 +53,7 @@ class RoomsWork:
         batch: images rendered at once.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         cache_dir: where members of families are kept.
+        assets: places of materials and surroundings, as `pictures.places.Places.use` takes them.
     """
 
     spec: DatasetSpec
@@ -60,6 +62,7 @@ class RoomsWork:
     objects: Objects
     compression: str
     cache_dir: Path | None
+    assets: tuple[Path | None, Path | None] = (None, None)
 
     @property
     def block(self) -> int:
@@ -72,6 +75,7 @@ class RoomsWork:
         Returns why models were refused, by name.
         """
         MEMBER_STORE.use(self.cache_dir)
+        ASSETS.use(*self.assets)
         share_processors(workers, self.device)
         fields = columns(self.spec)
         groups = (

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.rotations import product
+from scenegen.description.interiors import WALLS
 from scenegen.objects.furniture import furnished
-from scenegen.objects.room_shell import KINDS, shell_name, shell_of
+from scenegen.objects.room_shell import PARTS, shell_name, shell_of
 from scenegen.rendering.materials.folders import MapFiles
 from scenegen.rendering.materials.kinds import material
 from scenegen.rendering.materials.material import Material
@@ -21,6 +22,7 @@ Array = NDArray[Any]
 Folder = Mapping[str, tuple[MapFiles, ...]] | None
 TEXEL_RANGE = 255.0
 GLOW = "glow"
+ACCENT_SHARE = 0.35  # of rooms in which one wall has another colour
 LAMP_FLUX = 0.03  # of a lamp, in the units of the sky's radiance times square metres
 CEILING_FLUX = 0.1
 WARM = (1.0, 0.72, 0.44)  # linear RGB of lamps, of some 3000 K
@@ -112,9 +114,9 @@ def room_palette(seed: int, index: int) -> Palette:
 def room_kinds(seed: int, index: int) -> tuple[str, ...]:
     """Return the kinds of materials of a shell's parts; in some rooms one wall stands out."""
     rng = item_rng(seed, index, Purpose.MATERIALS, 1)
-    accent = WALLS[int(rng.random() * 8)] if rng.random() < ACCENT_SHARE else ""
+    accent = WALLS[int(rng.random() * len(WALLS))] if rng.random() < ACCENT_SHARE else ""
     return tuple("wall" if k in WALLS and k != accent else "accent" if k in WALLS else k
-                 for k in KINDS)  # fmt: skip
+                 for k in PARTS)  # fmt: skip
 
 
 def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -> Matter:
@@ -126,7 +128,7 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -
     flat = np.repeat(room.normals[:, None], 3, axis=1)
     kinds = room_kinds(seed, index)
     rows = np.array([collected.number(kind, "room", i) for i, kind in enumerate(kinds)])
-    shines = (room.part == KINDS.index(GLOW)) & lit
+    shines = (room.part == PARTS.index(GLOW)) & lit
     collected.add(*(x[~shines] for x in (room.corners, flat, room.uv, rows[room.part])))
     if shines.any():
         collected.shine(*(x[shines] for x in (room.corners, flat, room.uv)), CEILING_FLUX)
