@@ -152,6 +152,10 @@ class RoomsFile(RowFile):
         with describing(f"{self.path}: scene, row {row}"):
             return SceneSpec.from_json(text)
 
+    def room_size(self, row: int) -> Array | None:
+        """Return the inner size of a closed room, (3,), metres; None for the paper's room."""
+        return np.asarray(self.read("room/size", row)) if self.spec.interior else None
+
     def check_field(self, name: str) -> None:
         """Raise SpecError unless `read` takes this name, FileFormatError if it is withheld."""
         if not self.has_truth and name in {c.name for c in columns(self.spec)} - {*INPUT}:

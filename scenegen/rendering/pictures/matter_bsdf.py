@@ -93,7 +93,7 @@ def _matter_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
             return mi.Frame3f(mi.Normal3f(tilted))
 
         def _local(self, si: Any, wo: Any, row: list[Any]) -> tuple[Any, Any, Any, Any]:
-            """Return wi and wo in the tilted frame, on the viewer's side; that frame, and a sign."""
+            """Return wi and wo in the tilted frame, on the viewer's side; the frame; a sign."""
             frame = self._frame(si, row)
             wi = frame.to_local(si.to_world(si.wi))
             out = frame.to_local(si.to_world(wo))
