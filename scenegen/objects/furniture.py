@@ -54,7 +54,7 @@ def family_of(name: str) -> tuple[str, int]:
     return family, int(number)
 
 
-_KEPT: Recent[tuple[Furnishing, Array, float]] = Recent(4_000_000)  # faces
+_KEPT: Recent[tuple[Furnishing, Array, float]] = Recent(1_000_000)  # faces, of some 200 bytes
 
 
 def furnished(name: str) -> tuple[Furnishing, Array, float]:

@@ -163,8 +163,9 @@ def _sampled_again(rooms: RoomsFile, rows: Sequence[int], objects: Objects) -> C
 
 def _proposals(rooms: RoomsFile, index: int, objects: Objects) -> Iterator[SceneSpec]:
     """Yield what the seed proposes for an item, some at a time, as few are mostly enough."""
-    for first in range(0, MAX_ATTEMPTS, TRIED_AT_ONCE):
-        attempts = range(first, min(first + TRIED_AT_ONCE, MAX_ATTEMPTS))
+    step = 1 if rooms.spec.interior else TRIED_AT_ONCE  # closed rooms take long, one by one
+    for first in range(0, MAX_ATTEMPTS, step):
+        attempts = range(first, min(first + step, MAX_ATTEMPTS))
         _, drawn = sample_scenes(rooms.spec, [index] * len(attempts), attempts, objects)
         yield from (drawn.scene(k) for k in range(len(drawn)))
 
