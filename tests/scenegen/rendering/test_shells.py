@@ -60,7 +60,8 @@ def test_only_a_windows_opening_shows_nothing(wall):
     camera = Camera(start, ahead, 70.0)
     pixels = rendered(camera, (window,))
     nothing = pixels["object_id"] < 0
-    assert np.isnan(pixels["depth"][nothing]).all() and (pixels["normal"][nothing] == 0).all()
+    assert np.isnan(pixels["depth"][nothing]).all()
+    assert (pixels["normal"][nothing] == 0).all()
     assert nothing[SPEC.height // 2 - 4, SPEC.width // 2 - 6]
     depth, _ = planes(camera)
     inside = np.flatnonzero(nothing.any(axis=0))

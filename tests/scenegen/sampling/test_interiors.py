@@ -50,7 +50,8 @@ def test_as_many_objects_as_asked_for_stand_in_the_room(scenes):
         room = scene.interior
         for item in scene.objects:
             points = corners(item).reshape(-1, 3)
-            assert (points > -0.2).all() and (points < np.array(room.size) + 0.2).all()
+            assert (points > -0.2).all()
+            assert (points < np.array(room.size) + 0.2).all()
 
 
 def test_nothing_cuts_into_anything_else(scenes):
@@ -87,7 +88,8 @@ def test_cameras_are_free_and_nearly_level(scenes):
     for scene in scenes:
         (camera,) = scene.cameras
         position = np.array(camera.position)
-        assert 0.8 <= position[1] <= 1.8 and 45 <= camera.fov_y_degrees <= 75
+        assert 0.8 <= position[1] <= 1.8
+        assert 45 <= camera.fov_y_degrees <= 75
         assert (position[[0, 2]] >= 0.3).all()
         assert (position[[0, 2]] <= np.array(scene.interior.size)[[0, 2]] - 0.3).all()
         down = camera.world_from_camera[:3, 2] @ (0, 1, 0)
