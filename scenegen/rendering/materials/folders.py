@@ -12,7 +12,7 @@ import OpenEXR
 from PIL import Image
 
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.rendering.materials.material import Array, Material
+from scenegen.rendering.materials.material import Array, Material, uneven
 
 Result = TypeVar("Result")
 MOST_PIXELS = 8192  # of a map's side
@@ -187,4 +187,4 @@ def _height(normal: Array, metres: float) -> Array:
     square = np.abs(u) ** 2 + np.abs(v) ** 2
     square[0, 0] = 1.0
     slopes[0, 0] = 0.0
-    return np.asarray(np.fft.irfft2(slopes / square, z.shape), np.float32)
+    return uneven(np.fft.irfft2(slopes / square, z.shape))

@@ -11,7 +11,7 @@ from scenegen.common.names import check_choice
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.rendering.materials import patterns, pictures
 from scenegen.rendering.materials.folders import MapFiles, read_maps
-from scenegen.rendering.materials.material import Array, Material, lerp
+from scenegen.rendering.materials.material import Array, Material, lerp, uneven
 from scenegen.rendering.materials.palettes import Color, Palette, linear
 from scenegen.rendering.materials.patterns import Pattern
 
@@ -170,7 +170,7 @@ def _shaded(
         seam = np.asarray(pick(rng, _options(recipe.seam, palette)), np.float32)
         color += joint[..., None] * (seam - color)
         roughness = roughness + joint * (recipe.rough_seam - roughness)
-    height = recipe.bumps * bumps if bumps.any() else None
+    height = uneven(recipe.bumps * bumps) if bumps.any() else None
     roughness = np.clip(roughness, 0.05, 1.0).astype(np.float32)
     return Material(color, roughness, height, specular=recipe.specular, metres=recipe.metres)
 
@@ -249,7 +249,7 @@ def _wood(rng: Generator, palette: Palette) -> Material:
     share = np.roll(patterns.grain(_seed(rng)), int(rng.random() * patterns.SIZE), axis=1)
     dark, light = palette.woods[1]
     roughness = (span(rng, 0.28, 0.5) + 0.14 * (1.0 - share)).astype(np.float32)
-    return Material(lerp(dark, light, share), roughness, 0.00006 * share, metres=0.6)
+    return Material(lerp(dark, light, share), roughness, uneven(0.00006 * share), metres=0.6)
 
 
 def _metal(rng: Generator, palette: Palette) -> Material:
@@ -281,7 +281,7 @@ def _cloth(
         count = pick(rng, (6, 8, 10)) if kind == "dots" else pick(rng, (3, 4, 5))
         base = lerp(color, other, patterns.figure(kind, count, _seed(rng)))
     light = np.minimum((0.45 + 0.75 * pattern.share)[..., None] * base, 0.88)
-    return Material(light, 0.95, pattern.height, specular=0.1, metres=metres)
+    return Material(light, 0.95, uneven(pattern.height), specular=0.1, metres=metres)
 
 
 def _fabric(rng: Generator, palette: Palette) -> Material:

@@ -10,7 +10,7 @@ from numpy.random import Generator
 
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.rendering.materials.fields import Field, grid, noise, smoothstep
-from scenegen.rendering.materials.material import Array, Material, lerp
+from scenegen.rendering.materials.material import Array, Material, lerp, uneven
 from scenegen.rendering.materials.palettes import Color, Palette, linear
 from scenegen.rendering.materials.patterns import Pattern
 
@@ -197,7 +197,7 @@ def rug(rng: Generator, ground: Color, colors: Colors, pile: Pattern) -> Materia
                 smoothstep(-soft, soft, edge - low) * smoothstep(-soft, soft, high - edge),
             )
     canvas *= (0.62 + 0.55 * pile.share)[..., None]
-    height = np.ascontiguousarray(pile.height / 2)  # the map spans metres, not half a metre
+    height = uneven(pile.height / 2)  # the map spans metres, not half a metre
     return Material(np.minimum(canvas, 0.85), 0.98, height, specular=0.05)
 
 

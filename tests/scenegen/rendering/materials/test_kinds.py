@@ -84,3 +84,13 @@ def test_unknown_kinds_are_refused():
     with pytest.raises(SpecError) as error:
         drawn("mahogany", 0)
     assert error.value.where == "material"
+
+
+@EVERY
+def test_bumps_are_nowhere_flat(kind):
+    """Mitsuba's bump maps return NaN where they are."""
+    for seed in range(4):
+        height = drawn(kind, seed).height
+        if height is not None:
+            slopes = (height - np.roll(height, 1, axis=axis) for axis in (0, 1))
+            assert not np.logical_and(*(slope == 0.0 for slope in slopes)).any()
