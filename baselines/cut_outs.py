@@ -81,7 +81,8 @@ def _camera(rooms: RoomsFile, row: int) -> tuple[Array, float]:
 
 
 def _empty(rooms: RoomsFile, row: int) -> Array:
-    return empty_room(*_camera(rooms, row), rooms.spec.height, rooms.spec.width)[0]
+    size = rooms.spec.height, rooms.spec.width
+    return empty_room(*_camera(rooms, row), *size, rooms.room_size(row))[0]
 
 
 def _mask(rooms: RoomsFile, row: int) -> Array:

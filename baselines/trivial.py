@@ -69,7 +69,7 @@ def write_room_baseline(
                     matrix = rooms.read("camera/world_from_camera", row)
                     fov = float(rooms.read("camera/fov_y_degrees", row))
                     size = rooms.spec.height, rooms.spec.width
-                    submission.add(row, *empty_room(matrix, fov, *size))
+                    submission.add(row, *empty_room(matrix, fov, *size, rooms.room_size(row)))
                 progress(1, len(rooms))
 
 

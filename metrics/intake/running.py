@@ -182,7 +182,7 @@ def _geometries(
                 )  # fmt: skip
             except OutputError as error:
                 raise error.inside(f"{model.name}: row {row}") from error
-            in_metres = bool(getattr(rooms.spec, "interior", None))
+            in_metres = rooms.spec.interior
             if model.metres and geometry.alignment == "none" and not in_metres:
                 geometry = replace(geometry, alignment="scale")
             yield row, geometry

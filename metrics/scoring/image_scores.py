@@ -117,7 +117,7 @@ class Reference:
 def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
     """Return the reference of a true view; `first` is None where it is the first one itself."""
     mask, fov = truth.mask, truth.fov_y_degrees
-    empty, _ = empty_room(truth.world_from_camera, fov, *truth.depth.shape)
+    empty, _ = empty_room(truth.world_from_camera, fov, *truth.depth.shape, truth.room_size)
     pitch = pixel_size(len(mask), fov)
     points = back_project(truth.depth, fov)[mask]
     surface = surface_of(points, truth.normal[mask].astype(np.float64), pitch, mask)
@@ -213,9 +213,11 @@ def _hidden(truth: TrueView, counted: Array, first: FirstView | None) -> Array:
     return hidden
 
 
-def true_relief(depth: Array, world_from_camera: Array, fov_y_degrees: float) -> Array:
+def true_relief(
+    depth: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+) -> Array:
     """Return the relief of a true view of this depth, (H, W), scene units; NaN where no depth."""
-    empty, _ = empty_room(world_from_camera, fov_y_degrees, *depth.shape)
+    empty, _ = empty_room(world_from_camera, fov_y_degrees, *depth.shape, room_size)
     return np.asarray(empty - depth)
 
 
@@ -318,7 +320,7 @@ def _scores_of_relief(
     if not geometry.on_rays:
         ahead = geometry.points[:, 2] < 0.0
         lines = geometry.points[ahead] / -geometry.points[ahead, 2:]
-        room[ahead] = depth_along(lines, truth.world_from_camera)
+        room[ahead] = depth_along(lines, truth.world_from_camera, truth.room_size)
     said = room - geometry.depth[mask]
     relief = relief_scores(said, (reference.empty - truth.depth)[mask])
     if other_relief is None:
