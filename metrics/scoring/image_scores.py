@@ -117,7 +117,8 @@ class Reference:
 def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
     """Return the reference of a true view; `first` is None where it is the first one itself."""
     mask, fov = truth.mask, truth.fov_y_degrees
-    empty, _ = empty_room(truth.world_from_camera, fov, *truth.depth.shape, truth.room_size)
+    height, width = truth.depth.shape
+    empty, _ = empty_room(truth.world_from_camera, fov, height, width, truth.room_size)
     pitch = pixel_size(len(mask), fov)
     points = back_project(truth.depth, fov)[mask]
     surface = surface_of(points, truth.normal[mask].astype(np.float64), pitch, mask)
@@ -217,7 +218,8 @@ def true_relief(
     depth: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
 ) -> Array:
     """Return the relief of a true view of this depth, (H, W), scene units; NaN where no depth."""
-    empty, _ = empty_room(world_from_camera, fov_y_degrees, *depth.shape, room_size)
+    height, width = depth.shape
+    empty, _ = empty_room(world_from_camera, fov_y_degrees, height, width, room_size)
     return np.asarray(empty - depth)
 
 
