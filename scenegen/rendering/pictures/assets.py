@@ -9,18 +9,17 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
+from scenegen.rendering.backend import point_to_llvm
 from scenegen.rendering.materials.folders import MapFiles, from_folder
 from scenegen.rendering.pictures.places import ASSETS
 
 Array = NDArray[Any]
-mi: Any = mitsuba
 MEAN = 0.09  # radiance that the upper half of the surroundings is scaled to, that of a clear sky
 MOST_COLUMNS = 4096
 
@@ -80,6 +79,12 @@ def read_environment(place: Path) -> Array:
     Raises FileFormatError where it is broken, has a low dynamic range, or is not twice as wide as
     high.
     """
+    point_to_llvm()  # before Dr.Jit is imported, with Mitsuba
+    import mitsuba
+
+    mi: Any = mitsuba
+    if mi.variant() is None:  # bitmaps need one
+        mi.set_variant("scalar_rgb")
     expected = "an equirectangular picture in HDR or EXR"
     try:
         bitmap = mi.Bitmap(str(place))
@@ -109,8 +114,6 @@ def use_assets(materials: str | None, environment: str | None) -> dict[str, str]
         _folder(ASSETS.materials)
         settings["materials"] = digest_of(ASSETS.materials)
     if ASSETS.environment is not None:
-        if mi.variant() is None:  # bitmaps need one
-            mi.set_variant("scalar_rgb")
         read_environment(ASSETS.environment)
         settings["environment"] = digest_of(ASSETS.environment)
     return settings

