@@ -131,7 +131,8 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -
     shines = (room.part == PARTS.index(GLOW)) & lit
     collected.add(*(x[~shines] for x in (room.corners, flat, room.uv, rows[room.part])))
     if shines.any():
-        collected.shine(*(x[shines] for x in (room.corners, flat, room.uv)), CEILING_FLUX)
+        glowing = room.corners[shines], flat[shines], room.uv[shines]
+        collected.shine(*glowing, CEILING_FLUX)
     for k in range(int(batch.object_count[b])):
         name = batch.names[batch.shape[b, k]]
         thing, vertices, _ = furnished(name)
@@ -152,8 +153,9 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -
     more = max(LEAST_SHINING, 1 << count.bit_length()) - count
     triangle = np.array([[[0, 0, 0], [1e-3, 0, 0], [0, 0, 1e-3]]])
     triangle[..., 1] = OUT_OF_SIGHT
-    dark = (triangle, np.tile([0.0, 1.0, 0.0], (1, 3, 1)), np.zeros((1, 3, 2)), np.zeros((1, 3)))
-    collected.glowing.append(tuple(np.repeat(part, more, axis=0) for part in dark))  # type: ignore[arg-type]
+    up, nowhere = np.tile([0.0, 1.0, 0.0], (1, 3, 1)), np.zeros((1, 3, 2))
+    unseen = (np.repeat(x, more, axis=0) for x in (triangle, up, nowhere, np.zeros((1, 3))))
+    collected.glowing.append(tuple(unseen))  # type: ignore[arg-type]
     shining, shining_normals, shining_uv, radiance = (
         np.concatenate(x) for x in zip(*collected.glowing, strict=True)
     )

@@ -33,7 +33,7 @@ SILL_DEPTH = 0.14  # of a window's sill, inside the wall's plane
 TOP = 1.0  # least height of a wall's free part for a picture's lower edge
 FILL_TRIES = 400
 # What stands on what, by family and with weights; "sill" and "floor" are the room's.
-ON_TOP = {
+ON_TOP: dict[str, dict[str, float]] = {
     "table": {"plate": 2, "cup": 3, "mug": 3, "bowl": 3, "bottle": 2, "can": 1, "vase": 2,
               "book": 2, "plant": 1, "cap": 0.3, "basket": 0.3},
     "coffee_table": {"book": 4, "cup": 2, "mug": 2, "vase": 2, "bowl": 2, "plant": 1, "can": 0.5},
@@ -276,8 +276,8 @@ class Arranger:
         if chair is None:
             return
         a, b = place.half
-        seats = []
-        for side in (-1, 1):
+        seats: list[tuple[float, float, float, float]] = []
+        for side in (-1.0, 1.0):
             count = max(1, min(int(2 * a / (2 * chair.half[0] + 0.12)), 3))
             seats += [((2 * i + 1 - count) * a / count, side * b, 0.0, side) for i in range(count)]
             if 2 * b > 2 * chair.half[0] + 0.1 and 2 * a > 1.1:
@@ -432,8 +432,8 @@ class Arranger:
                 )
         for hole in self.room.openings:
             if hole.kind == "window":
-                sides = (hole.left, hole.right, hole.bottom, float(WALLS.index(hole.wall)))
-                found.append((("sill", 0, hole.bottom, sides), 0.08))
+                sill = (hole.left, hole.right, hole.bottom, float(WALLS.index(hole.wall)))
+                found.append((("sill", 0, hole.bottom, sill), 0.08))
         astray = sum(
             t.piece.family in ON_TOP["floor"] and not t.stands_on for t in self.space.placed
         )
