@@ -160,8 +160,8 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -
         np.concatenate(x) for x in zip(*collected.glowing, strict=True)
     )
     tables = _tables(collected.materials, of_face)
-    glowing = Soup(shining, shining_normals, shining_uv)
-    return Matter(Soup(corners, normals, uv), tables, glowing, radiance)
+    lights = Soup(shining, shining_normals, shining_uv)
+    return Matter(Soup(corners, normals, uv), tables, lights, radiance)
 
 
 def _tables(materials: list[Material], of_face: Array) -> Tables:
