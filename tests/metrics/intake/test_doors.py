@@ -96,7 +96,7 @@ def test_a_run_is_the_import_of_the_same_arrays_and_says_what_it_was(folders, tr
         assert found.method == Path(folder).name
         for row in (0, 7):
             expected = here.infer(srgb_bytes(rooms[row].radiance))["depth_metric"]
-            np.testing.assert_allclose(found.depth(row), expected, rtol=1e-4)
+            np.testing.assert_allclose(found.depth(row), expected, rtol=1e-3, atol=1e-3)
         for text in told["weights_sha256"], "DepthAnythingForDepthEstimation", "input: 70x70":
             assert text in found.notes
     with torch.no_grad():

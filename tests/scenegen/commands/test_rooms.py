@@ -21,7 +21,7 @@ TINY = ("--size", "32", "--min-visible-pixels", "3")
 BY_OTHERS = {
     "height", "width", "source", "listing", "own_reflectance", "fov_degrees", "fov_spread_degrees",
 }  # fmt: skip
-FIXED = {"camera_target"}
+FIXED = {"camera_target", "interior"}  # the latter by its preset
 NOT_SETTINGS = {
     "count", "out", "preset", "size", "classes", "shapenet_root", "objects_root", "up", "cache_dir",
     "compression", "batch", "workers", "shard_size", "scheduler", "device", "overwrite",

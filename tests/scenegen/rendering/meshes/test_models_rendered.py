@@ -91,7 +91,7 @@ def test_path_tracing_is_refused_where_only_the_slow_path_is(scenes_of, monkeypa
     batch = pack(spec, scenes_of(spec, 1))
     monkeypatch.setattr(renderer, "select_variant", lambda device: "scalar_rgb")
     with pytest.raises(BackendError) as refused:
-        renderer.launch(batch)
+        renderer.trace(batch, ["image"])
     assert refused.value.where == "shading path"
 
 
