@@ -113,6 +113,7 @@ def refused(name, **more):
     return caught.value
 
 
+@pytest.mark.slow
 def test_one_line_says_what_is_wrong(tmp_path, folders, truths, monkeypatch):
     from transformers import BertConfig
 
