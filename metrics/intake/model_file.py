@@ -27,7 +27,10 @@ from scenegen.files.pool import ended
 
 LIBRARIES = ("hf:", "moge:")  # what begins the names of models that `doors` loads
 DOORS = Path(__file__).with_name("doors.py")
-PACKAGES = {"transformers": "transformers torch", "moge": "dlr-moge torch"}  # of modules
+PACKAGES = {  # what to install, by the module that is missing
+    "transformers": "transformers torch torchvision",
+    "moge": "dlr-moge torch",
+}
 # For `python -c`: runs a file without its folder among those of imports; -P is of Python 3.11.
 BOOT = (
     "import runpy, sys; sys.path = [p for p in sys.path if p];"

@@ -105,6 +105,7 @@ def run_model(
     texts: dict[str, Any] = {"method": method, "run": run, "notes": notes, "overwrite": overwrite}
     kept = {name: value for name, value in (options or {}).items() if name != "batch"}
     settings = {"model": model.sha256, **call.settings, "options": kept}
+    settings |= {"weights": model.provenance["weights_sha256"]} if model.named else {}
     runner = _run_questions if questions else _run_rooms
     return runner(model, data, out, call, texts, settings, keep, progress)
 

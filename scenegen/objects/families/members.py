@@ -13,16 +13,18 @@ from scenegen.objects.families import (
     cans,
     caps,
     chairs,
-    devices,
     lamps,
+    tables,
+    vessels,
+)
+from scenegen.objects.families.home import (
+    devices,
     paper,
     plants,
     seats,
     storage,
-    tables,
     tableware,
     textiles,
-    vessels,
 )
 from scenegen.objects.families.parts.assembly import assemble
 from scenegen.objects.families.parts.surfaces import Part

@@ -5,7 +5,6 @@ samples are added in a fixed order, so that the same command gives the same byte
 """
 
 import gc
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
-from scenegen.common.random.seeding import Purpose, item_rng, item_seed
+from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import from_json
 from scenegen.description.interiors import Interior
 from scenegen.objects.room_shell import REVEAL
 from scenegen.rendering.packing import SceneBatch
+from scenegen.rendering.path_tracing.path_tracer import camera_rays
 from scenegen.rendering.pictures.assets import environment_of, materials_of
 from scenegen.rendering.pictures.daylight import daylight
 from scenegen.rendering.pictures.denoiser import denoised
@@ -27,7 +27,6 @@ from scenegen.rendering.pictures.development import develop
 from scenegen.rendering.pictures.matter import Matter, Soup, gather_matter
 from scenegen.rendering.pictures.matter_bsdf import matter_bsdf
 from scenegen.rendering.pictures.sky import Outside, outside
-from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.tables import unit
 
 Array = NDArray[Any]
@@ -35,7 +34,6 @@ dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
 MAX_DEPTH = 12  # segments of a path; in closed rooms light bounces often
 ROULETTE_DEPTH = 5  # segments after which a path may end at random
-RAYS_AT_ONCE = 2**21
 BRIGHTEST = 60.0  # radiance of one sample, in units of the mean of its picture
 MATTER_BSDF = "matter"
 
@@ -63,25 +61,8 @@ def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Arr
     })  # fmt: skip
     pixels = spec.height * spec.width
     camera = _camera(batch, b)
-    right, up, back, origin, size = camera
-    places = sample_positions(spec.spp)
     total = np.zeros((pixels, 10))
-    at_once = max(1, RAYS_AT_ONCE // pixels)
-    for number, start in enumerate(range(0, spec.spp, at_once)):
-        positions = places[start : start + at_once]
-        count = len(positions)
-        kind = "independent" if count % math.isqrt(count) else "multijitter"
-        sampler = mi.load_dict({"type": kind, "sample_count": count})
-        sampler.set_samples_per_wavefront(count)
-        stream = number * len(spec.views) + int(batch.view[b])
-        seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, stream)
-        sampler.seed(seed, pixels * count)
-        index = dr.arange(mi.UInt32, pixels * count)
-        pixel, sample = index // count, index % count
-        x = mi.Float(pixel % spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 0]), sample)
-        y = mi.Float(pixel // spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 1]), sample)
-        d = right * ((x - spec.width / 2) * size) + up * ((spec.height / 2 - y) * size) - back
-        ray = mi.RayDifferential3f(mi.Point3f(origin), unit(d))
+    for ray, sampler, count in camera_rays(batch, b, camera):
         radiance, _, _ = integrator.sample(scene, sampler, ray)
         si = scene.ray_intersect(ray)
         hit = si.is_valid()

@@ -12,6 +12,7 @@ from metrics.intake.model_file import ModelError, opened_model
 from metrics.intake.running import Call, run_model
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
+from scenegen.common.errors import SpecError
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import RoomsFile
 
@@ -105,6 +106,28 @@ def test_a_run_is_the_import_of_the_same_arrays_and_says_what_it_was(folders, tr
 
     changed = provenance_of(here.network, "", "", "cpu", torch.float32, "transformers")
     assert changed["weights_sha256"] != told["weights_sha256"]
+
+
+@pytest.mark.slow
+def test_rows_of_other_weights_under_one_name_are_not_taken(tmp_path, truths):
+    folder, out = save("dpt", tmp_path / "network"), tmp_path / "p.h5"
+
+    def stop(done):
+        raise KeyboardInterrupt
+
+    def run(**more):
+        with opened_model(f"hf:{folder}") as model:
+            return run_model(model, truths.rooms, out, call=Call(batch=3), method="m", **more)
+
+    with pytest.raises(KeyboardInterrupt):
+        run(progress=stop)
+    here = load(f"hf:{folder}").network
+    with torch.no_grad():
+        next(here.parameters()).add_(1.0)
+    here.save_pretrained(folder)
+    with pytest.raises(SpecError):
+        run()
+    assert run(keep="resume").startswith("disparity_affine_invariant of 8 rows")
 
 
 def refused(name, **more):
