@@ -19,7 +19,7 @@ command -v chromium > /dev/null || echo "No Chromium: tests of pages are skipped
 $(PIP) --no-compile -e '.[$(1)]'; status=$$?; wait; exit $$status
 endef
 
-.PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results torture harnesses dist clean
+.PHONY: demo demo-summary demo-model docs test test-all check bench gpu results torture harnesses dist clean
 
 demo: $(VENV)/.runtime
 	mkdir -p demo
@@ -113,9 +113,9 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.surfels
 	$(BIN)/python -m benchmarks.score_rows
 
-# Needs an NVIDIA GPU; writes docs/gpu.md.
-bench-gpu: $(VENV)/.test
-	$(BIN)/python -m benchmarks.gpu --page docs/gpu.md
+# Nine minutes on a machine with an NVIDIA GPU, without network; gpu/result/tables.md shows it.
+gpu: $(VENV)/.test
+	$(BIN)/python -m benchmarks.gpu.run
 
 # Hours; stop it when you like, and start it again. RESULTS="--only questions --seeds 1" runs a part.
 results: $(VENV)/.model

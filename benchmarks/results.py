@@ -9,14 +9,12 @@ started again. Use another folder after a change of the code. The score files ar
 """
 
 import argparse
-import os
-import shlex
-import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-ROOT = Path(__file__).parents[1]
+from benchmarks.commands import is_done, product, run
+
 Commands = Iterator[str]
 BASELINE = "bench baseline"
 
@@ -188,38 +186,6 @@ TABLES = {
 }
 
 
-def product(command: str) -> str:
-    """Return the file or folder that a command makes."""
-    words = shlex.split(command)
-    return next(words[i + 1] for i, word in enumerate(words) if word in ("--out", "--json"))
-
-
-def made(folder: Path, command: str) -> bool:
-    """Run a command unless it is done; return whether it is done now."""
-    note = folder / "done.txt"
-    if note.exists() and command in note.read_text().splitlines():
-        return True
-    words, out = shlex.split(command), product(command)
-    (folder / out).parent.mkdir(parents=True, exist_ok=True)
-    if any((folder / out).glob("checkpoint*")):  # the run keeps its settings
-        first = next(i for i, word in enumerate(words) if word.startswith("--"))
-        data = words[words.index("--data") + 1]
-        words = [*words[:first], "--data", data, "--out", out, "--resume"]
-    print(f"$ {shlex.join(words)}", flush=True)
-    program, *arguments = words
-    code = f"import sys, cli; sys.argv[0] = {program!r}; cli.{program}()"
-    path = os.pathsep.join([str(ROOT), *filter(None, [os.environ.get("PYTHONPATH")])])
-    stdout = subprocess.DEVNULL if arguments[0] == "score" else None  # pages of tables
-    done = subprocess.run(
-        [sys.executable, "-c", code, *arguments],
-        cwd=folder, env={**os.environ, "PYTHONPATH": path}, stdout=stdout, check=False,
-    )  # fmt: skip
-    if done.returncode == 0:
-        with note.open("a") as file:
-            print(command, file=file)
-    return done.returncode == 0
-
-
 def main() -> None:
     """Read the options and run; exit with 1 where something failed."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.results", description=__doc__)
@@ -236,7 +202,7 @@ def main() -> None:
             if options.word in command:
                 if options.print:
                     print(command)
-                elif not made(options.folder, command):
+                elif not is_done(options.folder, command) and not run(options.folder, command):
                     failed.append(product(command))
     if failed:
         sys.exit(f"{len(failed)} failed: {', '.join(failed)}")

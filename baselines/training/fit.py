@@ -146,7 +146,8 @@ class _Plan:
         check(left > 0, "minutes", limit, "more: they passed while the data were read")
         check(processes() == 1, "minutes", limit, "no limit where several processes train")
         self._machine, self._done, self._left = machine, card.iteration, left
-        self._iterations = card.settings.iterations if card.iteration else UNPLANNED
+        begun = 0 < card.iteration < card.settings.iterations
+        self._iterations = card.settings.iterations if begun else UNPLANNED
         self._share = left / PLANS
 
     def planned(self, card: CardT) -> CardT:

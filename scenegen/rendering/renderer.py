@@ -21,7 +21,8 @@ from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
 Array = NDArray[Any]
 PICTURE = ("image", "exposure", "albedo")  # fields that depend on materials
-MOST_WORKERS = 8  # that are used unasked; each takes about 0.4 GiB
+MOST_WORKERS = 16  # that are used unasked; each takes about 0.4 GiB
+MOST_ON_GPU = 4  # the same on a GPU, of whose memory each takes a share, too
 WORTHWHILE = 2000  # images for each worker; below, starting it takes longer than it saves
 MOST_FACES = 2_000_000  # of the models of one launch; the rasteriser takes 96 bytes a face
 MOST_DRAWN = 8_000_000  # faces that the images of one launch show; it takes some 16 bytes for each
@@ -31,10 +32,11 @@ MOST_MODELS = 2000  # in one Mitsuba scene; must not exceed `model_scene.MOST_MO
 def useful_workers(images: int, variant: str) -> int:
     """Return how many processes should render so many images.
 
-    One for each processor, as far as each has enough to do; a GPU has enough to do with one.
+    One for each processor, as far as each has enough to do. Several share a GPU, which waits for
+    one.
     """
-    most = 1 if variant == "cuda_ad_rgb" else min(processors(), MOST_WORKERS)
-    return max(1, min(most, images // WORTHWHILE))
+    most = MOST_ON_GPU if variant == "cuda_ad_rgb" else MOST_WORKERS
+    return max(1, min(processors(), most, images // WORTHWHILE))
 
 
 def share_processors(workers: int, device: str = "auto") -> None:

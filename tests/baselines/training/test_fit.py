@@ -242,10 +242,11 @@ def test_a_limit_of_time_sets_the_schedule(later, tmp_path, monkeypatch):
     assert load_weights(tmp_path / "run" / WEIGHTS, METHOD)[1] == state.card
 
 
-def test_a_run_that_goes_on_gets_its_own_limit(tmp_path, monkeypatch):
+@pytest.mark.parametrize("planned", [30, 1000], ids=["it had ended", "it was stopped"])
+def test_a_run_that_goes_on_gets_its_own_limit(planned, tmp_path, monkeypatch):
     state, now = begun(), [0.0]
     monkeypatch.setattr(machine.time, "monotonic", lambda: now[0])
-    state.card = replace(state.card, iteration=30, settings=Settings(iterations=1000))
+    state.card = replace(state.card, iteration=30, settings=Settings(iterations=planned))
 
     def pass_time(*_: Any) -> None:
         now[0] += 1

@@ -1,7 +1,7 @@
 """Does a GPU draw what the CPU draws, and how fast: every preset of rooms, every kind of questions.
 
-`python -m benchmarks.gpu [--quick] [--device cuda] [--page docs/gpu.md]`, from the repository's
-root. It ends with an error where a goal of agreement is missed.
+`python -m benchmarks.gpu.agreement [--images 2000] [--device cuda]` ends with an error where a goal
+of agreement is missed.
 """
 
 import argparse
@@ -23,7 +23,6 @@ from iqtt.files.make import make_split
 from iqtt.questions.specs import SUITE, SplitSpec
 from scenegen.common.errors import BackendError
 from scenegen.description.presets import PRESETS, preset_spec
-from scenegen.files.new_file import write_text
 from scenegen.rendering.backend import select_variant
 from scenegen.rooms.make import make_dataset
 
@@ -95,19 +94,19 @@ def agreement(a: Made, b: Made) -> tuple[int, float, float]:
 
 
 def main() -> None:
-    """Read the options, make every set on both devices, and write the page."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.gpu", description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="fewer images")
-    parser.add_argument("--device", default="cuda", help="beside the CPU [cuda]")
-    parser.add_argument("--page", type=Path, help="where to write the page; else it is printed")
+    """Read the options, make every set on both devices, and print the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.gpu.agreement", description=__doc__)
+    parser.add_argument("--images", type=int, default=2_000, help="of each set, or so  [2000]")
+    parser.add_argument("--device", default="cuda", help="beside the CPU  [cuda]")
     options = parser.parse_args()
     device = options.device
     try:
         variants = {name: select_variant(name) for name in (device, "cpu")}
     except BackendError as error:
-        sys.exit(f"benchmarks.gpu: {error}")
-    rows, missed = [], []
-    for name, images, make in sets(64 if options.quick else 2_000):
+        sys.exit(f"benchmarks.gpu.agreement: {error}")
+    print(f"`{variants[device]}` beside `{variants['cpu']}` on one machine.\n")
+    missed = []
+    for row, (name, images, make) in enumerate(sets(options.images)):
         made, rates, waits = {}, {}, {}
         with tempfile.TemporaryDirectory(prefix="bench-") as folder:
             for where in variants:
@@ -117,20 +116,15 @@ def main() -> None:
                 seconds = time.perf_counter() - start
                 rates[where] = images / seconds
                 waits[where] = max(0.0, 1 - (time.process_time() - used) / seconds)
-        alike, ids, depths = agreement(*made.values())
+        alike, ids, depths = agreement(made[device], made["cpu"])
         cells = [name, f"{alike:,} of {len(made['cpu'].items):,}", f"{ids:.6f}", f"{depths:.6f}"]
         cells += [f"{rates[device]:,.0f}", f"{rates['cpu']:,.0f}"]
         cells += [f"{rates[device] / rates['cpu']:.1f}", f"{waits[device]:.0%}"]
-        rows.append(cells)
-        print(", ".join(cells), file=sys.stderr)
+        # A line at a time: a run that is stopped leaves the rows before.
+        print("\n".join(table(HEAD, [cells]).splitlines()[2 if row else 0 :]), flush=True)
         if ids < 1 or depths < GOAL:
             missed.append(name)
-    text = f"# On a GPU\n\n`make bench-gpu` wrote this page: `{variants[device]}` beside"
-    text += f" `{variants['cpu']}` on one machine.\n\n{table(HEAD, rows)}\n\n{NOTES}\n"
-    if options.page:
-        write_text(options.page, text, overwrite=True)
-    else:
-        print(text)
+    print(f"\n{NOTES}")
     if missed:
         sys.exit(f"the devices do not agree on {len(missed)} sets: {'; '.join(missed)}")
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.gpu import NEAR, Made, agreement, sets
+from benchmarks.gpu.agreement import NEAR, Made, agreement, sets
 
 DEPTH = np.linspace(1, 2, 3 * 4 * 5).reshape(3, 4, 5).astype(np.float32)
 IDS = np.zeros((3, 4, 5), np.int8)
