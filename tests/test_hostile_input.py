@@ -280,7 +280,9 @@ INSTEAD = {
 }
 
 
-@pytest.mark.parametrize("kind", INSTEAD)
+@pytest.mark.parametrize(
+    "kind", [pytest.param(k, marks=[pytest.mark.slow] * (k == "a gigabyte")) for k in INSTEAD]
+)
 def test_whatever_lies_in_its_place(kind, folder):
     for name in READ:
         path = folder / name

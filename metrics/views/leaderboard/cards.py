@@ -15,6 +15,7 @@ from scenegen.common.errors import SpecError
 from scenegen.common.names import did_you_mean
 from scenegen.common.records import from_json
 
+DEEPEST = 3  # a table of cards, a card, and one for the message that a field is no text
 LARGEST = 1_000_000  # characters of a file of cards
 HEAD = ("trained on", "told", "views seen", "paper", "code", "date")
 VIEWS_SEEN = {
@@ -53,8 +54,14 @@ def read_cards(path: str | Path) -> dict[str, Card]:
     if len(text) > LARGEST:
         raise SpecError(path, f"{len(text):,} characters", f"at most {LARGEST:,}")
     try:
-        if any(isinstance(event, yaml.AliasEvent) for event in yaml.parse(text)):
-            raise SpecError(path, "an alias", "YAML without aliases")  # they may unfold without end
+        depth = 0
+        for event in yaml.parse(text):
+            if isinstance(event, yaml.AliasEvent):  # they may unfold without end
+                raise SpecError(path, "an alias", "YAML without aliases")
+            depth += isinstance(event, yaml.CollectionStartEvent)
+            depth -= isinstance(event, yaml.CollectionEndEvent)
+            if depth > DEEPEST:  # the time to read them grows with the square
+                raise SpecError(path, "lists in lists", "cards by name of the method")
         root = yaml.compose(text, yaml.SafeLoader)
         content = {} if root is None else _as_written(root, path)
         return from_json(dict[str, Card], json.dumps(content), str(path))

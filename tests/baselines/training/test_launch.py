@@ -93,9 +93,8 @@ def test_an_environment_that_torchrun_does_not_make_is_refused(here, world, monk
 @pytest.mark.parametrize(
     ("kind", "name"),
     [
-        ("rooms", "2"),
         ("rooms", "2 then 1"),
-        *(pytest.param(kind, "2", marks=pytest.mark.slow) for kind in CONFIGS if kind != "rooms"),
+        *(pytest.param(kind, "2", marks=pytest.mark.slow) for kind in CONFIGS),
         pytest.param("rooms", "1 then 2", marks=pytest.mark.slow),
     ],
 )

@@ -199,26 +199,29 @@ class Baseline:
 """
 
 
-def test_a_wrapper_of_moges_evaluation_runs_as_it_is(truths, tmp_path):
+@pytest.mark.parametrize("told", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_a_wrapper_of_moges_evaluation_runs_as_it_is(told, truths, tmp_path):
     path, out = tmp_path / "wrapped.py", tmp_path / "p.h5"
     path.write_text(BASELINE)
-    words = ["--factor", "2.5"]
-    for told in (False, True):
-        with opened_model(path, {"device": "cpu"}, arguments=words) as model:
-            run_model(
-                model, truths.rooms, out, call=Call(intrinsics=told), method="m", overwrite=True
-            )
-        with open_predictions(out) as found, RoomsFile(truths.rooms) as rooms:
-            seen = srgb_bytes(rooms[3].radiance).astype(float).mean(axis=-1) / 255.0
-            np.testing.assert_allclose(found.depth(3), 2.5 + seen, rtol=1e-6)
-            assert found.alignment == "scale"
-            if told:
-                fov = found.view(3).fov_y_degrees
-                assert fov == pytest.approx(rooms[3].fov_y_degrees, abs=1e-4)
+    with opened_model(path, {"device": "cpu"}, arguments=["--factor", "2.5"]) as model:
+        run_model(model, truths.rooms, out, call=Call(intrinsics=told), method="m")
+    with open_predictions(out) as found, RoomsFile(truths.rooms) as rooms:
+        seen = srgb_bytes(rooms[3].radiance).astype(float).mean(axis=-1) / 255.0
+        np.testing.assert_allclose(found.depth(3), 2.5 + seen, rtol=1e-6)
+        assert found.alignment == "scale"
+        if told:
+            fov = found.view(3).fov_y_degrees
+            assert fov == pytest.approx(rooms[3].fov_y_degrees, abs=1e-4)
+
+
+@pytest.mark.slow
+def test_options_of_a_wrapper_are_checked(tmp_path):
+    path = tmp_path / "wrapped.py"
+    path.write_text(BASELINE)
     assert refused(path, settings={"device": "cpu"}, arguments=["--nothing"]).where
     assert refused(path, settings={"batch": 3}).where == "--batch"
     path.write_text("def infer(image): pass")
-    assert "--" in refused(path, arguments=words).where
+    assert "--" in refused(path, arguments=["--factor", "2.5"]).where
 
 
 def test_what_goes_between_processes_needs_no_numpy_of_one_version():

@@ -262,7 +262,7 @@ def test_diameter_is_the_largest_of_all_distances():
         assert diameter(points) == every.max()
 
 
-@pytest.mark.parametrize("source", ["shapes", "families"])
+@pytest.mark.parametrize("source", ["shapes", pytest.param("families", marks=pytest.mark.slow)])
 def test_bop_counts_what_lies_beyond_the_edge(source, make_rooms, tmp_path):
     """As BOP's scripts do, from the exported folder alone: ray casts on three by three images."""
     engine = pytest.importorskip("trimesh.ray.ray_pyembree")
