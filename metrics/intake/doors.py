@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import hashlib
 import platform
+import re
 from collections.abc import Callable
 from importlib.metadata import PackageNotFoundError, version
 from inspect import signature
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -144,8 +146,6 @@ class MoGe:
 
 def _moge(name: str) -> tuple[Any, str]:
     """Return a MoGeModel and the revision of its weights; a path is taken before the hub's name."""
-    from pathlib import Path
-
     from huggingface_hub import hf_hub_download
     from moge.model import import_model_class_by_version
 
@@ -186,9 +186,20 @@ def provenance_of(
         "dtype": str(dtype).removeprefix("torch."),
         "device": torch.cuda.get_device_name(device) if cuda else device,
         "cuda": str(torch.version.cuda) if cuda else "",
+        "driver": driver_version() if cuda else "",
         "python": platform.python_version(),
         **{one: _version(one) for one in (library, "torch", "numpy")},
     }
+
+
+def driver_version(told: str = "/proc/driver/nvidia/version") -> str:
+    """Return the version of NVIDIA's driver, as the driver tells on Linux; "" elsewhere."""
+    try:
+        text = Path(told).read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""
+    found = re.search(r"\b\d+\.\d+(\.\d+)?\b", text)
+    return found[0] if found else ""
 
 
 def _version(package: str) -> str:

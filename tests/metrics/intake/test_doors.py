@@ -20,7 +20,7 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("transformers")
 from tiny_depth_models import MODELS, save  # noqa: E402
 
-from metrics.intake.doors import load  # noqa: E402
+from metrics.intake.doors import driver_version, load, provenance_of  # noqa: E402
 
 NEEDS_TORCHVISION = ("zoedepth", "depth-pro")
 CLASSES = [
@@ -102,10 +102,30 @@ def test_a_run_is_the_import_of_the_same_arrays_and_says_what_it_was(folders, tr
             assert text in found.notes
     with torch.no_grad():
         next(here.network.parameters()).add_(1.0)
-    from metrics.intake.doors import provenance_of
 
     changed = provenance_of(here.network, "", "", "cpu", torch.float32, "transformers")
     assert changed["weights_sha256"] != told["weights_sha256"]
+
+
+@pytest.mark.parametrize(
+    ("told", "version"),
+    [
+        (
+            "NVRM version: NVIDIA UNIX x86_64 Kernel Module  535.104.05  Sat Aug 19 2023",
+            "535.104.05",
+        ),
+        (
+            "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.82.07  Release",
+            "580.82.07",
+        ),
+        ("no numbers", ""),
+        (None, ""),
+    ],
+)
+def test_the_driver_is_named_where_it_tells(told, version, tmp_path):
+    if told is not None:
+        (tmp_path / "version").write_text(told)
+    assert driver_version(str(tmp_path / "version")) == version
 
 
 @pytest.mark.slow
