@@ -88,6 +88,8 @@ _PLACE = (
     r"(?:one|picture|image|option|shape)(?:\s+(?:in|on|at|to)\s+the\s+\w+)?\s*[,:(]\s*"
 )
 _YES = any_of("yes|yep|correct|no|nope|wrong|match|same|mirror(?:ed)?|different")
+_SHARE = r"[\s(:=-]*(?:(?:confidence|probability|score|p)\W{0,3})?\d*\.?\d+\s*%?\)?"
+_MARKS = "✓✔✅☑✗✘❌✖"
 # What makes plain sentences of a text: patterns with their replacements, in this order.
 _PLAIN: list[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]] = [
     (re.compile(r"<([A-J])>(?!.*</\1>)", re.DOTALL), r"(\1)"),  # "<B>", and no "<B>bold</B>"
@@ -95,6 +97,13 @@ _PLAIN: list[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]] = [
     (re.compile(r"[\\\t](?:text(?:bf|rm|it)?|math(?:bf|rm|sf)|bf|rm|mbox)\s*\{([^{}]*)\}"), r"\1"),
     (re.compile(r"\\n(?![a-z])"), "\n"),  # an escaped end of a line
     (re.compile(r"(?<=[A-Za-z])_(?=[A-J]\b)|\[[xX]\](?=\s*\W?[A-J]\b)"), " "),
+    # "A 40%, B 60%" names both; "A ❌ B ✅" has an entry for each.
+    (re.compile(rf"^(\W*{L}){_SHARE}\s*(?:[,;/]|or\b|and\b)\s*(?={L}{_SHARE})", re.MULTILINE), r"\1 or "),
+    (
+        re.compile(rf"^(?:[A-J][^\w\n]*?[{_MARKS}][^\w\n]*){{2,}}$", re.MULTILINE),
+        lambda match: re.sub(f"(?<=[{_MARKS}])", "\n", match[0]),
+    ),
+    (re.compile(r"(?<=[a-z])~(?=[A-J]\b)"), " "),
     # Marks of Markdown and LaTeX, and white space at the starts of lines.
     (re.compile(r"```\w*|[*_`$~#]|\\[()\[\]]|^[^\S\n]*(?:>[^\S\n]*)+|^[^\S\n]+", re.MULTILINE), ""),
     # Scripts without spaces get some around letters, so that these stand by themselves.

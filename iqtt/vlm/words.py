@@ -42,14 +42,15 @@ OF_ANSWER = any_of(
     antwort|lösung|wahl
     réponse|choix
     respuesta|solución|elección|opción
-    risposta|scelta|resposta|antwoord|ответ|đáp án""",
-    "الجواب|उत्तर|答案|答え|正解|回答|解答|选择|選択|选项|정답|답",
+    risposta|scelta|resposta|antwoord|ответ|đáp án|cevap|yanıt""",
+    "الجواب|الإجابة|उत्तर|答案|答え|正解|回答|解答|选择|選択|选项|정답|답",
 )
 GOOD = any_of(
     r"""same|match(?:es|ing|ed)?|identical|correct|congruent|equivalent|fits?|fitting|best|yes|true
     correspond(?:s|ing)?|most similar|closest|(?:is|be) right
     right (?:one|answer|choice|option|picture|image|match|shape|figure)
-    rotat\w+ (?:(?:version )?of )?(?:the )?(?:into|reference)
+    rotat\w+ (?:(?:version |view |copy )?of )?(?:the )?(?:into|reference)
+        (?:obtained|made) from the reference
     gleich\w*|dasselbe|dieselbe\w*|derselbe\w*|richtig\w*|korrekt\w*|passt|passende?|stimmt
     identisch\w*
     même|correcte|bonne?|correspond|identique
@@ -144,7 +145,7 @@ _RIGHT = r"(?:correct|right|richtig|korrekt|correcte|correct[oa])(?=\W*$|\s+(?:o
 AFTER_ANSWER = compiled(
     r"^\s*(?:(?:is|must\s+be|has\s+to\s+be|ist|est|es|è|é)\s+(?:\w+\s+){0,3}?(?:answer|choice|option"
     rf"|pick|selection|solution|match|one(?=\W*$)|antwort|lösung|réponse|respuesta|{_RIGHT})\b"
-    r"|it\s+is\b|would\s+be\s+(?:my|the)\s+(?:answer|choice|pick)(?=\W*$)"
+    r"|it\s+is\b|remains(?=\W*$)|is\s+left(?=\W*$)|would\s+be\s+(?:my|the)\s+(?:answer|choice|pick)(?=\W*$)"
     r"|(?:是|为)?\s*(?:正确|正確|答案)|です|だ(?!け)|である|が(?:正解|答え|正しい)|を選|と(?:思|考)"
     r"|입니다|이다|[를을]\s*선택)"
 )
