@@ -143,29 +143,50 @@ def normals_from_points(points: ArrayLike, fov_y_degrees: float, mask: Mask) -> 
     normals, on_surface = _fit_planes(steps, near, rays)
     on_surface &= inside
     rest = inside & ~on_surface
-    loose, spanned = _fit_planes(steps[:, :, rest], counted[:, rest], rays[:, rest])
-    normals[:, rest] = np.where(spanned, loose, -rays[:, rest])
+    if rest.any():
+        loose, spanned = _fit_planes(steps[:, :, rest], counted[:, rest], rays[:, rest])
+        normals[:, rest] = np.where(spanned, loose, -rays[:, rest])
     normals *= np.where(inside, -np.copysign(1.0, _dot(normals, rays)), 0.0)
     return np.moveaxis(normals, 0, -1), on_surface
 
 
 def _neighbours(points: Array, rays: Array, inside: Mask) -> tuple[Array, Mask, Mask]:
-    """Steps (8, 3, H, W) to the neighbours; which are in the mask; which are near as well."""
+    """Steps (8, 3, H, W) to the neighbours; which are in the mask; which are near as well.
+
+    One neighbour after another, in buffers: arrays of all eight do not fit into a core's cache.
+    """
     height, width = inside.shape
-    padded, padded_inside = np.pad(points, ((0, 0), (1, 1), (1, 1))), np.pad(inside, 1)
-    windows = [(..., slice(i, i + height), slice(j, j + width)) for i, j in _NEIGHBOURS]
+    padded, padded_inside = np.zeros((3, height + 2, width + 2)), np.pad(inside, 1)
+    padded[:, 1:-1, 1:-1] = points
     steps = np.empty((8, 3, height, width))
-    for step, window in zip(steps, windows, strict=True):
+    counted, near = np.empty((2, 8, height, width), bool)
+    size = np.zeros((height, width))
+    for step, count, (i, j) in zip(steps, counted, _NEIGHBOURS, strict=True):
+        window = (..., slice(i, i + height), slice(j, j + width))
         np.subtract(padded[window], points, out=step)
-    counted = np.stack([padded_inside[window] for window in windows]) & inside
-    steps *= counted[:, None]
+        np.logical_and(padded_inside[window], inside, out=count)
+        np.multiply(step, count.astype(float), out=step)
+        np.maximum(size, np.abs(step).max(axis=0), out=size)
     # Only the shape of the patch matters. Dividing by its size keeps powers from overflowing.
-    size = np.maximum(steps.max(axis=(0, 1)), -steps.min(axis=(0, 1)))
-    steps /= np.where(size > 0.0, size, 1.0)
-    x, y, z = np.moveaxis(steps, 1, 0)
-    along, lengths = x * rays[0] + y * rays[1] + z * rays[2], x * x + y * y + z * z
+    size[size == 0.0] = 1.0
     grazing = math.cos(math.radians(GRAZING_DEGREES)) ** 2
-    return steps, counted, counted & (np.square(along) <= grazing * lengths)
+    along, lengths, product = np.empty((3, height, width))
+    for step, count, close in zip(steps, counted, near, strict=True):
+        np.divide(step, size, out=step)
+        _dot_into(along, step, rays, product)
+        _dot_into(lengths, step, step, product)
+        np.square(along, out=along)
+        lengths *= grazing
+        np.less_equal(along, lengths, out=close)
+        np.logical_and(close, count, out=close)
+    return steps, counted, near
+
+
+def _dot_into(out: Array, a: Array, b: Array, buffer: Array) -> None:
+    """Write the scalar products of vectors (3, ...) to an array (...)."""
+    np.multiply(a[0], b[0], out=out)
+    for x, y in zip(a[1:], b[1:], strict=True):
+        out += np.multiply(x, y, out=buffer)
 
 
 def _fit_planes(steps: Array, counted: Mask, rays: Array) -> tuple[Array, Mask]:
@@ -176,14 +197,19 @@ def _fit_planes(steps: Array, counted: Mask, rays: Array) -> tuple[Array, Mask]:
     choose which side of it faces the viewer.
     """
     number = 1.0 + counted.sum(axis=0)
-    kept = steps if counted.all() else steps * counted[:, None]
-    mean = kept.sum(axis=0) / number
+    all_counted = counted.all()
+    mean, scatter = np.zeros(steps.shape[1:]), np.zeros((6, *steps.shape[2:]))
+    product = np.empty(steps.shape[2:])
     pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2))
-    scatter = np.zeros((6, *mean.shape[1:]))
+    for step, count in zip(steps, counted, strict=True):
+        kept = step if all_counted else step * count.astype(float)
+        mean += kept
+        for k, (a, b) in enumerate(pairs):
+            scatter[k] += np.multiply(kept[a], kept[b], out=product)
+    mean /= number
+    scatter /= number
     for k, (a, b) in enumerate(pairs):
-        for step in kept:
-            scatter[k] += step[a] * step[b]
-        scatter[k] = scatter[k] / number - mean[a] * mean[b]
+        scatter[k] -= np.multiply(mean[a], mean[b], out=product)
     normals, clear = _least_axis(*scatter)
     return normals, clear & (np.abs(_dot(normals, rays)) > _EDGE_ON)
 

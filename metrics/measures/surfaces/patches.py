@@ -90,12 +90,19 @@ def surface_distances(
     )
 
 
-def _to_patches(points: Array, patches: Array) -> Array:
-    """Return the distances (...) of points (3, ...) to patches (7, ...)."""
-    x, y, z = points[0] - patches[0], points[1] - patches[1], points[2] - patches[2]
-    off = patches[3] * x
-    off += patches[4] * y
-    off += patches[5] * z
+def _squared_to_patches(points: Array, patches: Array, buffers: Array | None = None) -> Array:
+    """Return the squared distances (...) of points (3, ...) to patches (7, ...), in a buffer.
+
+    Args:
+        buffers: (5, ...), to be written to; by default new ones.
+    """
+    shape = np.broadcast_shapes(points.shape[1:], patches.shape[1:])
+    x, y, z, off, beyond = np.empty((5, *shape)) if buffers is None else buffers
+    for axis, apart in enumerate((x, y, z)):
+        np.subtract(points[axis], patches[axis], out=apart)
+    np.multiply(patches[3], x, out=off)
+    off += np.multiply(patches[4], y, out=beyond)
+    off += np.multiply(patches[5], z, out=beyond)
     off *= off
     x *= x
     y *= y
@@ -103,23 +110,23 @@ def _to_patches(points: Array, patches: Array) -> Array:
     x += y
     x += z
     x -= off
-    beyond = np.sqrt(np.maximum(x, 0.0, out=x), out=x)
+    np.sqrt(np.maximum(x, 0.0, out=x), out=beyond)
     beyond -= patches[6]
     np.maximum(beyond, 0.0, out=beyond)
     beyond *= beyond
     beyond += off
-    return np.asarray(np.sqrt(beyond, out=beyond))
+    return np.asarray(beyond)
 
 
 def _to_neighbours(surface: Surface, other: Surface) -> Array:
     """Return the distance (N,) of each point to the nearest patch of its pixel and the 8 around."""
     height, width = surface.mask.shape
     image = surface.patches[:3, 1:-1, 1:-1]
-    least = np.full((height, width), np.inf)
+    least, buffers = np.full((height, width), np.inf), np.empty((5, height, width))
     for i, j in np.ndindex(3, 3):
         window = other.patches[:, i : i + height, j : j + width]
-        np.minimum(least, _to_patches(image, window), out=least)
-    return least[surface.mask]
+        np.minimum(least, _squared_to_patches(image, window, buffers), out=least)
+    return np.asarray(np.sqrt(least[surface.mask]))
 
 
 def _to_where_seen(predicted: Surface, true: Surface) -> tuple[Array, Array]:
@@ -138,6 +145,6 @@ def _to_where_seen(predicted: Surface, true: Surface) -> tuple[Array, Array]:
     for i, j in np.ndindex(3, 3):
         at = np.clip(row + i - 1, 0, height + 1), np.clip(column + j - 1, 0, width + 1)
         patches = true.patches[:, *at]
-        forward[seen] = np.minimum(forward[seen], _to_patches(own, patches))
-        np.minimum.at(reverse, at, _to_patches(patches, own))
-    return forward, reverse[1:-1, 1:-1][mask]
+        forward[seen] = np.minimum(forward[seen], _squared_to_patches(own, patches))
+        np.minimum.at(reverse, at, _squared_to_patches(patches, own))
+    return np.sqrt(forward), np.sqrt(reverse[1:-1, 1:-1][mask])

