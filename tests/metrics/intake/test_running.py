@@ -307,7 +307,13 @@ def test_what_ends_or_hangs_is_named_by_its_row_and_rows_are_kept(how, run, tmp_
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals of Linux")
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(
+    "number",
+    [
+        signal.SIGKILL,
+        *(pytest.param(n, marks=pytest.mark.slow) for n in (signal.SIGINT, signal.SIGTERM)),
+    ],
+)
 def test_a_hanging_model_ends_with_the_command(number, tmp_path, truths):
     text = INFER.replace("    return", "    if next(N) == 5: print(os.getpid(), flush=True);"
                          " subprocess.run(['sleep', '1000'])\n    return")  # fmt: skip
