@@ -7,6 +7,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scenegen.common.records import check
 from scenegen.description.presets import preset_spec
 from scenegen.description.specs import BUILT_IN, TRUTHS, DatasetSpec
@@ -74,10 +76,10 @@ class RoomStream(RowStream):
         """
         variant = select_variant(device)
         requests, shares = mixed(preset_or_spec, DatasetSpec)
+        specs = [preset_spec(one) if isinstance(one, str) else one for one in requests]
+        every = [_asked(spec, fields) for spec in specs]
         sources = []
-        for request in requests:
-            spec = preset_spec(request) if isinstance(request, str) else request
-            spec, asked = _asked(spec, fields)
+        for spec, asked in zip(*_with_slots(every), strict=True):
             check_batch(batch, len(spec.views), spec)
             plain = on_device and variant != "scalar_rgb" and spec.shading != "path"
             kept = tuple(name for name in asked if name in PICTURED and plain and not spec.truth)
@@ -92,6 +94,23 @@ class RoomStream(RowStream):
 
 
 PICTURED = ("image", "depth", "normal", "object_id")
+UNUSED = {"object/shape": -1, "object/stands_on": -1, "material/shininess": 1}  # slots; others 0
+
+
+def _with_slots(
+    requests: Sequence[tuple[DatasetSpec, dict[str, Column]]],
+) -> tuple[list[DatasetSpec], list[dict[str, Column]]]:
+    """Return requests and their columns, all with as many slots as the request with the most."""
+    every = [columns for _, columns in requests]
+
+    def widened(column: Column) -> Column:
+        others = [columns[column.name].shape for columns in every]
+        slots = column.axes is not None and column.axes[:1] and column.axes[0].endswith("_slot")
+        most = max(shape[0] for shape in others) if slots else 0
+        return replace(column, shape=(most, *column.shape[1:])) if slots else column
+
+    wide = [{name: widened(c) for name, c in columns.items()} for columns in every]
+    return [spec for spec, _ in requests], wide
 
 
 def _asked(spec: DatasetSpec, fields: Sequence[str]) -> tuple[DatasetSpec, dict[str, Column]]:
@@ -146,5 +165,14 @@ class RoomSource:
             every = chain.from_iterable(range(r.index * views, (r.index + 1) * views) for r in ready)
             for place, row in enumerate(every):
                 if row == number:
-                    yield {name: column[place] for name, column in chosen.items()}
+                    yield {name: self._value(name, of[place]) for name, of in chosen.items()}
                     number = next(wanted)
+
+    def _value(self, name: str, value: Any) -> Any:
+        """Return the value of a column, with unused slots where other requests have more."""
+        shape = self.columns[name].shape
+        if name in self.kept or np.shape(value) == shape:
+            return value
+        wide = np.full(shape, UNUSED.get(name, 0), value.dtype)
+        wide[: len(value)] = value
+        return wide
