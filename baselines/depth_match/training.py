@@ -60,10 +60,10 @@ def train(
     with alone_in(folder):
         earlier = earlier_state(folder, METHOD, resume)
         settings = settings if earlier is None else earlier.card.settings
-        shown = None
+        shown, each = None, 0
         if isinstance(data, TrainingStreams):
-            questions = -(-settings.batch // (1 + SplitSpec.answers))
-            shown = data.shown(settings, questions, machine.workers, **STREAMED)
+            shown = data.shown(settings.size, settings.seed, **STREAMED)
+            each = -(-settings.batch // (1 + SplitSpec.answers))  # questions
             card = Card("depth-match", settings, **shown.card())
         else:
             files = data.questions(UNLABELED)
@@ -72,8 +72,8 @@ def train(
         state = begun(METHOD, card, earlier, data.where, device)
         at = state.card.iteration
         if shown:
-            blocks = (cast(QuestionsFile, block) for block in shown.blocks(at))
-            source = (read_pictures([block], settings.size) for block in blocks)
+            blocks = shown.blocks(at * each, each, machine.workers)
+            source = (read_pictures([cast(QuestionsFile, b)], settings.size) for b in blocks)
         else:
             source = batches_of(pictures, settings, at)
         batches = read_ahead(source, device)
@@ -87,7 +87,6 @@ def train(
             off = errors.abs().sum() / shown.sum().clamp(min=1)
             yield Loss(off + shape_loss(errors, shown.int()), {"error of depth": off})
 
-        each = shown.batch if shown else 0
         fit(folder, METHOD, state, losses, learning_rate, machine, rows=each, progress=progress)
     return folder / WEIGHTS
 

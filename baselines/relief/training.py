@@ -108,7 +108,7 @@ def train(
         settings = settings if earlier is None else earlier.card.settings
         shown = None
         if isinstance(data, TrainingStreams):
-            shown = data.shown(settings, settings.batch, machine.workers, **streamed)
+            shown = data.shown(settings.size, settings.seed, **streamed)
             card = Card(method.name, settings, **shown.card())
         else:
             files = data.rooms()
@@ -119,7 +119,7 @@ def train(
             begin(state.network)
         at, last = state.card.iteration, settings.iterations
         if shown:
-            source = batches_of_stream(shown, teach, with_depth, settings, at)
+            source = batches_of_stream(shown, machine.workers, teach, with_depth, settings, at)
         else:
             lessons = teach(
                 rooms,
@@ -136,7 +136,7 @@ def train(
             loss = _loss(state.network, next(batches), windows_only)
             yield Loss(loss, {"loss": loss})
 
-        each = shown.batch if shown else 0
+        each = shown.whole(settings.batch) if shown else 0
         fit(folder, method, state, losses, learning_rate, machine, rows=each, progress=progress)
     return folder / WEIGHTS
 
@@ -160,10 +160,11 @@ def batches_of(rooms: Rooms, lessons: Lessons, settings: Settings, first: int) -
 
 
 def batches_of_stream(
-    shown: Shown, teach: Teach, with_depth: bool, settings: Settings, first: int
+    shown: Shown, workers: int, teach: Teach, with_depth: bool, settings: Settings, first: int
 ) -> Iterator[Batch]:
     """Yield the batches of iteration `first` and of those after it, each of rooms of its own."""
-    for number, block in enumerate(shown.blocks(first), first):
+    size = shown.whole(settings.batch)
+    for number, block in enumerate(shown.blocks(first * size, size, workers), first):
         rooms = read_rooms([cast(RoomsFile, block)], settings.size, depth=with_depth)
         lessons = teach(rooms, settings, None, lambda done, total: None)
         rng = item_rng(settings.seed, number, Purpose.TRAINING)

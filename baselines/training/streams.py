@@ -53,63 +53,65 @@ class TrainingStreams:
         """Their names, for messages."""
         return f"stream {self.names}"
 
-    def shown(self, settings: Any, batch: int, workers: int, **more: Any) -> "Shown":
-        """Return what a run is shown: `batch` images or questions in an iteration, or some more.
+    def shown(self, size: int, seed: int, **more: Any) -> "Shown":
+        """Return the streams of a run.
 
         Args:
-            settings: of the run, with `size` and `seed`.
-            workers: processes that render.
-            more: settings of the requests.
+            size: of images, pixels.
+            seed: of the run, and of its rooms or questions.
+            more: further settings of the requests.
 
         Raises SpecError, also for the seed and the objects of a named test set.
         """
         specs: list[Any] = []
-        size = {"height": settings.size, "width": settings.size, "seed": settings.seed}
+        given = {"height": size, "width": size, "seed": seed, **more}
         for name in self.names.split(","):
             if self.hold_questions:
-                specs.append(iqtt.preset_spec("small", distractors=name, **size, **more))
+                specs.append(iqtt.preset_spec("small", distractors=name, **given))
                 continue
             families = PRESETS[name].settings.get("source") == "families"
             split = {"object_split": "train"} if families else {}
-            specs.append(preset_spec(name, **{**size, **split, **more}))
+            specs.append(preset_spec(name, **split, **given))
             if not self.allow_test_set:
                 refuse_request(self.where, specs[-1].to_json())
-        together = 1 if self.hold_questions else len(specs[0].views)
-        return Shown(tuple(specs), -(-batch // together) * together, workers)
+        return Shown(tuple(specs))
 
 
 @dataclass(frozen=True)
 class Shown:
-    """Streams of these requests, in batches of some rows."""
+    """Streams of these requests."""
 
     specs: tuple[Any, ...]
-    batch: int
-    workers: int
+
+    def whole(self, batch: int) -> int:
+        """Return how many rows are shown for a batch: of whole scenes, so perhaps more."""
+        views = len(getattr(self.specs[0], "views", (0,)))
+        return -(-batch // views) * views
 
     def card(self) -> dict[str, Any]:
         """Return what a card tells: the requests, with their seeds, and what tells them apart."""
         data = "\n".join(spec.to_json() for spec in self.specs)
         return {"data": data, "fingerprint": hashlib.sha256(f"stream\n{data}".encode()).hexdigest()}
 
-    def blocks(self, batches: int, rows: int = 0, **share: int) -> Iterator["Block"]:
-        """Yield the rows of batch after batch, without end.
+    def blocks(self, before: int, rows: int, workers: int, **share: int) -> Iterator["Block"]:
+        """Yield blocks of so many rows without end, rendered by `workers`.
 
         Args:
-            batches: that were shown before, by all processes that train.
-            rows: of a batch of this process, if they are others.
+            before: rows that were shown before, by all processes that train.
             share: `rank` and `world_size`, where they are not those of torch.
         """
         requests = dict.fromkeys(self.specs, 1.0)
-        how: dict[str, Any] = {"batch": rows or self.batch, "workers": self.workers, **share}
+        how: dict[str, Any] = {"batch": rows, "workers": workers, **share}
         if isinstance(self.specs[0], SplitSpec):
-            start = MAX_QUESTIONS + batches * self.batch
             fields = QUESTION_FIELDS + ["depth"] * self.specs[0].with_depth
-            stream: Any = QuestionStream(requests, fields=fields, start=start, **how)
+            how |= {"fields": fields, "start": MAX_QUESTIONS + before}
+            stream: Any = QuestionStream(requests, **how)
         else:
-            start = MAX_COUNT * len(self.specs[0].views) + batches * self.batch
-            stream = RoomStream(requests, fields=ROOM_FIELDS, start=start, **how)
+            first = MAX_COUNT * len(self.specs[0].views)
+            stream = RoomStream(requests, fields=ROOM_FIELDS, start=first + before, **how)
+        mark = self.card()["fingerprint"]
         for values in stream:
-            yield Block("stream", self.specs[0], self.card()["fingerprint"], values)
+            yield Block("stream", self.specs[0], mark, values)
 
 
 @dataclass(frozen=True, eq=False)
