@@ -307,7 +307,11 @@ def train_baseline(
 
     machine = Machine(device, minutes=minutes)
     parameters = inspect.signature(module.train).parameters.values()
-    arguments = {p.name for p in parameters if p.kind is p.KEYWORD_ONLY} - {"resume", "progress", "streamed"}
+    arguments = {p.name for p in parameters if p.kind is p.KEYWORD_ONLY} - {
+        "resume",
+        "progress",
+        "streamed",
+    }
     names = {field.name for field in fields(module.Settings)}
     if labels is not None and "labels" not in arguments:
         raise click.UsageError(f"--labels: {name} has no such setting")

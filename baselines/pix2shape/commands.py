@@ -208,7 +208,9 @@ def train(
         raise
     if weights is not None:  # None in all processes but the first
         named = shlex.quote(str(weights))
-        print_line(f"{weights}: trained on {files.where}; now `pix2shape predict --weights {named} ...`")
+        print_line(
+            f"{weights}: trained on {files.where}; now `pix2shape predict --weights {named} ...`"
+        )
 
 
 def training_data(paths: tuple[str, ...], stream: str | None, allow_test_set: bool) -> Any:

@@ -39,7 +39,5 @@ def lessons_of(
 
 
 STREAMED = NEIGHBOURS
-train = partial(
-    training.train, METHOD, lessons_of, False, training.as_it_is, streamed=STREAMED
-)
+train = partial(training.train, METHOD, lessons_of, False, training.as_it_is, streamed=STREAMED)
 write_submission = partial(predict.write_submission, METHOD)

@@ -1,7 +1,8 @@
 """Questions without a file: endless batches of the rows that `iqtt make-split` would write."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from itertools import chain, groupby
 from typing import Any
 
@@ -11,8 +12,13 @@ from iqtt.questions.distractors import Pools, make_pools
 from iqtt.questions.specs import DISTRACTORS, SPLITS, SplitSpec
 from iqtt.render import DEFAULT_BATCH, groups, render_questions
 from scenegen.common.names import check_choice
-from scenegen.files.schema import Column
-from scenegen.files.stream import RowStream, check_fields, mixed
+from scenegen.files.stream import (
+    Columns,
+    RowStream,
+    chosen_columns,
+    common_columns,
+    requests_and_shares,
+)
 from scenegen.rendering.backend import select_variant
 from scenegen.rendering.renderer import share_processors, stacked
 from scenegen.rooms.make import check_batch
@@ -59,60 +65,56 @@ class QuestionStream(RowStream):
         """
         variant = select_variant(device)
         check_choice("split", split, SPLITS)
-        requests, shares = mixed(kind_or_spec, SplitSpec)
-        sources = []
-        for request in requests:
+        makers, asked = [], []
+        kept = [n for n in ON_DEVICE if n in fields and on_device and variant != "scalar_rgb"]
+        for request, share in requests_and_shares(kind_or_spec, SplitSpec).items():
             if isinstance(request, str):
                 check_choice("kind", request, DISTRACTORS)
-                request = SplitSpec(distractors=request)
-            check_batch(batch, 1 + request.answers, request)
-            spec = replace(request, with_depth="depth" in fields)
-            every = replace(request, with_depth=True)
+            spec = SplitSpec(distractors=request) if isinstance(request, str) else request
+            check_batch(batch, 1 + spec.answers, spec)
+            every = replace(spec, with_depth=True)
             known = [*question_columns(every), answer_column(), *truth_columns(every)]
-            asked = check_fields(fields, known)
-            kept = tuple(n for n in ON_DEVICE if n in asked and on_device and variant != "scalar_rgb")
-            sources.append(QuestionSource(make_pools(spec), split, asked, kept, device))
-        on = dict.fromkeys(sources[0].kept, _stacked)
-        super().__init__(sources, shares, batch, start, stop, workers, rank, world_size, on)
+            asked.append(chosen_columns(fields, known))
+            common_columns(asked)  # before pools are made, which takes a second
+            pools = make_pools(replace(spec, with_depth="depth" in fields))
+            makers.append((partial(_rows, pools, split, asked[0], kept, device), share))
+        super().__init__(
+            asked[0], makers, batch, start, stop, workers, rank, world_size,
+            on_device=dict.fromkeys(kept, _stacked),
+        )  # fmt: skip
 
 
 def _stacked(rows: list[Any], shape: tuple[int, ...]) -> Any:
     return stacked(list(chain.from_iterable(rows)), shape)
 
 
-@dataclass(frozen=True, eq=False)
-class QuestionSource:
-    """The questions of one request, as a `stream.Source`.
+def _rows(
+    pools: Pools,
+    split: str,
+    fields: Columns,
+    kept: Sequence[str],
+    device: str,
+    numbers: list[int],
+    processes: int,
+) -> Iterator[dict[str, Any]]:
+    """Yield questions, as a `stream.Maker`. Raises as `render_questions`."""
+    share_processors(processes, device)
+    images = [ON_DEVICE[name] for name in kept]
+    for (first, count), some in groupby(numbers, partial(_block, pools.spec, split)):
+        rows = [number - first for number in some]
+        for ready in render_questions(
+            pools, split, first, count, rows=rows, device=device, kept=images
+        ):
+            values = question_rows(pools.spec, ready)
+            for place in range(len(ready)):
+                yield {name: values[name][place] for name in fields}
 
-    Attributes:
-        kept: columns that stay on the device.
-    """
 
-    pools: Pools
-    split: str
-    columns: Mapping[str, Column]
-    kept: tuple[str, ...]
-    device: str
-    together = 1
-
-    def rows(self, numbers: Sequence[int], processes: int) -> Iterator[dict[str, Any]]:
-        """Yield questions by their numbers. Raises as `render_questions`."""
-        share_processors(processes, self.device)
-        kept = [ON_DEVICE[name] for name in self.kept]
-        for (first, count), some in groupby(numbers, self._block):
-            rows = [number - first for number in some]
-            for ready in render_questions(
-                self.pools, self.split, first, count, rows=rows, device=self.device, kept=kept
-            ):
-                values = question_rows(self.pools.spec, ready)
-                for place in range(len(ready)):
-                    yield {name: values[name][place] for name in self.columns}
-
-    def _block(self, number: int) -> tuple[int, int]:
-        """Return first question and number of those with which a question's answer is balanced."""
-        end = 0
-        for first, count in groups(self.pools.spec, self.split).values():
-            end = first + count
-            if number < end:
-                return first, count
-        return end + (number - end) // BLOCK * BLOCK, BLOCK
+def _block(spec: SplitSpec, split: str, number: int) -> tuple[int, int]:
+    """Return first question and number of those with which a question's answer is balanced."""
+    end = 0
+    for first, count in groups(spec, split).values():
+        end = first + count
+        if number < end:
+            return first, count
+    return end + (number - end) // BLOCK * BLOCK, BLOCK

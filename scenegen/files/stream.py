@@ -1,9 +1,9 @@
 """Rows that are made while somebody learns from them, batch after batch: nothing is stored.
 
-Batch k of a stream goes to one of equal shares: rank by rank, then to the workers of a
-`torch.utils.data.DataLoader`, then to processes of its own. So the batches of a rank come in the
-same order whoever makes them. Processes of its own write to memory that they share with this one;
-it has no name, and is gone when the last process and the last array are.
+Batch k goes to one of equal shares: rank by rank, then to the workers of a torch `DataLoader`, then
+to processes of the stream's own. So the batches of a rank come in one order, whoever makes them.
+Own processes write to memory that they share with this one. It has no name, and is gone when the
+last process and the last array are.
 """
 
 import math
@@ -16,9 +16,10 @@ import weakref
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing
-from itertools import chain, count, cycle, islice
+from dataclasses import replace
+from itertools import accumulate, chain, count, cycle, islice
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,40 +38,27 @@ else:
     Base = object
 
 Array = NDArray[Any]
+Columns = Mapping[str, Column]
 Batch = dict[str, Any]
+# Yields the values of rows by column, one after another: of these numbers, which ascend, while so
+# many processes share the processors. It can be pickled.
+Maker = Callable[[list[int], int], Iterator[Mapping[str, Any]]]
 Stack = Callable[[list[Any], tuple[int, ...]], Any]
-SOURCE = Column("spec", (), "int32", meaning="which of the stream's requests, from 0")
-CHUNK = 4096  # rows that a source is asked for at once, so that it can draw many together
+SPEC = Column("spec", (), "int32", meaning="which of the stream's requests, from 0")
+CHUNK = 4096  # rows that a maker is asked for at once, so that it can draw many together
 AHEAD = 2  # batches of each process that are made before they are asked for
 MOST_PROCESSES = 256
 ALIGNED = 64  # bytes
-GOLDEN = 0x9E3779B97F4A7C15  # 2**64 over the golden ratio
+GOLDEN = np.uint64(0x9E3779B97F4A7C15)  # 2**64 over the golden ratio
 _forked_renderer = False  # whether this process was forked from one that had loaded Dr.Jit
-
-
-class Source(Protocol):
-    """What makes rows; it can be pickled."""
-
-    @property
-    def columns(self) -> Mapping[str, Column]:
-        """The columns that it is asked for."""
-
-    @property
-    def together(self) -> int:
-        """How many rows are made together: row 0 and the next ones, and so on."""
-
-    def rows(self, numbers: Sequence[int], processes: int) -> Iterator[Mapping[str, Any]]:
-        """Yield the values of some rows by column, whose numbers ascend, one after another.
-
-        `processes` share the processors.
-        """
 
 
 class RowStream(Base):
     """Endless batches of rows, dicts of arrays (B, ...). See `RoomStream` and `QuestionStream`.
 
-    Every loop begins at row `start`, or where `load_state_dict` says. Where torch is imported, this
-    is an `IterableDataset`; torch is not imported here.
+    Every loop begins at row `start`, or where `load_state_dict` says. It raises what the makers
+    raise, and LostWorkerError where a process ended. Where torch is imported, this is an
+    `IterableDataset`; torch is not imported here.
 
     Attributes:
         columns: what the arrays are: `schema.Column`s with unit, frame and meaning, by field.
@@ -79,58 +67,54 @@ class RowStream(Base):
 
     def __init__(
         self,
-        sources: Sequence[Source],
-        shares: Sequence[float],
+        columns: Columns,
+        makers: Sequence[tuple[Maker, float]],
         batch: int,
         start: int,
         stop: int | None,
         workers: int,
         rank: int | None,
         world_size: int | None,
+        together: int = 1,
         on_device: Mapping[str, Stack] = MappingProxyType({}),
     ) -> None:
-        """Take sources of the same columns, and the share of the rows that each of them makes.
+        """Take makers of rows, and the share of the rows that each of them makes.
 
         Args:
+            together: how many rows have one maker: row 0 and the next ones, and so on.
             on_device: fields that are no arrays, each with the function that makes what is handed
-                out from a list of values, one a row, and the shape of all.
+                out of a list of values, one a row, and of the shape of all.
 
         Raises SpecError.
         """
+        shares = [share for _, share in makers]
+        positive = all(share > 0 and math.isfinite(share) for share in shares)
+        check(bool(shares) and positive, "shares", shares, "a number above 0 for each")
         check(start >= 0, "start", start, "0 or more")
         check(0 <= workers <= MOST_PROCESSES, "workers", workers, f"from 0 to {MOST_PROCESSES}")
-        where = "fields stay on the device" if on_device else "no POSIX system shares memory"
-        check(not workers or (not on_device and os.name == "posix"), "workers", workers, f"0, as {where}")
+        alone = "fields stay on the device" if on_device else "this system shares no memory so"
+        check(
+            not workers or (os.name == "posix" and not on_device), "workers", workers, f"0: {alone}"
+        )
         check((rank is None) == (world_size is None), "rank", rank, "it and world_size, or neither")
-        if rank is not None and world_size is not None:
-            check(0 <= rank < world_size, "rank", rank, f"from 0 to {world_size - 1}")
-        positive = all(share > 0 and np.isfinite(share) for share in shares)
-        check(bool(shares) and positive, "shares", list(shares), "a number above 0 for each")
-        self.columns = {**sources[0].columns, **({"spec": SOURCE} if len(sources) > 1 else {})}
-        for source in sources:
-            for name, column in source.columns.items():
-                own, other = ((c.shape, c.dtype) for c in (column, self.columns[name]))
-                check(own == other, name, f"{own} beside {other}", "one shape and type to mix them")
-            together = (source.together, sources[0].together)
-            check(together[0] == together[1], "views", together, "as many in all requests")
-        self.batch = batch
-        self._sources, self._on_device = tuple(sources), dict(on_device)
-        self._ends = np.cumsum(shares) / np.sum(shares) * 2.0**64
+        ranks = 1 if world_size is None else world_size
+        check(0 <= (rank or 0) < ranks, "rank", rank, f"from 0 to {ranks - 1}")
+        self.columns, self.batch = {**columns, **({"spec": SPEC} if len(makers) > 1 else {})}, batch
+        self._makers, self._together = [maker for maker, _ in makers], together
+        self._ends = np.cumsum(shares)[:-1] / sum(shares) * 2.0**64
         self._start, self._stop, self._processes = start, stop, workers
-        self._place = None if rank is None else (rank, world_size or 1)
-        self._row, self._resumed = start, False
+        self._place = None if rank is None else (rank, ranks)
+        self._on_device, self._row, self._resumed = dict(on_device), start, False
 
     def __iter__(self) -> Iterator[Batch]:
-        """Yield batches. Raises as the sources, and LostWorkerError where a process ended."""
-        if not self._resumed:
-            self._row = self._start
-        self._resumed = False
+        """Begin a loop."""
+        self._row, self._resumed = (self._row if self._resumed else self._start), False
         return self._batches(self._row)
 
     def state_dict(self) -> dict[str, int]:
         """Return where the stream is: {"row": the first that no rank and worker has shown yet}.
 
-        It holds where all of them have shown equally many batches; then any number of them can go
+        It holds where all of them have shown equally many batches. Any number of them can then go
         on from it.
         """
         return {"row": self._row}
@@ -140,19 +124,18 @@ class RowStream(Base):
         self._row, self._resumed = int(state["row"]), True
 
     def _batches(self, first: int) -> Iterator[Batch]:
+        if self._stop is not None and first >= self._stop:
+            return
         rank, ranks = self._ranks()
         data = sys.modules.get("torch.utils.data")
         worker = data.get_worker_info() if data else None
-        readers = worker.num_workers if worker else 1
-        mine, shares = rank + ranks * (worker.id if worker else 0), ranks * readers
-        if self._stop is not None and first >= self._stop:
-            return
-        # Threads of a renderer do not live on in a fork, so another process takes over.
-        processes = self._processes or int(_forked_renderer)
-        if processes:
-            batches = self._from_processes(first, mine, shares, processes, readers)
+        reader, readers = (worker.id, worker.num_workers) if worker else (0, 1)
+        share, shares = rank + ranks * reader, ranks * readers
+        # A renderer's threads do not live on in a fork, so a process of its own takes over there.
+        if processes := self._processes or int(_forked_renderer):
+            batches = self._from_processes(first, share, shares, processes, readers)
         else:
-            batches = self.made(first, mine, shares, readers, self._allocated)
+            batches = self.made(first, share, shares, readers, self._new)
         with closing(batches):
             for batch in batches:
                 self._row += shares * self.batch
@@ -160,79 +143,69 @@ class RowStream(Base):
 
     def _ranks(self) -> tuple[int, int]:
         """Return this process's rank and their number; torch.distributed's by default."""
-        if self._place is None and "torch.distributed" in sys.modules:
-            distributed = sys.modules["torch.distributed"]
-            if distributed.is_available() and distributed.is_initialized():
-                return distributed.get_rank(), distributed.get_world_size()
+        distributed = sys.modules.get("torch.distributed")
+        together = distributed and distributed.is_available() and distributed.is_initialized()
+        if self._place is None and distributed and together:
+            return distributed.get_rank(), distributed.get_world_size()
         return self._place or (0, 1)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_place": self._ranks()}  # workers of a loader have no rank
-
-    def _numbers(self, first: int, share: int, shares: int) -> Iterator[range]:
-        """Yield the numbers of the rows of each batch of a share; one by one they are counted."""
-        for start in count(first + share * self.batch, shares * self.batch):
-            end = start + self.batch if self._stop is None else min(start + self.batch, self._stop)
-            if start >= end:
-                return
-            yield range(start, end)
+        return {**vars(self), "_place": self._ranks()}  # a worker of a loader would not know it
 
     def made(
-        self,
-        first: int,
-        share: int,
-        shares: int,
-        processes: int,
-        room: Callable[[int], dict[str, Any]],
+        self, first: int, share: int, shares: int, processes: int, new: Callable[[int], Batch]
     ) -> Generator[Batch]:
         """Yield the batches of a share from row `first` on, made in this process.
 
         Args:
             processes: that share the processors.
-            room: returns what the next so many rows are written to, by field.
+            new: returns what so many rows are written to.
         """
-        numbers = self._numbers(first, share, shares)
-        while chunk := list(islice(numbers, max(1, CHUNK // self.batch))):
+        size, end = self.batch, self._stop
+        starts = count(first + share * size, shares * size)
+        parts = (range(i, i + size if end is None else min(i + size, end)) for i in starts)
+        while chunk := [part for part in islice(parts, max(1, CHUNK // size)) if part]:
             rows = self._rows(list(chain.from_iterable(chunk)), processes)
-            for each in chunk:
-                batch = room(len(each))
-                for place, row in enumerate(islice(rows, len(each))):
+            for numbers in chunk:
+                batch = new(len(numbers))
+                for place, row in enumerate(islice(rows, len(numbers))):
                     for name, values in batch.items():
                         values[place] = row[name]
                 for name, stack in self._on_device.items():
-                    batch[name] = stack(batch[name], (len(each), *self.columns[name].shape))
+                    batch[name] = stack(batch[name], (len(numbers), *self.columns[name].shape))
                 yield batch
 
     def _rows(self, numbers: list[int], processes: int) -> Iterator[Mapping[str, Any]]:
-        """Yield rows, each from the source whose turn it is.
+        """Yield rows, each from the maker whose turn it is.
 
         The turn follows from multiples of the golden ratio, which keeps the shares in every batch.
         """
-        if len(self._sources) == 1:
-            yield from self._sources[0].rows(numbers, processes)
+        if len(self._makers) == 1:
+            yield from self._makers[0](numbers, processes)
             return
-        items = np.array(numbers, np.uint64) // np.uint64(self._sources[0].together)
-        turns = np.searchsorted(self._ends[:-1], items * np.uint64(GOLDEN), side="right").tolist()
-        streams = [
-            source.rows([n for n, turn in zip(numbers, turns, strict=True) if turn == i], processes)
-            for i, source in enumerate(self._sources)
+        items = np.array(numbers, np.uint64) // np.uint64(self._together)
+        turns = np.searchsorted(self._ends, items * GOLDEN, side="right")
+        rows = [
+            make(np.array(numbers)[turns == i].tolist(), processes)
+            for i, make in enumerate(self._makers)
         ]
-        for turn in turns:
-            yield {**next(streams[turn]), "spec": turn}
+        for turn in turns.tolist():
+            yield {**next(rows[turn]), "spec": turn}
 
-    def _allocated(self, rows: int) -> dict[str, Any]:
-        """Return arrays for so many rows, or lists where they stay on the device."""
-        listed = {name: [None] * rows for name in self._on_device}
+    def _new(self, rows: int) -> Batch:
+        """Return arrays for so many rows, and lists for fields that stay on the device."""
         return {
-            name: listed.get(name) or np.empty((rows, *column.shape), column.dtype)
+            name: [None] * rows
+            if name in self._on_device
+            else np.empty((rows, *column.shape), column.dtype)
             for name, column in self.columns.items()
         }
 
     def _from_processes(
-        self, first: int, mine: int, shares: int, processes: int, readers: int
+        self, first: int, share: int, shares: int, processes: int, readers: int
     ) -> Generator[Batch]:
         """Yield batches from processes, which write the next ones meanwhile."""
-        memory, owner = _Slots(self.columns, self.batch), os.getpid()
+        memory, owner = _Memory(self, _unnamed_file()), os.getpid()
         waiting = [deque[int]() for _ in range(processes)]
         started: list[Process] = []
 
@@ -240,20 +213,25 @@ class RowStream(Base):
             waiting[which].append(memory.free_slot())
             started[which].ask(pickle.dumps(waiting[which][-1]))
 
+        def answer(which: int) -> Any:
+            succeeded, result = started[which].heard()
+            if not succeeded:
+                raise result
+            return result
+
         try:
             for which in range(processes):
                 started.append(Process([memory.file]))
-                part = (first, mine + shares * which, shares * processes, processes * readers)
-                started[which].ask(pickle.dumps(_Filler(self, part, memory.file, memory.size)))
+                part = (first, share + shares * which, shares * processes, processes * readers)
+                started[which].ask(pickle.dumps(_Filler(self, part, memory.file)))
                 for _ in range(AHEAD):
                     ask(which)
-            for process in started:
-                _result(process)
+            for which in range(processes):
+                answer(which)  # that it is ready
             for which in cycle(range(processes)):
-                rows = _result(started[which])
+                rows, slot = answer(which), waiting[which].popleft()
                 if not rows:
                     return
-                slot = waiting[which].popleft()
                 ask(which)
                 yield memory.arrays(slot, rows)
         finally:
@@ -273,11 +251,23 @@ class RowStream(Base):
 def _tell_torch() -> None:
     """Let torch take streams for IterableDatasets, where it is imported."""
     data = sys.modules.get("torch.utils.data")
-    if data is not None and hasattr(data, "IterableDataset"):
+    if hasattr(data, "IterableDataset"):
         data.IterableDataset.register(RowStream)
 
 
-def check_fields(fields: Sequence[str], columns: Sequence[Column]) -> dict[str, Column]:
+def requests_and_shares(requests: Any, kind: type) -> dict[Any, float]:
+    """Return requests with their shares, from one request or a mapping.
+
+    Raises SpecError for what is neither a name nor of the kind.
+    """
+    several = dict(requests) if isinstance(requests, Mapping) else {requests: 1.0}
+    for request in several:
+        if not isinstance(request, (str, kind)):
+            raise SpecError("stream", repr(request), f"the name of a preset, or a {kind.__name__}")
+    return several
+
+
+def chosen_columns(fields: Sequence[str], columns: Sequence[Column]) -> dict[str, Column]:
     """Return the columns of some fields, by name. Raises SpecError for one that there is not."""
     known = {column.name: column for column in columns if column.dtype != "text"}
     check(len(fields) > 0, "fields", "none", f"some of {', '.join(known)}")
@@ -286,70 +276,80 @@ def check_fields(fields: Sequence[str], columns: Sequence[Column]) -> dict[str, 
     return {name: known[name] for name in fields}
 
 
-def mixed(requests: Any, kind: type) -> tuple[list[Any], list[float]]:
-    """Return requests and their shares, from one request or a mapping to shares.
+def common_columns(requests: Sequence[Columns]) -> dict[str, Column]:
+    """Return columns that hold the rows of all requests: with as many slots as any of them needs.
 
-    Raises SpecError for what is neither a name nor of the kind.
+    Raises SpecError where they differ otherwise.
     """
-    several = dict(requests) if isinstance(requests, Mapping) else {requests: 1.0}
-    for request in several:
-        if not isinstance(request, (str, kind)):
-            raise SpecError("stream", repr(request), f"the name of a preset, or a {kind.__name__}")
-    return list(several), list(several.values())
+    common = {}
+    for name, column in requests[0].items():
+        shapes, dtypes = zip(*((of[name].shape, of[name].dtype) for of in requests), strict=True)
+        slots = bool(column.axes) and column.axes[0].endswith("_slot")
+        rest = {shape[1:] if slots else shape for shape in shapes} | {*dtypes}
+        check(len(rest) == 2, name, f"rows of {shapes}", "one shape and type, to mix requests")
+        common[name] = replace(column, shape=max(shapes)) if slots else column
+    return common
 
 
-class _Slots:
-    """Memory that processes share, in slots of one batch each.
+class _Memory:
+    """Memory that processes share, in slots of a batch each, as one process has it open.
 
     A slot is free again when the last array that lies in it is gone.
-
-    Attributes:
-        file: its descriptor; size: of a slot, bytes.
     """
 
-    def __init__(self, columns: Mapping[str, Column], batch: int) -> None:
-        self._columns, self._free = columns, list[int]()
-        self._maps: list[mmap.mmap] = []
-        page, used = mmap.ALLOCATIONGRANULARITY, _places(columns, batch)[""]
-        self.file, self.size = _unnamed_file(), -(-used // page) * page
+    def __init__(self, stream: RowStream, file: int) -> None:
+        self.file, self._columns, self._rows = file, stream.columns, stream.batch
+        sizes = [
+            self._rows * math.prod(column.shape) * np.dtype(column.dtype).itemsize
+            for column in self._columns.values()
+        ]
+        *self._places, end = accumulate(
+            (-(-size // ALIGNED) * ALIGNED for size in sizes), initial=0
+        )
+        self._size = -(-end // mmap.ALLOCATIONGRANULARITY) * mmap.ALLOCATIONGRANULARITY
+        self._free, self._maps = list[int](), dict[int, mmap.mmap]()
 
     def free_slot(self) -> int:
         """Return the number of a free slot, perhaps a new one."""
         if self._free:
             return self._free.pop()
         slot = len(self._maps)
-        os.ftruncate(self.file, (slot + 1) * self.size)
-        self._maps.append(mmap.mmap(self.file, self.size, offset=slot * self.size))
+        os.ftruncate(self.file, (slot + 1) * self._size)
+        self._open(slot)
         return slot
 
     def arrays(self, slot: int, rows: int) -> dict[str, Array]:
         """Return the first rows of a slot, by field."""
-        whole = np.frombuffer(self._maps[slot], np.uint8)
+        whole = np.frombuffer(self._open(slot), np.uint8)
         weakref.finalize(whole, self._free.append, slot)
-        return _arrays_in(whole, self._columns, rows)
+        return {
+            name: np.ndarray((self._rows, *column.shape), column.dtype, whole, place)[:rows]
+            for (name, column), place in zip(self._columns.items(), self._places, strict=True)
+        }
+
+    def _open(self, slot: int) -> mmap.mmap:
+        if slot not in self._maps:
+            self._maps[slot] = mmap.mmap(self.file, self._size, offset=slot * self._size)
+        return self._maps[slot]
 
 
 class _Filler:
-    """What a process does: it writes the next batch of a share to a slot, and tells its rows."""
+    """What a process does: it writes the next batch of a share to a slot."""
 
-    def __init__(self, stream: RowStream, part: tuple[int, ...], file: int, size: int) -> None:
-        """Take the arguments of `RowStream.made`, and the memory that processes share."""
-        self._stream, self._part, self._file, self._size = stream, part, file, size
-        self._maps: dict[int, mmap.mmap] = {}
+    def __init__(self, stream: RowStream, part: tuple[int, int, int, int], file: int) -> None:
+        """Take the first arguments of `made`, and the descriptor of the memory."""
+        self._stream, self._part, self._file = stream, part, file
         self._batches: Iterator[Batch] | None = None
 
     def __call__(self, slot: int) -> int:
         """Return how many rows were written; 0 at the end of the share."""
-        if self._batches is None:
-            self._batches = self._stream.made(*self._part, self._arrays)
-        if slot not in self._maps:
-            self._maps[slot] = mmap.mmap(self._file, self._size, offset=slot * self._size)
         self._slot = slot
+        if self._batches is None:
+            memory = _Memory(self._stream, self._file)
+            self._batches = self._stream.made(
+                *self._part, lambda rows: memory.arrays(self._slot, rows)
+            )
         return len(next(iter(next(self._batches, {"": ()}).values())))
-
-    def _arrays(self, rows: int) -> dict[str, Array]:
-        whole = np.frombuffer(self._maps[self._slot], np.uint8)
-        return _arrays_in(whole, self._stream.columns, rows)
 
 
 def _unnamed_file() -> int:
@@ -358,31 +358,6 @@ def _unnamed_file() -> int:
         return os.memfd_create("rows")
     with tempfile.TemporaryFile() as file:
         return os.dup(file.fileno())
-
-
-def _places(columns: Mapping[str, Column], rows: int) -> dict[str, int]:
-    """Return where the values of each column begin among those of so many rows; "" is the end."""
-    places, end = {}, 0
-    for name, column in columns.items():
-        places[name] = end
-        size = rows * math.prod(column.shape) * np.dtype(column.dtype).itemsize
-        end += -(-size // ALIGNED) * ALIGNED
-    return {**places, "": end}
-
-
-def _arrays_in(memory: Array, columns: Mapping[str, Column], rows: int) -> dict[str, Array]:
-    places = _places(columns, rows)
-    return {
-        name: np.ndarray((rows, *column.shape), column.dtype, memory, places[name])
-        for name, column in columns.items()
-    }
-
-
-def _result(process: Process) -> Any:
-    succeeded, result = process.heard()
-    if not succeeded:
-        raise result
-    return result
 
 
 def _after_fork() -> None:

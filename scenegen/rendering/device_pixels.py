@@ -7,6 +7,7 @@ from typing import Any
 import drjit as dr
 import mitsuba as mi
 
+
 @dataclass(frozen=True, eq=False)
 class DeviceImage:
     """A field of one image, among those of its launch.
@@ -29,17 +30,18 @@ def stacked(images: Sequence[DeviceImage], shape: tuple[int, ...]) -> Any:
     It has `__dlpack__`, from which torch and others take it without a copy.
     """
     pixels, channels = images[0].height * images[0].width, len(images[0].channels)
-    kind = type(images[0].channels[0])
+    kind: Any = type(images[0].channels[0])
     values = dr.empty(kind, len(images) * pixels * channels)
     launches: dict[int, list[int]] = {}
     for place, image in enumerate(images):
         launches.setdefault(id(image.channels), []).append(place)
     for places in launches.values():
         ray = dr.arange(mi.UInt32, len(places) * pixels)
-        image, pixel = ray // pixels, ray % pixels
-        source = dr.gather(mi.UInt32, mi.UInt32([images[i].first for i in places]), image) + pixel
-        target = dr.gather(mi.UInt32, mi.UInt32(places), image) * pixels + pixel
+        row, pixel = ray // pixels, ray % pixels
+        source = dr.gather(mi.UInt32, mi.UInt32([images[i].first for i in places]), row) + pixel
+        target = dr.gather(mi.UInt32, mi.UInt32(places), row) * pixels + pixel
         for channel, plane in enumerate(images[places[0]].channels):
             dr.scatter(values, dr.gather(kind, plane, source), target * channels + channel)
     dr.eval(values)
-    return dr.tensor_t(kind)(values, shape)
+    tensor: Any = dr.tensor_t(kind)
+    return tensor(values, shape)

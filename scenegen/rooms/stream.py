@@ -1,7 +1,7 @@
 """Rooms without a file: endless batches of the rows that `scenegen render` would write."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import chain
 from pathlib import Path
@@ -13,7 +13,13 @@ from scenegen.common.records import check
 from scenegen.description.presets import preset_spec
 from scenegen.description.specs import BUILT_IN, TRUTHS, DatasetSpec
 from scenegen.files.schema import Column
-from scenegen.files.stream import RowStream, check_fields, mixed
+from scenegen.files.stream import (
+    Columns,
+    RowStream,
+    chosen_columns,
+    common_columns,
+    requests_and_shares,
+)
 from scenegen.layout import FURTHER, columns
 from scenegen.objects.cache import default_cache_dir
 from scenegen.objects.catalogue import Objects, objects_of
@@ -27,6 +33,8 @@ from scenegen.rooms.pack import room_rows
 from scenegen.rooms.render import render_items
 
 PIXELS = 2**20  # that are rendered at once, unless a batch has more
+ON_DEVICE = ("image", "depth", "normal", "object_id")  # fields that may stay there
+UNUSED = {"object/shape": -1, "object/stands_on": -1, "material/shininess": 1}  # slots; others 0
 
 
 class RoomStream(RowStream):
@@ -56,7 +64,7 @@ class RoomStream(RowStream):
     ) -> None:
         """Take a preset, a request, or several with the share of scenes that each gets.
 
-        Of several, room i shows scene i of one of them, and the field "spec" says of which.
+        Of several, scene i is scene i of one of them, and the field "spec" says of which.
 
         Args:
             fields: columns of the file that are numbers, those of `--with` among them.
@@ -68,111 +76,85 @@ class RoomStream(RowStream):
                 default.
             objects: models of requests for folders of meshes.
             on_device: leave pixels on the device, as Dr.Jit tensors, which `torch.from_dlpack`
-                takes without a copy; other fields, and those of path tracing, are numpy arrays.
+                takes without a copy. Other fields, and all of path tracing, are numpy arrays.
 
         Raises SpecError for a setting out of range, an unknown field, or requests whose fields
         differ in shape; BackendError where the device cannot render here. Iterating raises
         PlacementError where no scene meets the request, and LostWorkerError where a process ended.
         """
         variant = select_variant(device)
-        requests, shares = mixed(preset_or_spec, DatasetSpec)
-        specs = [preset_spec(one) if isinstance(one, str) else one for one in requests]
-        every = [_asked(spec, fields) for spec in specs]
-        sources = []
-        for spec, asked in zip(*_with_slots(every), strict=True):
-            check_batch(batch, len(spec.views), spec)
-            plain = on_device and variant != "scalar_rgb" and spec.shading != "path"
-            kept = tuple(name for name in asked if name in PICTURED and plain and not spec.truth)
+        shares = requests_and_shares(preset_or_spec, DatasetSpec)
+        given = [
+            preset_spec(request) if isinstance(request, str) else request for request in shares
+        ]
+        specs, asked = zip(*(_asked(spec, fields) for spec in given), strict=True)
+        common, views = common_columns(asked), len(specs[0].views)
+        places = (MEMBER_STORE.folder or default_cache_dir(), ASSETS.materials, ASSETS.environment)
+        kept: list[str] = []
+        if (
+            on_device
+            and variant != "scalar_rgb"
+            and not any(spec.truth or spec.shading == "path" for spec in specs)
+        ):
+            kept = [name for name in ON_DEVICE if name in fields]
+        makers = []
+        for spec, share in zip(specs, shares.values(), strict=True):
+            check_batch(batch, views, spec)
+            check(len(spec.views) == views, "views", len(spec.views), f"{views}, as in the first")
             own = objects_of(spec) if spec.source in BUILT_IN or objects is None else objects
-            folder = MEMBER_STORE.folder or default_cache_dir()
-            assets = (ASSETS.materials, ASSETS.environment)
-            sources.append(RoomSource(spec, own, asked, kept, device, batch, folder, assets))
-        alike = all(source.kept == sources[0].kept for source in sources)
-        check(alike, "on_device", "requests of which some stay there", "all or none")
-        on = dict.fromkeys(sources[0].kept, stacked)
-        super().__init__(sources, shares, batch, start, stop, workers, rank, world_size, on)
+            maker = partial(_rows, spec, own, common, kept, device, batch, places)
+            makers.append((maker, share))
+        super().__init__(
+            common, makers, batch, start, stop, workers, rank, world_size, views,
+            dict.fromkeys(kept, stacked),
+        )  # fmt: skip
 
 
-PICTURED = ("image", "depth", "normal", "object_id")
-UNUSED = {"object/shape": -1, "object/stands_on": -1, "material/shininess": 1}  # slots; others 0
-
-
-def _with_slots(
-    requests: Sequence[tuple[DatasetSpec, dict[str, Column]]],
-) -> tuple[list[DatasetSpec], list[dict[str, Column]]]:
-    """Return requests and their columns, all with as many slots as the request with the most."""
-    every = [columns for _, columns in requests]
-
-    def widened(column: Column) -> Column:
-        others = [columns[column.name].shape for columns in every]
-        slots = column.axes is not None and column.axes[:1] and column.axes[0].endswith("_slot")
-        most = max(shape[0] for shape in others) if slots else 0
-        return replace(column, shape=(most, *column.shape[1:])) if slots else column
-
-    wide = [{name: widened(c) for name, c in columns.items()} for columns in every]
-    return [spec for spec, _ in requests], wide
-
-
-def _asked(spec: DatasetSpec, fields: Sequence[str]) -> tuple[DatasetSpec, dict[str, Column]]:
+def _asked(spec: DatasetSpec, fields: Sequence[str]) -> tuple[DatasetSpec, Columns]:
     """Return a request for the truth that some fields need and no more, and their columns."""
     truth = tuple(name for name in TRUTHS if name != "flow" or len(spec.views) > 1)
-    asked = check_fields(fields, columns(replace(spec, truth=truth)))
+    asked = chosen_columns(fields, columns(replace(spec, truth=truth)))
     needed = tuple(n for n in truth if any(column.name in asked for column in FURTHER[n]))
     return replace(spec, truth=needed), asked
 
 
-@dataclass(frozen=True, eq=False)
-class RoomSource:
-    """The rows of one request, as a `stream.Source`.
+def _rows(
+    spec: DatasetSpec,
+    objects: Objects,
+    fields: Columns,
+    kept: Sequence[str],
+    device: str,
+    batch: int,
+    places: tuple[Path | None, Path | None, Path | None],
+    numbers: list[int],
+    processes: int,
+) -> Iterator[dict[str, Any]]:
+    """Yield rows of a request, as a `stream.Maker`. Raises as `render_items`."""
+    MEMBER_STORE.use(places[0])
+    ASSETS.use(*places[1:])
+    share_processors(processes, device)
+    views = len(spec.views)
+    at_once = min(DEFAULT_BATCH, max(batch, PIXELS // (spec.height * spec.width)))
+    items = list(dict.fromkeys(number // views for number in numbers))
+    wanted = iter((*numbers, -1))
+    number = next(wanted)
+    for ready in render_items(spec, items, at_once, device, objects, fields, kept):
+        values = room_rows(ready)
+        chosen = {name: values[KEPT + name if name in kept else name] for name in fields}
+        every = chain.from_iterable(range(r.index * views, (r.index + 1) * views) for r in ready)
+        for place, row in enumerate(every):
+            if row == number:
+                yield {
+                    name: of[place] if name in kept else _in_slots(of[place], fields[name])
+                    for name, of in chosen.items()
+                }
+                number = next(wanted)
 
-    Attributes:
-        kept: columns that stay on the device.
-        batch: rows of a dict.
-        cache_dir, assets: as in `render.RoomsWork`.
-    """
 
-    spec: DatasetSpec
-    objects: Objects
-    columns: Mapping[str, Column]
-    kept: tuple[str, ...]
-    device: str
-    batch: int
-    cache_dir: Path | None
-    assets: tuple[Path | None, Path | None]
-
-    @property
-    def together(self) -> int:
-        """Rows of a scene."""
-        return len(self.spec.views)
-
-    def rows(self, numbers: Sequence[int], processes: int) -> Iterator[dict[str, Any]]:
-        """Yield rows by their numbers. Raises as `render_items`."""
-        MEMBER_STORE.use(self.cache_dir)
-        ASSETS.use(*self.assets)
-        share_processors(processes, self.device)
-        spec, views = self.spec, self.together
-        at_once = max(self.batch, min(DEFAULT_BATCH, PIXELS // (spec.height * spec.width)))
-        items = list(dict.fromkeys(number // views for number in numbers))
-        rendered = render_items(
-            spec, items, min(at_once, DEFAULT_BATCH), self.device, self.objects, self.columns,
-            self.kept,
-        )  # fmt: skip
-        wanted = iter((*numbers, -1))
-        number = next(wanted)
-        for ready in rendered:
-            values = room_rows(ready)
-            chosen = {name: values[KEPT + name if name in self.kept else name] for name in self.columns}
-            every = chain.from_iterable(range(r.index * views, (r.index + 1) * views) for r in ready)
-            for place, row in enumerate(every):
-                if row == number:
-                    yield {name: self._value(name, of[place]) for name, of in chosen.items()}
-                    number = next(wanted)
-
-    def _value(self, name: str, value: Any) -> Any:
-        """Return the value of a column, with unused slots where other requests have more."""
-        shape = self.columns[name].shape
-        if name in self.kept or np.shape(value) == shape:
-            return value
-        wide = np.full(shape, UNUSED.get(name, 0), value.dtype)
-        wide[: len(value)] = value
-        return wide
+def _in_slots(value: Any, column: Column) -> Any:
+    """Return the value of a column, with unused slots where other requests have more."""
+    if np.shape(value) == column.shape:
+        return value
+    wide = np.full(column.shape, UNUSED.get(column.name, 0), value.dtype)
+    wide[: len(value)] = value
+    return wide

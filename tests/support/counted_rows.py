@@ -2,8 +2,7 @@
 
 import os
 import signal
-import time
-from dataclasses import dataclass, field
+from functools import partial
 
 from scenegen.common.errors import PlacementError
 from scenegen.files.schema import Column
@@ -12,26 +11,18 @@ from scenegen.files.stream import RowStream
 COLUMNS = {"row": Column("row", (), "int64"), "grid": Column("grid", (2, 3), "float32")}
 
 
-@dataclass(frozen=True)
-class Counted:
-    together: int = 1
-    refused: int = -1  # the row that cannot be made
-    killed: int = -1  # the row at which the process is killed
-    columns: dict = field(default_factory=lambda: COLUMNS)
-    slow: float = 0.0  # seconds for a row
-
-    def rows(self, numbers, processes):
-        for number in numbers:
-            time.sleep(self.slow)
-            if number == self.refused:
-                raise PlacementError(f"row {number}")
-            if number == self.killed:
-                os.kill(os.getpid(), signal.SIGKILL)
-            yield {"row": number, "grid": [[number] * 3] * 2}
+def rows(refused, killed, numbers, processes):
+    for number in numbers:
+        if number == refused:
+            raise PlacementError(f"row {number}")
+        if number == killed:
+            os.kill(os.getpid(), signal.SIGKILL)
+        yield {"row": number, "grid": [[number] * 3] * 2}
 
 
 def counted(batch=4, start=0, stop=None, workers=0, rank=None, world_size=None, **how):
-    """Return a stream of them; `shares` of several sources."""
-    shares = how.pop("shares", [1.0])
-    sources = [Counted(**how)] * len(shares)
-    return RowStream(sources, shares, batch, start, stop, workers, rank, world_size)
+    """Return a stream of them; row `refused` cannot be made, at row `killed` the process ends."""
+    maker = partial(rows, how.get("refused", -1), how.get("killed", -1))
+    makers = [(maker, share) for share in how.get("shares", [1.0])]
+    together = how.get("together", 1)
+    return RowStream(COLUMNS, makers, batch, start, stop, workers, rank, world_size, together)

@@ -11,9 +11,11 @@ def stored(path, *groups):
         for group in groups or ("/",):
             columns = {}
             file[group].visititems(
-                lambda name, item, columns=columns: columns.update({name: item[:]})
-                if "meaning" in item.attrs and item.dtype.kind not in "SO"
-                else None
+                lambda name, item, columns=columns: (
+                    columns.update({name: item[:]})
+                    if "meaning" in item.attrs and item.dtype.kind not in "SO"
+                    else None
+                )
             )
             found.append(columns)
     names = set.intersection(*map(set, found))

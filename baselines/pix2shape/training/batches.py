@@ -16,10 +16,10 @@ from torch import Tensor
 from torch.utils.data import DataLoader, Dataset, default_collate
 
 from baselines.pix2shape.batch import Batch
+from baselines.pix2shape.matching.relief import matched_rows, relief_of_rows
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.questions import QuestionImages
 from baselines.pix2shape.rooms import RoomImages
-from baselines.pix2shape.matching.relief import matched_rows, relief_of_rows
 from baselines.training.data import Opened
 from baselines.training.images import Draws
 from baselines.training.processes import LostProcessError, processes, share

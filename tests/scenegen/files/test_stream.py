@@ -9,11 +9,12 @@ import time
 
 import numpy as np
 import pytest
-from counted_rows import Counted, counted
+from counted_rows import COLUMNS, counted
 
 from scenegen.common.errors import PlacementError, SpecError
 from scenegen.files.pool import LostWorkerError
-from scenegen.files.stream import RowStream
+from scenegen.files.schema import Column
+from scenegen.files.stream import common_columns
 
 # Shows each row once through torch's loader; arguments: start method, and how many loaders.
 LOADED = """
@@ -129,12 +130,9 @@ def test_settings_out_of_range():
             counted(shares=shares)
     with pytest.raises(SpecError):
         counted(rank=2, world_size=2)
-    other = Counted(columns={"row": COUNTED_WIDE})
+    wide = {"row": Column("row", (2,), "int64")}
     with pytest.raises(SpecError, match="row"):
-        RowStream([Counted(), other], [1, 1], 4, 0, None, 0, None, None)
-
-
-COUNTED_WIDE = Counted().columns["grid"]
+        common_columns([COLUMNS, {**COLUMNS, **wide}])
 
 
 @linux
