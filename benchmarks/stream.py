@@ -44,7 +44,8 @@ def running(what: str, preset: str, count: int, workers: int, folder: str) -> di
                 pass
 
     make(512)  # fills the caches
-    (few, few_busy), (many, many_busy) = (processors_busy(lambda n=n: make(n)) for n in (count, 3 * count))  # fmt: skip
+    few, few_busy = processors_busy(lambda: make(count))
+    many, many_busy = processors_busy(lambda: make(3 * count))
     seconds = many - few
     images = 2 * count * (4 if "questions" in what else 1)
     busy = (many * many_busy - few * few_busy) / seconds
@@ -109,16 +110,16 @@ def main() -> None:
         speeds = print_table("once running, 2 workers", rows(folder, quick), folder)
     named: dict[str, Speed | None] = dict.fromkeys(name for name, *_ in rows("", quick))
     named |= speeds
-    for preset, goal in (("rooms {}, shapes", 1.8), ("rooms {}, shapenet", 1.3), ("questions {}, mixed", 1.3)):  # fmt: skip
-        stream, file = (named[preset.format(what)] for what in ("stream", "file"))
-        print_ratio(preset.format("stream / file"), stream, file, goal)
+    goals = {"rooms {}, shapes": 1.8, "rooms {}, shapenet": 1.3, "questions {}, mixed": 1.3}
+    for what, goal in goals.items():
+        stream, file = (named[what.format(kind)] for kind in ("stream", "file"))
+        print_ratio(what.format("stream / file"), stream, file, goal)
     for _ in range(2):
         start, used = time.perf_counter(), os.times().children_user
         subprocess.run([sys.executable, "-c", FIRST], check=True)
         seconds, processor = time.perf_counter() - start, os.times().children_user - used
-    print(
-        f"- first batch of a second start: {seconds:.1f} s, {processor:.1f} s of processor; goal 1.3"
-    )
+    cost = f"{seconds:.1f} s, {processor:.1f} s of processor"
+    print(f"- first batch of a second start: {cost}; goal 1.3 s")
     print(f"- waiting, with a step of 40 ms for 64 images: {waiting(500):.1%}; goal below 10%")
     count = 10_000 if quick else 50_000
     print(f"- memory grows over {count:,} rooms by {growth(count):.0f} MiB; goal below 50 MB")
