@@ -25,7 +25,8 @@ def test_the_programs_read_every_row_and_what_they_write_can_be_scored(tmp_path)
     """One test, so that one worker runs the page, once; with fewer and smaller rooms to score."""
     pytest.importorskip("datasets")
     printed = {
-        code: run_block(language, title, shorter(code), tmp_path) for language, title, code in BLOCKS
+        code: run_block(language, title, shorter(code), tmp_path)
+        for language, title, code in BLOCKS
     }
     for words, lines in BATCHES.items():
         assert [text for code, text in printed.items() if words in code] == [lines]

@@ -71,6 +71,7 @@ def train(
             card = Card("depth-match", settings, **requests(files))
         state = begun(METHOD, card, earlier, data.where, device)
         at = state.card.iteration
+        source: Iterator[Pictures]
         if shown:
             blocks = shown.blocks(at * each, each, machine.workers)
             source = (read_pictures([cast(QuestionsFile, b)], settings.size) for b in blocks)

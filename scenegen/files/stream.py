@@ -250,7 +250,7 @@ class RowStream(Base):
 
 def _tell_torch() -> None:
     """Let torch take streams for IterableDatasets, where it is imported."""
-    data = sys.modules.get("torch.utils.data")
+    data: Any = sys.modules.get("torch.utils.data")
     if hasattr(data, "IterableDataset"):
         data.IterableDataset.register(RowStream)
 
@@ -284,7 +284,7 @@ def common_columns(requests: Sequence[Columns]) -> dict[str, Column]:
     common = {}
     for name, column in requests[0].items():
         shapes, dtypes = zip(*((of[name].shape, of[name].dtype) for of in requests), strict=True)
-        slots = bool(column.axes) and column.axes[0].endswith("_slot")
+        slots = any(axis.endswith("_slot") for axis in (column.axes or ())[:1])
         rest = {shape[1:] if slots else shape for shape in shapes} | {*dtypes}
         check(len(rest) == 2, name, f"rows of {shapes}", "one shape and type, to mix requests")
         common[name] = replace(column, shape=max(shapes)) if slots else column
