@@ -56,7 +56,7 @@ def test_rows_come_from_processes_too(rooms):
 def test_mixed_rows_are_those_of_their_request():
     specs = [DatasetSpec(**TINY), DatasetSpec(**{**TINY, "seed": 4, "objects": (2, 2)})]
     fields = ("image", "scene_index")
-    alone = [list(RoomStream(spec, fields=fields, stop=24, batch=24))[0] for spec in specs]
+    alone = [next(iter(RoomStream(spec, fields=fields, stop=24, batch=24))) for spec in specs]
     (both,) = RoomStream(dict(zip(specs, (1, 2), strict=True)), fields=fields, stop=24, batch=24)
     assert abs(np.count_nonzero(both["spec"]) - 16) <= 1
     for row, which in enumerate(both["spec"]):
