@@ -24,6 +24,7 @@ from scenegen.rendering.renderer import share_processors, stacked
 from scenegen.rooms.make import check_batch
 
 BLOCK = 1200  # questions whose right answers are balanced, beyond those of a file
+PIXELS = 2**22  # that are rendered at once, unless a batch has more
 ON_DEVICE = {"questions": "image", "depth": "depth"}  # columns that may stay there
 
 
@@ -71,13 +72,13 @@ class QuestionStream(RowStream):
             if isinstance(request, str):
                 check_choice("kind", request, DISTRACTORS)
             spec = SplitSpec(distractors=request) if isinstance(request, str) else request
-            check_batch(batch, 1 + spec.answers, spec)
+            check_batch(batch, spec, images=1 + spec.answers)
             every = replace(spec, with_depth=True)
             known = [*question_columns(every), answer_column(), *truth_columns(every)]
             asked.append(chosen_columns(fields, known))
             common_columns(asked)  # before pools are made, which takes a second
             pools = make_pools(replace(spec, with_depth="depth" in fields))
-            makers.append((partial(_rows, pools, split, asked[0], kept, device), share))
+            makers.append((partial(_rows, pools, split, asked[0], kept, device, batch), share))
         super().__init__(
             asked[0], makers, batch, start, stop, workers, rank, world_size,
             on_device=dict.fromkeys(kept, _stacked),
@@ -94,18 +95,21 @@ def _rows(
     fields: Columns,
     kept: Sequence[str],
     device: str,
+    batch: int,
     numbers: list[int],
     processes: int,
 ) -> Iterator[dict[str, Any]]:
     """Yield questions, as a `stream.Maker`. Raises as `render_questions`."""
     share_processors(processes, device)
-    images = [ON_DEVICE[name] for name in kept]
-    for (first, count), some in groupby(numbers, partial(_block, pools.spec, split)):
+    spec, images = pools.spec, [ON_DEVICE[name] for name in kept]
+    fitting = PIXELS // (spec.height * spec.width * (1 + spec.answers))
+    how: dict[str, Any] = {"batch": min(DEFAULT_BATCH, max(batch, fitting))}
+    for (first, count), some in groupby(numbers, partial(_block, spec, split)):
         rows = [number - first for number in some]
         for ready in render_questions(
-            pools, split, first, count, rows=rows, device=device, kept=images
+            pools, split, first, count, rows=rows, device=device, kept=images, **how
         ):
-            values = question_rows(pools.spec, ready)
+            values = question_rows(spec, ready)
             for place in range(len(ready)):
                 yield {name: values[name][place] for name in fields}
 

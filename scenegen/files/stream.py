@@ -133,6 +133,9 @@ class RowStream(Base):
         share, shares = rank + ranks * reader, ranks * readers
         # A renderer's threads do not live on in a fork, so a process of its own takes over there.
         if processes := self._processes or int(_forked_renderer):
+            check(
+                not self._on_device, "on_device", "a fork", "the process that loaded the renderer"
+            )
             batches = self._from_processes(first, share, shares, processes, readers)
         else:
             batches = self.made(first, share, shares, readers, self._new)

@@ -75,7 +75,7 @@ def make_dataset(
     PlacementError where no scene meets the request, and others as `making.make_set`.
     """
     views = len(spec.views)
-    check_batch(batch, views, spec)
+    check_batch(batch, spec, views)
     check(0 <= workers <= MAX_WORKERS, "workers", workers, f"from 0 to {MAX_WORKERS}")
     check(1 <= count <= MAX_COUNT // views, "n", count, f"from 1 to {MAX_COUNT // views:,} scenes")
     variant = select_variant(device)
@@ -93,15 +93,19 @@ def make_dataset(
     )  # fmt: skip
 
 
-def check_batch(batch: int, together: int, size: Any) -> None:
-    """Raise SpecError for a batch of too many images, `together` of which are rendered at least.
+def check_batch(batch: int, size: Any, views: int = 1, images: int = 1) -> None:
+    """Raise SpecError for a batch of rows that has too many pixels.
 
-    `size` has their `height` and `width`.
+    Args:
+        size: has `height` and `width` of an image.
+        views: rows that are rendered together, at least.
+        images: of each row.
     """
     check(1 <= batch <= MAX_BATCH, "batch", batch, f"from 1 to {MAX_BATCH}")
-    most = MAX_RAYS // (size.height * size.width)
-    text = f"{batch}, with {together} views of a scene"
-    check(max(batch, together) <= most, "batch", text, f"at most {most} images of this size")
+    most = MAX_RAYS // (size.height * size.width * images)
+    text = f"{batch}, with {views} views of a scene"
+    what = "images" if images == 1 else f"rows of {images} images"
+    check(max(batch, views) <= most, "batch", text, f"at most {most} {what} of this size")
 
 
 def rooms_plan(

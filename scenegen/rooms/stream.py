@@ -99,7 +99,7 @@ class RoomStream(RowStream):
             kept = [name for name in ON_DEVICE if name in fields]
         makers = []
         for spec, share in zip(specs, shares.values(), strict=True):
-            check_batch(batch, views, spec)
+            check_batch(batch, spec, views)
             check(len(spec.views) == views, "views", len(spec.views), f"{views}, as in the first")
             own = objects_of(spec) if spec.source in BUILT_IN or objects is None else objects
             maker = partial(_rows, spec, own, common, kept, device, batch, places)

@@ -66,6 +66,8 @@ def test_settings_that_no_stream_has():
     for wrong in ({"fields": ["image"]}, {"split": "training"}, {"batch": 5000}):
         with pytest.raises(SpecError):
             QuestionStream("matched", **wrong)
+    with pytest.raises(SpecError, match="at most 4 rows"):
+        QuestionStream(SplitSpec(height=4096, width=4096), batch=5)
     with pytest.raises(SpecError):
         QuestionStream("matches")
     with pytest.raises(SpecError):
