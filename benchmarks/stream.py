@@ -49,7 +49,7 @@ def running(
                 if device.get("on_device"):
                     torch.from_dlpack(batch["depth"]).sum().item()  # waits for the device
 
-    make(512)  # fills the caches
+    make(3 * count)  # fills the caches
     few, few_busy = processors_busy(lambda: make(count))
     many, many_busy = processors_busy(lambda: make(3 * count))
     seconds = many - few
