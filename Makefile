@@ -109,6 +109,7 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.render
 	$(BIN)/python -m benchmarks.shapes
 	$(BIN)/python -m benchmarks.questions
+	$(BIN)/python -m benchmarks.stream
 	$(BIN)/python -m benchmarks.nearest
 	$(BIN)/python -m benchmarks.surfels
 	$(BIN)/python -m benchmarks.score_rows

@@ -18,6 +18,7 @@ from baselines.pix2shape.commands import (
     ALLOW_TEST_SET,
     DEVICE,
     MINUTES,
+    STREAM,
     SUBMISSION,
     WEIGHTS_PATH,
     Setting,
@@ -27,6 +28,7 @@ from baselines.pix2shape.commands import (
     predict_to,
     shown_rows,
     shown_training,
+    training_data,
 )
 from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import LARGEST, OVERWRITE
@@ -247,10 +249,10 @@ def _answer_by_outline(
     "--data",
     type=InputPath(),
     multiple=True,
-    required=True,
     metavar="FILE...",
     help="Rooms or questions to train on; networks of depth learn from several files.",
 )
+@STREAM
 @click.option("--out", type=OutputFolder(), required=True, help="Folder of the run.")
 @click.option(
     "--labels",
@@ -278,6 +280,7 @@ def train_baseline(
     name: str,
     more: tuple[str, ...],
     data: tuple[str, ...],
+    stream: str | None,
     out: str,
     labels: int | None,
     seed: int | None,
@@ -297,14 +300,18 @@ def train_baseline(
     if minutes is not None and iterations is not None:
         raise click.UsageError("--minutes decides --iterations; leave one of them out")
     module = _module(name)
-    from baselines.training.data import TrainingFiles
+    if stream is not None and not hasattr(module, "STREAMED"):
+        raise click.UsageError(f"--stream: {name} learns from files")
     from baselines.training.machine import Machine
-    from baselines.training.test_sets import refuse_test_set
     from scenegen.common.records import check, from_json
 
     machine = Machine(device, minutes=minutes)
     parameters = inspect.signature(module.train).parameters.values()
-    arguments = {p.name for p in parameters if p.kind is p.KEYWORD_ONLY} - {"resume", "progress"}
+    arguments = {p.name for p in parameters if p.kind is p.KEYWORD_ONLY} - {
+        "resume",
+        "progress",
+        "streamed",
+    }
     names = {field.name for field in fields(module.Settings)}
     if labels is not None and "labels" not in arguments:
         raise click.UsageError(f"--labels: {name} has no such setting")
@@ -318,10 +325,8 @@ def train_baseline(
     how = {key: chosen.pop(key) for key in arguments & chosen.keys()}
     made = from_json(module.Settings, json.dumps(chosen), "settings")
     text = ""
-    with TrainingFiles(*data, *more) as files, shown_training(out, machine.every) as show:
-        if not allow_test_set:
-            for opened in files.opened:
-                refuse_test_set(opened)
+    given = training_data((*data, *more), stream, allow_test_set)
+    with given as files, shown_training(out, machine.every) as show:
 
         def remember(done: int, total: int, numbers: Mapping[str, float]) -> None:
             nonlocal text

@@ -20,12 +20,14 @@ if TYPE_CHECKING:
     from iqtt.files.reader import QuestionsDataset as QuestionsDataset
     from iqtt.files.reader import QuestionsFile as QuestionsFile
     from iqtt.files.reader import open_questions as open_questions
+    from iqtt.files.stream import QuestionStream as QuestionStream
     from iqtt.questions.specs import SplitSpec as SplitSpec
     from iqtt.questions.specs import preset_spec as preset_spec
 
 HOMES = {
     "files.make": "make_split",
     "files.reader": "QuestionRecord QuestionsDataset QuestionsFile open_questions",
+    "files.stream": "QuestionStream",
     "questions.specs": "SplitSpec preset_spec",
 }
 __all__ = [name for names in HOMES.values() for name in names.split()]

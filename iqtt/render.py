@@ -2,7 +2,7 @@
 
 import itertools
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -12,7 +12,7 @@ from iqtt.questions.distractors import Pools, answer_positions
 from iqtt.questions.packing import Question, pack_questions
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally, sample_questions
-from scenegen.rendering.ground_truth import visible_pixels
+from scenegen.rendering.ground_truth import KEPT, visible_pixels
 from scenegen.rendering.renderer import launch_fields
 
 Array = NDArray[Any]
@@ -48,33 +48,35 @@ def render_questions(
     first: int,
     count: int,
     *,
-    rows: range | None = None,
+    rows: Sequence[int] | None = None,
     batch: int = DEFAULT_BATCH,
     device: str = "auto",
     tally: Tally | None = None,
+    kept: Collection[str] = (),
 ) -> Iterator[list[Rendered]]:
     """Yield questions first .. first + count - 1 of a split in order, at most `batch` at a time.
 
     The positions of the right answers are balanced over just these questions. Of these, only `rows`
-    are made where they are given; 0 is the first of them.
+    are made where they are given, which ascend; 0 is the first of them. Of image and depth, those
+    that are `kept` stay on the device, as in `renderer.launch_fields`.
 
     Raises PlacementError where the bounded search finds no question that meets the spec.
     """
     spec, tally = pools.spec, tally or Tally()
     places = answer_positions(spec, split, first, count)
     pending = deque[Fetch]()
-    begin, end = (rows.start, rows.stop) if rows else (0, count)
-    few = SAMPLED if begin else FIRST_SAMPLED
-    starts = [begin, *range(min(begin + few, end), end, SAMPLED), end]
+    rows = range(count) if rows is None else rows
+    few = SAMPLED if rows and rows[0] else FIRST_SAMPLED
+    starts = [0, *range(min(few, len(rows)), len(rows), SAMPLED), len(rows)]
     for start, stop in itertools.pairwise(starts):
-        requests = [(first + i, int(places[i]), 0) for i in range(start, stop)]
+        requests = [(first + i, int(places[i]), 0) for i in rows[start:stop]]
         sampled = sample_questions(pools, split, requests, tally)
         for i in range(0, len(sampled), batch):
-            pending.append(_launch(spec, sampled[i : i + batch], device))
+            pending.append(_launch(spec, sampled[i : i + batch], device, kept))
             if len(pending) > AHEAD:
-                yield _checked(pools, split, pending.popleft()(), tally, device)
+                yield _checked(pools, split, pending.popleft()(), tally, device, kept)
     while pending:
-        yield _checked(pools, split, pending.popleft()(), tally, device)
+        yield _checked(pools, split, pending.popleft()(), tally, device, kept)
 
 
 def render_question(pools: Pools, split: str, index: int, device: str = "auto") -> Rendered:
@@ -107,10 +109,13 @@ def groups(spec: SplitSpec, split: str) -> dict[str, tuple[int, int]]:
     return {"": (0, getattr(spec, split))}
 
 
-def _launch(spec: SplitSpec, questions: Sequence[Question], device: str) -> Fetch:
+def _launch(
+    spec: SplitSpec, questions: Sequence[Question], device: str, kept: Collection[str] = ()
+) -> Fetch:
     """Start to render questions; the function that is returned waits for their images."""
     names = ("image", "object_id", "depth") if spec.with_depth else ("image", "object_id")
-    fetch = launch_fields(pack_questions(spec, questions), names, device)
+    fetch = launch_fields(pack_questions(spec, questions), names, device, kept)
+    image, depth_name = (KEPT + name if name in kept else name for name in ("image", "depth"))
 
     def rendered() -> list[Rendered]:
         pixels = fetch()
@@ -118,15 +123,20 @@ def _launch(spec: SplitSpec, questions: Sequence[Question], device: str) -> Fetc
         result = []
         for i, question in enumerate(questions):
             its_images = slice((1 + spec.answers) * i, (1 + spec.answers) * (i + 1))
-            depth = pixels["depth"][its_images] if spec.with_depth else None
-            result.append(Rendered(question, pixels["image"][its_images], shown[its_images], depth))
+            depth = pixels[depth_name][its_images] if spec.with_depth else None
+            result.append(Rendered(question, pixels[image][its_images], shown[its_images], depth))
         return result
 
     return rendered
 
 
 def _checked(
-    pools: Pools, split: str, done: list[Rendered], tally: Tally, device: str
+    pools: Pools,
+    split: str,
+    done: list[Rendered],
+    tally: Tally,
+    device: str,
+    kept: Collection[str] = (),
 ) -> list[Rendered]:
     """Make questions anew whose full images hide a cube after all."""
     spec = pools.spec
@@ -134,7 +144,7 @@ def _checked(
         again = [done[i].question for i in hidden]
         requests = [(q.index, q.shapes.answer, q.attempt + 1) for q in again]
         anew = sample_questions(pools, split, requests, tally)
-        for i, question in zip(hidden, _launch(spec, anew, device)(), strict=True):
+        for i, question in zip(hidden, _launch(spec, anew, device, kept)(), strict=True):
             done[i] = question
     return done
 

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from scenegen.camera import Camera as Camera
     from scenegen.camera import back_project as back_project
     from scenegen.common.errors import SceneGenError as SceneGenError
+    from scenegen.description.presets import preset_spec as preset_spec
     from scenegen.description.scenes import SceneSpec as SceneSpec
     from scenegen.description.specs import DatasetSpec as DatasetSpec
     from scenegen.rendering.shading import shade as shade
@@ -23,15 +24,18 @@ if TYPE_CHECKING:
     from scenegen.rooms.reader import RoomsDataset as RoomsDataset
     from scenegen.rooms.reader import RoomsFile as RoomsFile
     from scenegen.rooms.reader import open_rooms as open_rooms
+    from scenegen.rooms.stream import RoomStream as RoomStream
 
 HOMES = {
     "camera": "Camera back_project",
     "common.errors": "SceneGenError",
+    "description.presets": "preset_spec",
     "description.scenes": "SceneSpec",
     "description.specs": "DatasetSpec",
     "rendering.shading": "shade",
     "rooms.make": "make_dataset",
     "rooms.reader": "Room RoomsDataset RoomsFile open_rooms",
+    "rooms.stream": "RoomStream",
 }
 __all__ = [name for names in HOMES.values() for name in names.split()]
 __getattr__ = lazy_names(__name__, HOMES)

@@ -17,19 +17,24 @@ BATCHES = {
 }
 
 
+def shorter(code):
+    return code.replace("--n 32 --size 64", "--n 8 --size 32").replace("TOLD = 180", "TOLD = 1")
+
+
 def test_the_programs_read_every_row_and_what_they_write_can_be_scored(tmp_path):
     """One test, so that one worker runs the page, once; with fewer and smaller rooms to score."""
     pytest.importorskip("datasets")
     printed = {
-        code: run_block(
-            language, title, code.replace("--n 32 --size 64", "--n 8 --size 32"), tmp_path
-        )
+        code: run_block(language, title, shorter(code), tmp_path)
         for language, title, code in BLOCKS
     }
     for words, lines in BATCHES.items():
         assert [text for code, text in printed.items() if words in code] == [lines]
     (scored,) = [text for code, text in printed.items() if "bench validate" in code]
     assert scored.startswith("mine.h5: valid\nmine: 8 images of 8 scenes of rooms.h5\n")
+    ((code, reached),) = [pair for pair in printed.items() if "RoomStream" in pair[0]]
+    assert len(code.splitlines()) <= 35
+    assert 0 <= float(reached) < 1
     (training,) = [text for code, text in printed.items() if "metrics.evaluate(" in code]
     first, second, last = (line.split() for line in training.splitlines())
     assert float(second[2]) < float(first[2])  # half the shift has half the error

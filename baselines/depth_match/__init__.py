@@ -9,6 +9,6 @@ docs/baselines.md says what it reaches and what it is told.
 
 from baselines.depth_match.answers import write_submission
 from baselines.depth_match.network import Settings
-from baselines.depth_match.training import train
+from baselines.depth_match.training import STREAMED, train
 
-__all__ = ["Settings", "train", "write_submission"]
+__all__ = ["STREAMED", "Settings", "train", "write_submission"]

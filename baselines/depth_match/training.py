@@ -7,6 +7,7 @@ right, is not read.
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import torch
@@ -21,7 +22,8 @@ from baselines.training.images import Array, Draws, check_reducible, read_ahead
 from baselines.training.machine import Machine, chosen_device
 from baselines.training.questions import UNLABELED, check_truth, question_images
 from baselines.training.run_folder import alone_in, begun, earlier_state
-from iqtt import QuestionsFile
+from baselines.training.streams import TrainingStreams
+from iqtt import QuestionsFile, SplitSpec
 from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
 
@@ -34,8 +36,11 @@ class Pictures:
     height: Tensor
 
 
+STREAMED = {"with_depth": True}  # settings of the questions of streams
+
+
 def train(
-    data: TrainingFiles,
+    data: TrainingFiles | TrainingStreams,
     run_folder: str | Path,
     settings: Settings = Settings(),  # noqa: B008 (it is frozen)
     machine: Machine | None = None,
@@ -43,7 +48,9 @@ def train(
     resume: bool = False,
     progress: Progress = lambda done, total, losses: None,
 ) -> Path:
-    """Train on the unlabelled questions of files with depth, as `baselines.training` says.
+    """Train on the unlabelled questions of files with depth, or on streams.
+
+    The arguments are those that `baselines.training` says.
 
     The loss is the mean absolute error of height, plus `shape_loss` of each whole shape. Pictures
     are shown turned and mirrored.
@@ -53,11 +60,24 @@ def train(
     with alone_in(folder):
         earlier = earlier_state(folder, METHOD, resume)
         settings = settings if earlier is None else earlier.card.settings
-        files = data.questions(UNLABELED)
-        pictures = read_pictures(files, settings.size)
-        card = Card("depth-match", settings, **requests(files))
+        shown, each = None, 0
+        if isinstance(data, TrainingStreams):
+            shown = data.shown(settings.size, settings.seed, **STREAMED)
+            each = -(-settings.batch // (1 + SplitSpec.answers))  # questions
+            card = Card("depth-match", settings, **shown.card())
+        else:
+            files = data.questions(UNLABELED)
+            pictures = read_pictures(files, settings.size)
+            card = Card("depth-match", settings, **requests(files))
         state = begun(METHOD, card, earlier, data.where, device)
-        batches = read_ahead(batches_of(pictures, settings, state.card.iteration), device)
+        at = state.card.iteration
+        source: Iterator[Pictures]
+        if shown:
+            blocks = shown.blocks(at * each, each, machine.workers)
+            source = (read_pictures([cast(QuestionsFile, b)], settings.size) for b in blocks)
+        else:
+            source = batches_of(pictures, settings, at)
+        batches = read_ahead(source, device)
 
         def losses(number: int) -> Iterator[Loss]:
             batch = next(batches)
@@ -68,7 +88,7 @@ def train(
             off = errors.abs().sum() / shown.sum().clamp(min=1)
             yield Loss(off + shape_loss(errors, shown.int()), {"error of depth": off})
 
-        fit(folder, METHOD, state, losses, learning_rate, machine, progress=progress)
+        fit(folder, METHOD, state, losses, learning_rate, machine, rows=each, progress=progress)
     return folder / WEIGHTS
 
 

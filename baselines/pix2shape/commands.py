@@ -6,7 +6,7 @@ Heavy imports happen inside the commands, so that `--help` is quick and works wi
 import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from typing import Any
 
 import click
@@ -81,6 +81,11 @@ MINUTES = click.option(
     type=click.FloatRange(0, 1e6, min_open=True),
     help="End training so many minutes from now, with a schedule of as many iterations as fit.",
 )
+STREAM = click.option(
+    "--stream",
+    metavar="NAME,...",
+    help="Instead of --data: presets of rooms, or kinds of questions, that are rendered meanwhile.",
+)
 ALLOW_TEST_SET = click.option(
     "--allow-test-set", is_flag=True, help="Learn from a named test set, or from its scenes."
 )
@@ -88,9 +93,8 @@ ALLOW_TEST_SET = click.option(
 
 @click.command(epilog=f"{EXAMPLE}pix2shape train --data rooms.h5 --out run")
 @ALLOW_TEST_SET
-@click.option(
-    "--data", type=InputPath(), required=True, help="Rooms, or iqtt-train.h5, to train on."
-)
+@click.option("--data", type=InputPath(), help="Rooms, or iqtt-train.h5, to train on.")
+@STREAM
 @click.option("--out", type=OutputFolder(), required=True, help="Folder of the run.")
 @click.option(
     "--config",
@@ -143,7 +147,8 @@ ALLOW_TEST_SET = click.option(
     " run that --resume goes on with].",
 )
 def train(
-    data: str,
+    data: str | None,
+    stream: str | None,
     out: str,
     config: str | None,
     settings: tuple[tuple[str, Any], ...],
@@ -169,9 +174,7 @@ def train(
     from baselines.pix2shape.network.config import model_config
     from baselines.pix2shape.training.run import train_run
     from baselines.training import launch
-    from baselines.training.data import TrainingFiles
     from baselines.training.machine import Machine
-    from baselines.training.test_sets import refuse_test_set
 
     chosen = named_once(settings, **({} if seed is None else {"seed": seed}))
     if resume and (config or chosen or labels or conditional or start):
@@ -180,9 +183,8 @@ def train(
     here, machines = launch.torchrun_counts()
     machine = Machine(device, devices or here, nodes or machines, workers, every, minutes)
     try:
-        with TrainingFiles(data) as files, shown_training(out, every) as show:
-            if not allow_test_set:
-                refuse_test_set(files.opened[0])
+        given = training_data(() if data is None else (data,), stream, allow_test_set)
+        with given as files, shown_training(out, every) as show:
             name = config or ("views" if files.hold_questions else "rays")
             weights = train_run(
                 out,
@@ -206,7 +208,30 @@ def train(
         raise
     if weights is not None:  # None in all processes but the first
         named = shlex.quote(str(weights))
-        print_line(f"{weights}: trained on {data}; now `pix2shape predict --weights {named} ...`")
+        print_line(
+            f"{weights}: trained on {files.where}; now `pix2shape predict --weights {named} ...`"
+        )
+
+
+def training_data(paths: tuple[str, ...], stream: str | None, allow_test_set: bool) -> Any:
+    """Return a context manager of open files, or of streams, to learn from.
+
+    Raises UsageError unless one of --data and --stream is given, SpecError for a named test set.
+    """
+    from baselines.training.data import TrainingFiles
+    from baselines.training.streams import TrainingStreams
+    from baselines.training.test_sets import refuse_test_set
+
+    if (stream is None) == (not paths):
+        raise click.UsageError("say where to learn from: --data or --stream, one of them")
+    if stream is not None:
+        return nullcontext(TrainingStreams(stream, allow_test_set))
+    with ExitStack() as stack:
+        files = stack.enter_context(TrainingFiles(*paths))
+        for opened in () if allow_test_set else files.opened:
+            refuse_test_set(opened)
+        stack.pop_all()
+    return files
 
 
 @contextmanager

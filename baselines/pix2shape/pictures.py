@@ -119,7 +119,7 @@ def sample_sheet(
     Raises SpecError for a label that the model does not know, and for a model of questions.
     """
     _check_camera(card)
-    spec = replace(DatasetSpec.from_json(card.data), seed=seed)
+    spec = replace(DatasetSpec.from_json(card.data.partition("\n")[0]), seed=seed)
     if label is not None:
         none = "" if card.classes else "none: it knows no classes"
         check_choice("class", label, card.classes, expected=none)

@@ -19,7 +19,7 @@ TOLD = "; in training, true depth and object ids"
 __all__ = ["Settings", "train", "write_submission"]
 
 
-def lessons_of(rooms: Rooms, settings: Settings, _folder: Path, _progress: Any) -> Lessons:
+def lessons_of(rooms: Rooms, settings: Settings, _folder: Path | None, _progress: Any) -> Lessons:
     """Return the relief that the depth tells, where there is a surface, and the objects."""
     assert rooms.depth is not None, "train asks for it"
     depths = rooms.depth
@@ -33,5 +33,6 @@ def lessons_of(rooms: Rooms, settings: Settings, _folder: Path, _progress: Any) 
     return Lessons(torch.arange(len(rooms)), target, inside=rooms.inside)
 
 
+STREAMED: dict[str, Any] = {}  # settings of the rooms of streams
 train = partial(training.train, METHOD, lessons_of, True, training.as_it_is)
 write_submission = partial(predict.write_submission, METHOD, told_in_training=TOLD)

@@ -1,11 +1,13 @@
 """How relief networks learn, on any targets."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, cast
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -18,7 +20,9 @@ from baselines.training.images import Draws, read_ahead
 from baselines.training.machine import Machine, chosen_device
 from baselines.training.rooms import Rooms, read_rooms
 from baselines.training.run_folder import alone_in, begun, earlier_state
+from baselines.training.streams import Shown, TrainingStreams
 from scenegen.common.random.seeding import Purpose, item_rng
+from scenegen.rooms.reader import RoomsFile
 
 WARM_UP = 200  # iterations
 SLOPE = 2.0  # weight of differences between neighbours, in the loss of shape
@@ -43,7 +47,7 @@ class Lessons:
     inside: Tensor | None = None
 
 
-Teach = Callable[[Rooms, Settings, Path, Callable[[int, int], None]], Lessons]
+Teach = Callable[[Rooms, Settings, Path | None, Callable[[int, int], None]], Lessons]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,53 +79,65 @@ def train(
     teach: Teach,
     with_depth: bool,
     begin: Callable[[Any], Any],
-    data: TrainingFiles,
+    data: TrainingFiles | TrainingStreams,
     run_folder: str | Path,
     settings: Settings = Settings(),  # noqa: B008 (it is frozen)
     machine: Machine | None = None,
     *,
+    streamed: Mapping[str, Any] = MappingProxyType({}),
     resume: bool = False,
     progress: Progress = lambda done, total, losses: None,
 ) -> Path:
-    """Train a relief network on files of rooms, as `baselines.training` says.
+    """Train a relief network on files or streams of rooms, as `baselines.training` says.
 
     The loss is the mean absolute difference of relief: in contrast to the squared one it lets a
     pixel be either floor or object, rather than something between them. `shape_loss` is added
     where objects are told.
 
     Args:
-        teach: finds the relief to learn; it gets the rooms, the settings, the run's folder and a
-            function to call with the images done and in all.
+        teach: finds the relief to learn; it gets the rooms, the settings, the run's folder (None
+            for rooms of a stream) and a function to call with the images done and in all.
         with_depth: whether the rooms' depth and objects are read.
         begin: is given the network of a new run.
+        streamed: settings of the rooms of streams.
     """
     folder, machine = Path(run_folder), machine or Machine()
     device = chosen_device(machine.device)
     with alone_in(folder):
         earlier = earlier_state(folder, method, resume)
         settings = settings if earlier is None else earlier.card.settings
-        files = data.rooms()
-        rooms = read_rooms(files, settings.size, depth=with_depth)
-        card = Card(method.name, settings, **requests(files))
+        shown = None
+        if isinstance(data, TrainingStreams):
+            shown = data.shown(settings.size, settings.seed, **streamed)
+            card = Card(method.name, settings, **shown.card())
+        else:
+            files = data.rooms()
+            rooms = read_rooms(files, settings.size, depth=with_depth)
+            card = Card(method.name, settings, **requests(files))
         state = begun(method, card, earlier, data.where, device)
         if earlier is None:
             begin(state.network)
         at, last = state.card.iteration, settings.iterations
-        lessons = teach(
-            rooms,
-            settings,
-            folder,
-            lambda done, total: progress(at, last, {"share of images matched": done / total}),
-        )
+        if shown:
+            source = batches_of_stream(shown, machine.workers, teach, with_depth, settings, at)
+        else:
+            lessons = teach(
+                rooms,
+                settings,
+                folder,
+                lambda done, total: progress(at, last, {"share of images matched": done / total}),
+            )
+            source = batches_of(rooms, lessons, settings, at)
         state.network.to(memory_format=torch.channels_last)  # faster
-        batches = read_ahead(batches_of(rooms, lessons, settings, at), device)
+        batches = read_ahead(source, device)
 
         def losses(number: int) -> Iterator[Loss]:
             windows_only = number < (1 - WHOLE) * state.card.settings.iterations
             loss = _loss(state.network, next(batches), windows_only)
             yield Loss(loss, {"loss": loss})
 
-        fit(folder, method, state, losses, learning_rate, machine, progress=progress)
+        each = shown.whole(settings.batch) if shown else 0
+        fit(folder, method, state, losses, learning_rate, machine, rows=each, progress=progress)
     return folder / WEIGHTS
 
 
@@ -139,24 +155,41 @@ def batches_of(rooms: Rooms, lessons: Lessons, settings: Settings, first: int) -
     """Yield the batches of iteration `first` and of those after it, without end."""
     draws = Draws(len(lessons.rows), settings.batch, settings.seed, first)
     for number, drawn in enumerate(draws, first):
-        rows = seen = lessons.rows[torch.tensor(drawn)]
+        rows = lessons.rows[torch.tensor(drawn)]
+        yield _batch(rooms, lessons, rows, item_rng(settings.seed, number, Purpose.TRAINING))
+
+
+def batches_of_stream(
+    shown: Shown, workers: int, teach: Teach, with_depth: bool, settings: Settings, first: int
+) -> Iterator[Batch]:
+    """Yield the batches of iteration `first` and of those after it, each of rooms of its own."""
+    size = shown.whole(settings.batch)
+    for number, block in enumerate(shown.blocks(first * size, size, workers), first):
+        rooms = read_rooms([cast(RoomsFile, block)], settings.size, depth=with_depth)
+        lessons = teach(rooms, settings, None, lambda done, total: None)
         rng = item_rng(settings.seed, number, Purpose.TRAINING)
-        if lessons.views is not None:
-            share = rng.random(len(rows))
-            views = [lessons.views[row] for row in rows.tolist()]
-            chosen = zip(views, share, strict=True)
-            seen = torch.stack([others[int(place * len(others))] for others, place in chosen])
-        target, weight = lessons.target(seen)
-        yield Batch(
-            rooms.image[rows],
-            rooms.world_from_camera[rows],
-            None if lessons.views is None else rooms.world_from_camera[seen],
-            rooms.fov_of(rows),
-            target,
-            weight,
-            None if lessons.inside is None else lessons.inside[seen],
-            torch.from_numpy(rng.random(len(rows))),
-        )
+        yield _batch(rooms, lessons, lessons.rows, rng)
+
+
+def _batch(rooms: Rooms, lessons: Lessons, rows: Tensor, rng: np.random.Generator) -> Batch:
+    """Return the batch of some rows."""
+    seen = rows
+    if lessons.views is not None:
+        share = rng.random(len(rows))
+        views = [lessons.views[row] for row in rows.tolist()]
+        chosen = zip(views, share, strict=True)
+        seen = torch.stack([others[int(place * len(others))] for others, place in chosen])
+    target, weight = lessons.target(seen)
+    return Batch(
+        rooms.image[rows],
+        rooms.world_from_camera[rows],
+        None if lessons.views is None else rooms.world_from_camera[seen],
+        rooms.fov_of(rows),
+        target,
+        weight,
+        None if lessons.inside is None else lessons.inside[seen],
+        torch.from_numpy(rng.random(len(rows))),
+    )
 
 
 def _loss(network: Relief, batch: Batch, windows_only: bool) -> Tensor:

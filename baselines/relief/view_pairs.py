@@ -19,13 +19,14 @@ from baselines.relief.network import Card, Settings, relief_network
 from baselines.relief.training import Lessons
 from baselines.training.checkpoint import Method
 from baselines.training.rooms import Rooms
+from baselines.training.streams import NEIGHBOURS
 
 METHOD = Method("view-pairs", Card, relief_network)
 __all__ = ["Settings", "train", "write_submission"]
 
 
 def lessons_of(
-    rooms: Rooms, _settings: Settings, folder: Path, progress: Callable[[int, int], Any]
+    rooms: Rooms, _settings: Settings, folder: Path | None, progress: Callable[[int, int], Any]
 ) -> Lessons:
     """Return the relief that matching finds, of the rows that have a partner."""
     relief = relief_of_rows(rooms, folder, progress)
@@ -37,5 +38,6 @@ def lessons_of(
     return Lessons(matched_rows(rooms), target)
 
 
-train = partial(training.train, METHOD, lessons_of, False, training.as_it_is)
+STREAMED = NEIGHBOURS
+train = partial(training.train, METHOD, lessons_of, False, training.as_it_is, streamed=STREAMED)
 write_submission = partial(predict.write_submission, METHOD)

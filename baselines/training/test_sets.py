@@ -22,12 +22,18 @@ def refuse_test_set(opened: OpenFile) -> None:
     file = opened.file
     texts = {name: str(value) for name, value in file.attrs.items()}
     pictures = str(file["questions"].attrs.get("sha256", "")) if "questions" in file else ""
-    test = known_test(texts.get("truth_digest", "")) or _like(texts.get("spec", ""))
+    test = known_test(texts.get("truth_digest", ""))
     test = test or next((t for t in KNOWN_TESTS if pictures and t.pictures == pictures), None)
+    refuse_request(opened.path, texts.get("spec", ""), test)
+
+
+def refuse_request(where: object, spec: str, test: KnownTest | None = None) -> None:
+    """Raise SpecError for a named test set, or a request for rooms of its seed and objects."""
+    test = test or _like(spec)
     if test:
         hint = "take another --seed for training, or say --allow-test-set"
         found = f"the seed and the objects of the test set {test.name}"
-        raise SpecError(opened.path, found, "training data", hint)
+        raise SpecError(where, found, "training data", hint)
 
 
 def _like(text: str) -> KnownTest | None:

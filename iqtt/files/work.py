@@ -60,11 +60,7 @@ class QuestionsWork:
         pieces = (some[i : i + PACKED] for some in rendered for i in range(0, len(some), PACKED))
 
         def packed(questions: list[Rendered]) -> Packed:
-            values = {
-                "questions": [one.images for one in questions],
-                "answers": np.array([one.question.shapes.answer for one in questions], np.uint8),
-                **_truth(spec, questions),
-            }
+            values = question_rows(spec, questions)
             sheets = block.part.sheets
             return [pack_rows(values, sheet.columns, self.compression) for sheet in sheets]
 
@@ -73,8 +69,8 @@ class QuestionsWork:
         return tally
 
 
-def _truth(spec: SplitSpec, rendered: Sequence[Rendered]) -> dict[str, Any]:
-    """Return the values of `truth_columns`, for each question."""
+def question_rows(spec: SplitSpec, rendered: Sequence[Rendered]) -> dict[str, Any]:
+    """Return the values of each question, by column: images, answer, and `truth_columns`."""
     most, images = spec.cubes[1], 1 + spec.answers
     cubes = np.full((len(rendered), images, most, 3), NO_CUBE, np.int8)
     shape_ids, class_ids = np.zeros((2, len(rendered), images, ID_BYTES), np.uint8)
@@ -91,6 +87,8 @@ def _truth(spec: SplitSpec, rendered: Sequence[Rendered]) -> dict[str, Any]:
         return np.array([getattr(question, name) for question in questions])
 
     return {
+        "questions": [one.images for one in rendered],
+        "answers": np.array([question.shapes.answer for question in questions], np.uint8),
         "cube_count": counts,
         "cubes": cubes,
         "shape_id": shape_ids,

@@ -12,7 +12,7 @@ import subprocess
 import sys
 import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from queue import SimpleQueue
@@ -41,8 +41,8 @@ class Pool:
         """Take the function of all tasks, which is pickled once for each process."""
         self._function = pickle.dumps(function)
         self._threads = ThreadPoolExecutor(count, thread_name_prefix="worker")
-        self._idle: list[_Process] = []
-        self._started: list[_Process] = []
+        self._idle: list[Process] = []
+        self._started: list[Process] = []
         self._lock, self._killed = threading.Lock(), False
 
     def submit(self, task: Any) -> Future[Any]:
@@ -76,28 +76,35 @@ class Pool:
             raise result
         return result
 
-    def _start(self) -> "_Process":
+    def _start(self) -> "Process":
         with self._lock:
             if self._killed:
                 raise LostWorkerError("The worker processes were ended")
-            try:
-                process = _Process()
-            except OSError as error:
-                raise _not_to_be_had(error) from error
+            process = Process()
             self._started.append(process)
         process.begin(self._function)
         return process
 
 
-class _Process:
+class Process:
     """One process, and the pipes to it and from it."""
 
-    def __init__(self) -> None:
-        """Start it; it never sees Ctrl-C, which a terminal sends to all processes."""
+    def __init__(self, files: Sequence[int] = ()) -> None:
+        """Start it; it never sees Ctrl-C, which a terminal sends to all processes.
+
+        Args:
+            files: descriptors that it gets, too, under the same numbers.
+
+        Raises SceneGenError where no process can be started.
+        """
         command = python_command(f"from {__name__} import serve; serve()")
-        environment, pipe = {**os.environ, **ONE_THREAD}, subprocess.PIPE
-        with without_interrupts():
-            self._popen = subprocess.Popen(command, stdin=pipe, stdout=pipe, env=environment)
+        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
+        environment = {**os.environ, **ONE_THREAD}
+        try:
+            with without_interrupts():
+                self._popen = subprocess.Popen(command, **pipes, pass_fds=files, env=environment)
+        except OSError as error:
+            raise _not_to_be_had(error) from error
 
     def begin(self, function: bytes) -> None:
         """Hand over the function of all tasks. Raises SceneGenError where it cannot begin."""
@@ -110,19 +117,33 @@ class _Process:
 
     def answer(self, message: bytes) -> tuple[bool, Any]:
         """Return whether a task succeeded, and its result or error. Raises LostWorkerError."""
+        self.ask(message)
+        return self.heard()
+
+    def ask(self, message: bytes) -> None:
+        """Hand over a task, which is done after those before it. Raises LostWorkerError."""
         assert self._popen.stdin is not None
-        assert self._popen.stdout is not None
         try:
             _write(self._popen.stdin, message)
+        except OSError:  # it has closed the pipe, as it ends
+            raise self._lost() from None
+
+    def heard(self) -> tuple[bool, Any]:
+        """Wait for the oldest answer that is due; return and raise as `answer`."""
+        assert self._popen.stdout is not None
+        try:
             answer = _read(self._popen.stdout)
-        except (OSError, EOFError):  # it has closed the pipes, as it ends
-            with suppress(subprocess.TimeoutExpired):
-                self._popen.wait(PATIENCE)
-            self.kill()
-            what, hint = "A worker process ended", "memory may be short: use fewer --workers"
-            raise LostWorkerError(what, ended(self._popen.wait()), "", hint) from None
+        except (OSError, EOFError):
+            raise self._lost() from None
         succeeded, result = pickle.loads(answer)
         return succeeded, result
+
+    def _lost(self) -> LostWorkerError:
+        with suppress(subprocess.TimeoutExpired):
+            self._popen.wait(PATIENCE)
+        self.kill()
+        what, hint = "A worker process ended", "memory may be short: use fewer --workers"
+        return LostWorkerError(what, ended(self._popen.wait()), "", hint)
 
     def end(self) -> None:
         """Let it end by itself where it lives, wait for that, and close the pipes."""

@@ -4,7 +4,7 @@
 pixels. The camera rays start here; `rays` (or `cubes`) finds what they hit.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import drjit as dr
@@ -19,6 +19,8 @@ from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.exact_surfaces import Surface
 from scenegen.objects.solids import Mesh
 from scenegen.rendering.cubes import Cubes, closest_cube, upload_cubes
+from scenegen.rendering.device_pixels import DeviceImage
+from scenegen.rendering.ground_truth import KEPT
 from scenegen.rendering.meshes.model_scene import GRID, model_scene
 from scenegen.rendering.meshes.rasteriser import (
     Triangles,
@@ -49,11 +51,12 @@ LANES = 32  # an image's rays are padded to a multiple of this, so no SIMD packe
 
 
 def launch_pixels(
-    batch: SceneBatch, variant: str, fields: Sequence[str]
+    batch: SceneBatch, variant: str, fields: Sequence[str], kept: Collection[str] = ()
 ) -> Callable[[], dict[str, Array]]:
     """Start the kernel; the returned function waits for it and returns the pixels by field.
 
-    Only what is needed for these fields of `GroundTruth` is computed.
+    Only what is needed for these fields of `GroundTruth` is computed. As to those that are `kept`,
+    see `renderer.launch_fields`.
     """
     meshes = None
     shown = batch.names if batch.spec.source != "shapes" else ()
@@ -81,7 +84,17 @@ def launch_pixels(
         channels = (len(planes),) if len(planes) > 1 else ()
         return values.reshape(count, spec.height, spec.width, *channels)
 
-    return lambda: {name: pixels(name) for name in fields}
+    def images(name: str) -> Array:
+        firsts = range(0, count * padded_rays(spec), padded_rays(spec))
+        of_all = components[name]
+        return np.array([DeviceImage(of_all, i, spec.height, spec.width) for i in firsts], object)
+
+    def fetch() -> dict[str, Array]:
+        fetched = [name for name in fields if name not in kept or name == "object_id"]
+        on_device = {KEPT + name: images(name) for name in fields if name in kept}
+        return {name: pixels(name) for name in fetched} | on_device
+
+    return fetch
 
 
 def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tuple[Scenes, Any]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[Any]
+KEPT = "on the device: "  # before the names of fields that stay there
 
 
 @dataclass(frozen=True, eq=False)

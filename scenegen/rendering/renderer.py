@@ -1,6 +1,6 @@
 """Render a batch of scenes on the best backend: the entry point of this folder."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -80,9 +80,14 @@ def picture_fields(spec: DatasetSpec) -> list[str]:
 
 
 def launch_fields(
-    batch: SceneBatch, names: Sequence[str], device: str = "auto"
+    batch: SceneBatch, names: Sequence[str], device: str = "auto", kept: Collection[str] = ()
 ) -> Callable[[], dict[str, Array]]:
-    """Start to render some fields of `GroundTruth`; the others are not computed. See `launch`."""
+    """Start to render some fields of `GroundTruth`; the others are not computed. See `launch`.
+
+    Of the fields that are `kept`, nothing is fetched but object ids. They stay on the device: a
+    `device_pixels.DeviceImage` for each image, under its name after
+    `ground_truth.KEPT`. Path tracing and the scalar variant keep none.
+    """
     variant = select_variant(device)
     pictures = [name for name in names if name in PICTURE]
     if batch.spec.shading == "path" and pictures:
@@ -106,16 +111,23 @@ def launch_fields(
     from scenegen.rendering.drjit_renderer import launch_pixels  # imports drjit; not needed above
 
     first, *others = parts(batch)
-    fetch_first = launch_pixels(first, variant, names)
+    fetch_first = launch_pixels(first, variant, names, kept)
     if not others:
         return fetch_first
 
     def fetch_all() -> dict[str, Array]:
         pixels = [fetch_first()]
-        pixels += [launch_pixels(part, variant, names)() for part in others]
-        return {name: np.concatenate([part[name] for part in pixels]) for name in names}
+        pixels += [launch_pixels(part, variant, names, kept)() for part in others]
+        return {name: np.concatenate([part[name] for part in pixels]) for name in pixels[0]}
 
     return fetch_all
+
+
+def stacked(images: Sequence[Any], shape: tuple[int, ...]) -> Any:
+    """Return images that stayed on the device as one tensor: see `device_pixels.stacked`."""
+    from scenegen.rendering import device_pixels  # imports drjit, as above
+
+    return device_pixels.stacked(images, shape)
 
 
 def trace(batch: SceneBatch, names: Sequence[str], device: str = "auto") -> dict[str, Array]:

@@ -74,11 +74,9 @@ def make_dataset(
     Raises SpecError for a setting out of range, BackendError where the device cannot render here,
     PlacementError where no scene meets the request, and others as `making.make_set`.
     """
-    check(1 <= batch <= MAX_BATCH, "batch", batch, f"from 1 to {MAX_BATCH}")
+    views = len(spec.views)
+    check_batch(batch, spec, views)
     check(0 <= workers <= MAX_WORKERS, "workers", workers, f"from 0 to {MAX_WORKERS}")
-    most, views = MAX_RAYS // (spec.height * spec.width), len(spec.views)
-    batch_text = f"{batch}, with {views} views of a scene"
-    check(max(batch, views) <= most, "batch", batch_text, f"at most {most} images of this size")
     check(1 <= count <= MAX_COUNT // views, "n", count, f"from 1 to {MAX_COUNT // views:,} scenes")
     variant = select_variant(device)
     objects = objects or objects_of(spec)
@@ -93,6 +91,21 @@ def make_dataset(
         workers=workers or useful_workers(count * views, variant),
         cluster=cluster, overwrite=overwrite, progress=progress, note=objects.problems.update,
     )  # fmt: skip
+
+
+def check_batch(batch: int, size: Any, views: int = 1, images: int = 1) -> None:
+    """Raise SpecError for a batch of rows that has too many pixels.
+
+    Args:
+        size: has `height` and `width` of an image.
+        views: rows that are rendered together, at least.
+        images: of each row.
+    """
+    check(1 <= batch <= MAX_BATCH, "batch", batch, f"from 1 to {MAX_BATCH}")
+    most = MAX_RAYS // (size.height * size.width * images)
+    text = f"{batch}, with {views} views of a scene"
+    what = "images" if images == 1 else f"rows of {images} images"
+    check(max(batch, views) <= most, "batch", text, f"at most {most} {what} of this size")
 
 
 def rooms_plan(

@@ -46,13 +46,18 @@ def pack_rooms(
     rooms: Sequence[RenderedScene], columns: Sequence[Column], compression: str
 ) -> PackedRows:
     """Return a row for each view of each scene, at least one, packed to be written."""
-    views = len(rooms[0].visible_pixels)
-    rows: dict[str, Any] = _described(rooms, views)
+    views, rows = len(rooms[0].visible_pixels), room_rows(rooms)
+    rows["scene"] = [text for room in rooms for text in [room.scenes.to_json(room.row)] * views]
+    return pack_rows(rows, columns, compression)
+
+
+def room_rows(rooms: Sequence[RenderedScene]) -> dict[str, Any]:
+    """Return the values of a row for each view of each scene, at least one, but for texts."""
+    rows: dict[str, Any] = _described(rooms, len(rooms[0].visible_pixels))
     for name in rooms[0].pixels:
         rows[name] = [image for room in rooms for image in room.pixels[name]]
     rows["object/visible_pixels"] = np.concatenate([room.visible_pixels for room in rooms])
-    rows["scene"] = [text for room in rooms for text in [room.scenes.to_json(room.row)] * views]
-    return pack_rows(rows, columns, compression)
+    return rows
 
 
 def _described(rooms: Sequence[RenderedScene], views: int) -> dict[str, Array]:

@@ -4,7 +4,7 @@ Each worker process takes its own block of scenes through all of these steps. Me
 with the number of scenes.
 """
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Callable, Collection, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -94,20 +94,32 @@ class RoomsWork:
 
 def render_items(
     spec: DatasetSpec,
-    indices: range,
+    indices: Sequence[int],
     batch: int,
     device: str = "auto",
     objects: Objects | None = None,
+    fields: Collection[str] | None = None,
+    kept: Collection[str] = (),
 ) -> Iterator[list[RenderedScene]]:
     """Yield the accepted items in order, a list of them whenever some are complete.
 
     While a batch is rendered, the next one is proposed. An item whose objects do not all show
     enough pixels is proposed again. No new item is begun while the oldest one that is incomplete is
     more than WINDOW batches behind.
+
+    Args:
+        indices: of the items; they ascend.
+        fields: what is asked for of `GroundTruth`; None for all. Truth that the spec asks for
+            needs what it follows from.
+        kept: what stays on the device, too, as in `renderer.launch_fields`.
     """
     objects = objects or objects_of(spec)
     views, traced = range(len(spec.views)), spec.shading == "path"
-    names = truth_fields(spec) + ([] if traced else picture_fields(spec))
+    pictures = [name for name in picture_fields(spec) if fields is None or name in fields]
+    needed = truth_fields(spec)
+    if fields is not None and not spec.truth:
+        needed = [name for name in needed if name in fields or name == "object_id"]
+    names = needed + ([] if traced else pictures)
     batch = max(1, batch // len(views))  # scenes
     proposals = ProposalQueue(spec, indices, objects)
     finished: dict[int, RenderedScene] = {}
@@ -115,11 +127,13 @@ def render_items(
 
     def propose() -> tuple[SceneArrays, SceneBatch] | None:
         last = min(len(indices), next_out + WINDOW * batch)
-        scenes = proposals.take(batch, indices.start + last)
+        scenes = proposals.take(batch, indices[last - 1] + 1 if last else 0)
         return None if scenes is None else (scenes, pack_arrays(spec, scenes, views, objects))
 
     def begin(proposed: tuple[SceneArrays, SceneBatch] | None) -> _Begun | None:
-        return None if proposed is None else (*proposed, launch_fields(proposed[1], names, device))
+        if proposed is None:
+            return None
+        return *proposed, launch_fields(proposed[1], names, device, kept)
 
     begun: _Begun | None = None
     while begun := begun or begin(propose()):
@@ -129,7 +143,9 @@ def render_items(
         masks = amodal_masks(packed, device) if "amodal" in spec.truth else None
         begun = begin(following)
         for item, shown in zip(
-            scenes.index.tolist(), _shown(scenes, packed, truth, masks, device), strict=True
+            scenes.index.tolist(),
+            _shown(scenes, packed, truth, masks, pictures, device),
+            strict=True,
         ):
             if shown is None:
                 proposals.refuse(item)
@@ -149,6 +165,7 @@ def _shown(
     batch: SceneBatch,
     truth: dict[str, Array],
     masks: Array | None,
+    pictures: Sequence[str],
     device: str,
 ) -> Iterator[RenderedScene | None]:
     """Yield each scene with its pixels, or None where some view shows too little of its objects.
@@ -164,9 +181,10 @@ def _shown(
             yield None
             continue
         pixels = {name: values[images] for name, values in truth.items()}
-        if spec.shading == "path":
+        if spec.shading == "path" and pictures:
             shown = batch.rows(images.start, images.stop)
-            pixels |= trace(shown, picture_fields(spec), device)
+            pixels |= trace(shown, pictures, device)
         whole = None if masks is None else masks[images]
-        pixels |= further_truth(batch, first, pixels, whole)
+        if spec.truth:
+            pixels |= further_truth(batch, first, pixels, whole)
         yield RenderedScene(scenes, row, batch, first, pixels, visible[images])

@@ -2,6 +2,7 @@
 
 import heapq
 from collections import Counter, defaultdict, deque
+from collections.abc import Sequence
 
 from scenegen.description.scene_arrays import SceneArrays, joined
 from scenegen.description.specs import DatasetSpec
@@ -14,9 +15,9 @@ RETRIES = 3  # least number of attempts that are drawn at once for an item that 
 
 
 class ProposalQueue:
-    """The proposals of a range of items, each of which is proposed until it is accepted."""
+    """The proposals of items that ascend, each of which is proposed until it is accepted."""
 
-    def __init__(self, spec: DatasetSpec, items: range, objects: Objects) -> None:
+    def __init__(self, spec: DatasetSpec, items: Sequence[int], objects: Objects) -> None:
         """Draw nothing yet; `objects` are what the scenes are made of."""
         self._spec, self._objects, self._items = spec, objects, items
         self._ahead = AHEAD_INTERIORS if spec.interior else AHEAD

@@ -87,31 +87,33 @@ def _with_partner(pairs: list[tuple[list[int], list[int]]]) -> Tensor:
 
 
 def relief_of_rows(
-    rooms: Rooms, run_folder: str | Path, progress: Progress = lambda done, total: None
+    rooms: Rooms, run_folder: str | Path | None, progress: Progress = lambda done, total: None
 ) -> Tensor:
     """Return the relief of all rows, (N, S, S) float16; 0 for those that have no partner.
 
-    Labels that the run's folder holds are read, the others found and written.
+    Labels that the run's folder holds are read, the others found and written; None for no folder.
 
     Raises SpecError as `matched_rows`; OSError; FileFormatError where the folder's labels are not
     those of these rooms.
     """
     pairs = pairs_of(rooms)
     matched = _with_partner(pairs)
-    folder = Path(run_folder) / FOLDER
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = None if run_folder is None else Path(run_folder) / FOLDER
+    if folder:
+        folder.mkdir(parents=True, exist_ok=True)
     relief = torch.zeros(len(rooms), *rooms.image.shape[2:], dtype=torch.float16)
     blocks = rooms.scene[matched] // BLOCK
     done = 0
     for block in sorted(set(blocks.tolist())):
         rows = matched[blocks == block]
-        path = folder / f"{block:05d}.safetensors"
-        if path.exists():
+        path = folder / f"{block:05d}.safetensors" if folder else None
+        if path and path.exists():
             relief[rows] = _read(path, relief[rows], rooms.fingerprint)
         else:
             maps = [relief_of_row(rooms, row, pairs[row]) for row in rows.tolist()]
             relief[rows] = torch.stack(maps).half()
-            save_tensors(path, {"relief": relief[rows]}, {"fingerprint": rooms.fingerprint})
+            if path:
+                save_tensors(path, {"relief": relief[rows]}, {"fingerprint": rooms.fingerprint})
         done += len(rows)
         progress(done, len(matched))
     return relief

@@ -12,12 +12,13 @@ from baselines.pix2shape.network.config import TAUGHT_DEPTH, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.questions import QuestionImages, for_questions
 from baselines.pix2shape.rooms import RoomImages
-from baselines.pix2shape.training.batches import Sources
+from baselines.pix2shape.training.batches import Sources, streamed_source
 from baselines.pix2shape.weights import METHOD, Card, open_weights
 from baselines.training.checkpoint import State, load_checkpoint
 from baselines.training.data import TrainingFiles, only, shared_questions, shared_rooms
 from baselines.training.questions import LABELED, UNLABELED, check_labels
 from baselines.training.run_folder import begun
+from baselines.training.streams import NEIGHBOURS, Shown, TrainingStreams
 from iqtt import QuestionsFile
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check, to_json
@@ -30,10 +31,11 @@ OF_QUESTIONS = (
 )  # fmt: skip
 ModelState = State[Card, Pix2Shape]
 Files = RoomsFile | tuple[QuestionsFile, QuestionsFile]  # questions: unlabelled, labelled
+FIRST = 1024  # rows of streams that the prior is fitted to
 
 
 def new_run(
-    data: TrainingFiles,
+    data: TrainingFiles | TrainingStreams,
     config: ModelConfig,
     *,
     labels: int = 0,
@@ -47,19 +49,19 @@ def new_run(
     The arguments are those of `train_run`. Raises SpecError where they and the data do not fit;
     as `open_weights`, and as the readers of the data.
     """
-    files = _tables(data)
+    files, shown = _tables(data, config)
     suited = _suited(config, files, labels, conditional)
     for name in chosen:
         value, needed = (functools.reduce(getattr, name.split("."), c) for c in (config, suited))
         if value != needed:
             hint = f"leave it out: {data.where}, with {labels} labels, decides it or has no use"
             raise SpecError(name, value, "nothing", hint)
-    sources = _sources(files, suited, labels)
+    sources = _sources(files, suited, labels, shown)
     card = Card(
         "pix2shape",
         suited,
         labels=labels,
-        data=sources.images.spec.to_json(),
+        data=shown.card()["data"] if shown else sources.images.spec.to_json(),
         fingerprint=sources.fingerprint,
         precision=precision,
         classes=sources.images.classes if suited.networks.classes else (),
@@ -71,7 +73,7 @@ def new_run(
 
 
 def resumed_run(
-    folder: Path, data: TrainingFiles, precision: str | None
+    folder: Path, data: TrainingFiles | TrainingStreams, precision: str | None
 ) -> tuple[ModelState, Sources]:
     """Return the state of a folder's checkpoint, and what it learns from.
 
@@ -82,22 +84,37 @@ def resumed_run(
     card = earlier.card
     expected = f"{card.precision}, as the run began with"
     check(precision in (None, card.precision), "precision", precision, expected)
-    sources = _sources(_tables(data), card.settings, card.labels)
+    files, shown = _tables(data, card.settings)
+    sources = _sources(files, card.settings, card.labels, shown)
     told = replace(card, fingerprint=sources.fingerprint)
     return begun(METHOD, told, earlier, data.where), sources
 
 
-def _tables(data: TrainingFiles) -> Files:
+def _tables(
+    data: TrainingFiles | TrainingStreams, config: ModelConfig
+) -> tuple[Files, Shown | None]:
+    """Return files, or the first rows of streams, and the streams."""
+    if isinstance(data, TrainingStreams):
+        more = NEIGHBOURS if config.matching and not data.hold_questions else {}
+        shown = data.shown(config.networks.size, config.seed, **more)
+        rows = shown.whole(FIRST)
+        block: Any = next(shown.blocks(0, rows, workers=0, rank=0, world_size=1))
+        return (block, block) if data.hold_questions else block, shown
     if not data.hold_questions:
-        return only(data.rooms(), "pix2shape")
+        return only(data.rooms(), "pix2shape"), None
     unlabelled, labelled = (
         only(data.questions(part), "pix2shape") for part in (UNLABELED, LABELED)
     )
-    return unlabelled, labelled
+    return (unlabelled, labelled), None
 
 
-def _sources(files: Files, config: ModelConfig, labels: int) -> Sources:
+def _sources(files: Files, config: ModelConfig, labels: int, shown: Shown | None) -> Sources:
     """Return what a run learns from; the labelled questions if some of their answers are used."""
+    if shown is not None:
+        if isinstance(files, tuple):
+            check_labels(files[1], labels)
+        first: Any = files[0] if isinstance(files, tuple) else files
+        return Sources(streamed_source(first, config), shown=shown)
     if isinstance(files, RoomsFile):
         return Sources(RoomImages(shared_rooms(files), config))
     unlabelled, labelled = files
@@ -108,7 +125,7 @@ def _sources(files: Files, config: ModelConfig, labels: int) -> Sources:
 
 def _suited(config: ModelConfig, files: Files, labels: int, conditional: bool) -> ModelConfig:
     """Return the configuration as the data needs it. Raises SpecError where they do not fit."""
-    if isinstance(files, RoomsFile):
+    if not isinstance(files, tuple):
         return _for_rooms(config, files.spec, labels, conditional)
     unlabelled = files[0]
     if conditional:

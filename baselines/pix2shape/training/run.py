@@ -26,6 +26,7 @@ from baselines.training.machine import Machine
 from baselines.training.processes import summed
 from baselines.training.rooms import read_rooms
 from baselines.training.run_folder import alone_in, check_new
+from baselines.training.streams import TrainingStreams
 from scenegen.common.errors import SceneGenError
 from scenegen.files.new_file import check_writable
 from scenegen.files.pictures import save_picture
@@ -37,7 +38,7 @@ PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch si
 
 def train_run(
     folder: str | Path,
-    data: TrainingFiles,
+    data: TrainingFiles | TrainingStreams,
     config: ModelConfig | None,
     machine: Machine,
     *,
@@ -89,7 +90,8 @@ def train_run(
     with alone_in(folder) if first else nullcontext(), readers_kept():
         if first:
             _check_folder(folder, checkpoint)
-        if isinstance(sources.images, RoomImages) and settings.matching:
+        stored = sources.shown is None
+        if isinstance(sources.images, RoomImages) and settings.matching and stored:
             _match(sources.images, folder, state, fabric, progress)
         state.to(fabric.device)
         iterations = Iterations(model, sources, began, machine.workers, fabric.autocast)
@@ -110,6 +112,7 @@ def train_run(
                 iterations,
                 learning_rate,
                 machine,
+                rows=sources.rows(settings),
                 prepare=lambda: settings.adversarial or fit_prior(model, sources),
                 progress=show,
             )

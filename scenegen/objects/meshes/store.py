@@ -8,7 +8,6 @@ import numpy as np
 
 from scenegen.common.recent import Recent
 from scenegen.objects.cache import DiskCache
-from scenegen.objects.meshes.colors import corner_colors
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.meshes.models import Model, load_model
@@ -61,6 +60,8 @@ class MeshStore:
 
     def _colors(self, name: str, model: Model) -> Array:
         """Return the own colours of a model. Raises BadMeshError."""
+        from scenegen.objects.meshes.colors import corner_colors  # imports trimesh, which is slow
+
         path = self._files[name].path
         try:
             mesh = model.vertices, model.faces

@@ -1,0 +1,151 @@
+"""Streams beside files of the same rows, once both are running: a Markdown table, and what follows.
+
+    python -m benchmarks.stream [--quick] [--device cuda]
+
+With --device, a stream is measured whose pixels stay on the device, beside one of numpy arrays.
+Images have 128x128 pixels, with depth and normals; questions have four images each, colour only.
+To leave the start out, each row is the difference between a run of 3 N rows and one of N.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from benchmarks.timing import Row, Speed, print_ratio, print_table, processors_busy
+
+STEP, ROWS = 0.04, 64  # seconds of a step of training that waits, and its images
+FIRST = "import scenegen; next(iter(scenegen.RoomStream('shapes', batch=64)))"
+
+
+def running(
+    what: str, preset: str, count: int, workers: int, folder: str, **device: Any
+) -> dict[str, Any]:
+    """Time the rows N to 3 N of a stream or a file of rooms or questions; `what` says which."""
+    import torch
+
+    from iqtt import QuestionStream, SplitSpec, make_split
+    from scenegen import RoomStream, make_dataset
+    from scenegen.description.presets import preset_spec
+    from scenegen.objects.sources import object_source
+
+    object_source(preset, cache_dir=f"{folder}/cache")
+
+    def make(rows: int) -> None:
+        how: dict[str, Any] = {"workers": workers, "overwrite": True}
+        if what == "rooms file":
+            make_dataset(f"{folder}/rooms.h5", preset_spec(preset), rows, **how)
+        elif what == "questions file":
+            spec = SplitSpec(distractors=preset, train=rows, labeled=0, val=0, test=0)
+            make_split(f"{folder}/split", spec, **how)
+        else:
+            stream = RoomStream if what == "rooms stream" else QuestionStream
+            for batch in stream(preset, batch=64, stop=rows, workers=workers, **device):
+                if device.get("on_device"):
+                    torch.from_dlpack(batch["depth"]).sum().item()  # waits for the device
+
+    make(3 * count)  # fills the caches
+    few, few_busy = processors_busy(lambda: make(count))
+    many, many_busy = processors_busy(lambda: make(3 * count))
+    seconds = many - few
+    images = 2 * count * (4 if "questions" in what else 1)
+    busy = (many * many_busy - few * few_busy) / seconds
+    return {"seconds": [seconds], "images": images, "busy": busy, "workers": workers}
+
+
+def rows(folder: str, quick: bool) -> Iterator[Row]:
+    """Yield the rows of the table."""
+    for what, preset, count in (
+        ("rooms file", "shapes", 10_000),
+        ("rooms stream", "shapes", 10_000),
+        ("rooms file", "shapenet", 4_000),
+        ("rooms stream", "shapenet", 4_000),
+        ("questions file", "mixed", 2_000),
+        ("questions stream", "mixed", 2_000),
+    ):
+        how = {"what": what, "preset": preset, "count": count // (5 if quick else 1)}
+        yield f"{what}, {preset}", "stream:running", {**how, "workers": 2, "folder": folder}
+
+
+def rows_on_device(folder: str, device: str, count: int) -> Iterator[Row]:
+    """Yield the rows of the table of a device."""
+    how = {"what": "rooms stream", "count": count, "workers": 0, "folder": folder}
+    for preset in ("shapes", "shapenet"):
+        for on_device in (False, True):
+            where = "stays there" if on_device else "to numpy"
+            more = {"preset": preset, "device": device, "on_device": on_device}
+            yield f"{preset}, {device}, {where}", "stream:running", {**how, **more}
+
+
+def waiting(steps: int) -> float:
+    """Return which share of its time a loop waits whose step takes STEP seconds for ROWS images."""
+    from scenegen import RoomStream
+
+    waited, batches = 0.0, iter(RoomStream("shapes", batch=ROWS, workers=2))
+    next(batches)
+    start = time.perf_counter()
+    for _ in range(steps):
+        asked = time.perf_counter()
+        next(batches)
+        waited += time.perf_counter() - asked
+        time.sleep(STEP)
+    return waited / (time.perf_counter() - start)
+
+
+def growth(count: int) -> float:
+    """Return by how many MiB the memory of a loop and its processes grows, of its last 9 tenths."""
+    from scenegen import RoomStream
+
+    def resident() -> int:
+        children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+        pages = (Path(f"/proc/{pid}/statm").read_text().split()[1] for pid in ("self", *children))
+        return sum(map(int, pages)) * os.sysconf("SC_PAGE_SIZE")
+
+    done, begun = 0, 0
+    for batch in RoomStream("shapes", batch=64, workers=2, stop=count):
+        done += len(batch["depth"])
+        if done >= count // 10 and not begun:
+            begun = resident()
+        if done + 64 >= count:
+            return (resident() - begun) / 2**20
+    return float("nan")
+
+
+def main() -> None:
+    """Print the table, and what is measured beside it."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="measure fewer rows")
+    parser.add_argument("--device", help="measure streams on a device alone")
+    options = parser.parse_args()
+    quick = options.quick
+    with tempfile.TemporaryDirectory(prefix="bench-") as folder:
+        Path(folder, "cache").mkdir()
+        if options.device:
+            count = 1_000 if quick else 20_000
+            print_table("once running", rows_on_device(folder, options.device, count), folder)
+            return
+        speeds = print_table("once running, 2 workers", rows(folder, quick), folder)
+    named: dict[str, Speed | None] = dict.fromkeys(name for name, *_ in rows("", quick))
+    named |= speeds
+    goals = {"rooms {}, shapes": 1.8, "rooms {}, shapenet": 1.3, "questions {}, mixed": 1.3}
+    for what, goal in goals.items():
+        stream, file = (named[what.format(kind)] for kind in ("stream", "file"))
+        print_ratio(what.format("stream / file"), stream, file, goal)
+    for _ in range(2):
+        start, used = time.perf_counter(), os.times().children_user
+        subprocess.run([sys.executable, "-c", FIRST], check=True)
+        seconds, processor = time.perf_counter() - start, os.times().children_user - used
+    cost = f"{seconds:.1f} s, {processor:.1f} s of processor"
+    print(f"- first batch of a second start: {cost}; goal 1.3 s")
+    print(f"- waiting, with a step of 40 ms for 64 images: {waiting(500):.1%}; goal below 10%")
+    count = 10_000 if quick else 50_000
+    print(f"- memory grows over {count:,} rooms by {growth(count):.0f} MiB; goal below 50 MB")
+
+
+if __name__ == "__main__":
+    main()
