@@ -15,6 +15,7 @@ scale is never negative, or a prediction that swaps near and far would count as 
   Wang et al. 2025 (MoGe), section 3.2 and its appendix.
 - disparity_scale_shift: 1 / max(s d + b, 1 / max(t)), where s d + b minimises
   sum (s d + b - 1 / t)^2, and d is the disparity, 1 / p. Source: Ranftl et al. 2020, section 5.
+  Another `cap` may take the place of max(t).
 """
 
 from typing import Literal, get_args
@@ -38,8 +39,10 @@ SMALLEST_SHARE = 1e-4  # of the largest depth: less is raised to this before it 
 STEPS = 200  # of the search of `l1_scale_shift`, which takes about ten
 
 
-def align(p: Array, t: Array, alignment: Alignment) -> Array:
+def align(p: Array, t: Array, alignment: Alignment, cap: float | None = None) -> Array:
     """Return predicted depth (N,) after an alignment to the true depth (N,), both finite.
+
+    `cap` is that of `depth_of_disparity`.
 
     Where the formula gives a negative scale or none (p is 0 throughout, or constant where a shift
     is fitted, too), the scale is 0, the optimum under s >= 0. Raises MeasureError on another
@@ -55,7 +58,7 @@ def align(p: Array, t: Array, alignment: Alignment) -> Array:
     if alignment == "scale_shift":
         return _least_squares_line(unit, t)
     if alignment == "disparity_scale_shift":
-        return depth_of_disparity(1.0 / np.maximum(unit, SMALLEST_SHARE), t)
+        return depth_of_disparity(1.0 / np.maximum(unit, SMALLEST_SHARE), t, cap)
     if alignment == "scale":
         scale = _ratio(float(unit @ t), float(unit @ unit))
     elif alignment == "scale_l1":
@@ -67,14 +70,14 @@ def align(p: Array, t: Array, alignment: Alignment) -> Array:
     return np.asarray(scale * unit + shift)
 
 
-def depth_of_disparity(d: Array, t: Array) -> Array:
+def depth_of_disparity(d: Array, t: Array, cap: float | None = None) -> Array:
     """Return depth (N,) of disparity (N,), known up to scale and shift, fitted to the true depth.
 
-    As `disparity_scale_shift`; no depth exceeds the largest true one.
+    As `disparity_scale_shift`; no depth exceeds `cap`, by default the largest true one.
     """
     target = 1.0 / t
     fitted = _least_squares_line(d / (float(np.abs(d).max()) or 1.0), target)
-    return np.asarray(1.0 / np.maximum(fitted, target.min()))
+    return np.asarray(1.0 / np.maximum(fitted, target.min() if cap is None else 1.0 / cap))
 
 
 def align_points(p: Array, t: Array, alignment: Alignment) -> Array:

@@ -58,6 +58,7 @@ def draw_scores(
     name: str = "",
     width: float = COLUMN,
     overwrite: bool = False,
+    labels: Sequence[str] = (),
 ) -> None:
     """Draw one score of several methods: a dot and an interval each, and the floor, dashed.
 
@@ -65,13 +66,15 @@ def draw_scores(
         path: to write; its suffix is one of SUFFIXES.
         name: of the score; by default the first one of the headline that all files have.
         width: inches.
+        labels: of the files; by default the names of their methods.
 
     Raises FigureError where the files are of two tasks, or one lacks the score; OSError.
     """
     name = _common(files, name)
     floor = _floor(files[0], name)
     with _figure(path, overwrite, width, 0.35 + 0.17 * len(files)) as axes:
-        for place, (file, label) in enumerate(zip(files, labels_of(files), strict=True)):
+        named = zip(files, labels or labels_of(files), strict=True)
+        for place, (file, label) in enumerate(named):
             color, marker = KINDS[kind_of(place)]
             _dot(axes, file.metrics[name], len(files) - place, color, marker, along="y")
             axes.text(-0.02, len(files) - place, label, ha="right", va="center",

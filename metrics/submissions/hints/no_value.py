@@ -5,11 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measured.reader import Images
 from metrics.submissions.problems import HINT, Problem, first_ids
 from metrics.submissions.reader import RoomPredictions
 from metrics.submissions.rules import LARGEST
 from scenegen.common.errors import FileFormatError
-from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 ROWS = 256  # that are looked at, spread evenly
@@ -17,7 +17,7 @@ FAR = 10.0  # spreads of the other values by which a number that several pixels 
 VERY_FAR = 10_000.0  # the same, of a number at a single pixel
 
 
-def no_value_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]:
+def no_value_hints(predictions: RoomPredictions, truth: Images) -> list[Problem]:
     """Return a hint where pixels of true surfaces hold a number that stands for "no value"."""
     entries = np.flatnonzero((predictions.rows >= 0) & (predictions.rows < len(truth)))
     spread = np.linspace(0, max(0, len(entries) - 1), ROWS).astype(np.int64)

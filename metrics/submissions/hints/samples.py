@@ -6,14 +6,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measured.reader import Images, MeasuredFile
 from metrics.submissions.reader import RoomPredictions
 from metrics.submissions.rules import LARGEST
 from scenegen.camera import pixel_directions, pixel_size
 from scenegen.common.errors import FileFormatError
-from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 ROWS = 24
+FEWEST_PIXELS = 20  # of measured depth in an image
 SIDE = 32  # pixels per side that hints look at, at most twice as many
 
 
@@ -58,7 +59,7 @@ class Sample:
         return np.asarray((self.rays * self.true_depth[..., None])[self.mask])
 
 
-def sample_rooms(predictions: RoomPredictions, truth: RoomsFile) -> list[Sample]:
+def sample_rooms(predictions: RoomPredictions, truth: Images) -> list[Sample]:
     """Return the usable ones of some rows that are spread evenly over a submission."""
     entries = np.flatnonzero((predictions.rows >= 0) & (predictions.rows < len(truth)))
     if len(entries) == 0:
@@ -76,7 +77,7 @@ def mirrored_grid(count: int, about: int) -> Array:
     return np.unique(np.concatenate([first, count - 1 - first]))
 
 
-def _sample(predictions: RoomPredictions, i: int, truth: RoomsFile) -> Sample | None:
+def _sample(predictions: RoomPredictions, i: int, truth: Images) -> Sample | None:
     row = int(predictions.rows[i])
     try:
         disparity = predictions.kind == "disparity"
@@ -84,6 +85,8 @@ def _sample(predictions: RoomPredictions, i: int, truth: RoomsFile) -> Sample | 
         normal = predictions.normal(i) if predictions.has_normals else None
     except FileFormatError:
         return None
+    if isinstance(truth, MeasuredFile):
+        return _measured_sample(depth, truth, row)
     height, width = depth.shape
     grid = np.ix_(mirrored_grid(height, SIDE), mirrored_grid(width, SIDE))
     fov = float(truth.read("camera/fov_y_degrees", row))
@@ -107,4 +110,24 @@ def _sample(predictions: RoomPredictions, i: int, truth: RoomsFile) -> Sample | 
         pose[:3, :3].T,
         pose[:3, 3],
         fov,
+    )
+
+
+def _measured_sample(depth: Array, truth: MeasuredFile, row: int) -> Sample | None:
+    """Return a sample of an image whose truth may be sparse: all its pixels are taken then."""
+    height, width = truth.size(row)
+    depth, true_depth = depth[:height, :width], truth.read("depth", row)[:height, :width]
+    if truth.dense:
+        grid = np.ix_(mirrored_grid(height, SIDE), mirrored_grid(width, SIDE))
+    else:
+        grid = np.ix_(np.arange(height), np.arange(width))
+    usable = (np.isfinite(true_depth) & (np.abs(depth) <= LARGEST))[grid]
+    if np.count_nonzero(usable) < FEWEST_PIXELS:
+        return None
+    rays = truth.rays(row, height, width)
+    # Without a camera, rays are those of no field of view: a distance along them is the depth.
+    rays = np.full((height, width, 3), (0.0, 0.0, -1.0)) if rays is None else rays
+    true, no = true_depth[grid].astype(np.float64), np.full((*usable.shape, 3), np.nan)
+    return Sample(
+        depth[grid], true, usable, rays[grid], 0.0, None, None, no, np.eye(3), np.zeros(3), np.nan
     )

@@ -122,6 +122,8 @@ def _size(comparison: Comparison) -> str:
     """Return over how many items methods are compared, in words."""
     if comparison.task == "rooms":
         return f"{comparison.items:,} images of {comparison.clusters:,} scenes"
+    if comparison.task == "measured":
+        return f"{comparison.items:,} images, {comparison.clusters:,} of them independent"
     return f"{comparison.items:,} questions"
 
 
@@ -174,8 +176,8 @@ def _probability(p: float) -> str:
 def _legend(comparison: Comparison) -> list[str]:
     """Return in sentences what the columns of a comparison say."""
     tests = {d.test for d in comparison.differences}
-    rooms = comparison.task == "rooms"
-    items, apart = ("scenes", "scenes") if rooms else ("questions", "shapes")
+    of_task = {"rooms": ("scenes", "scenes"), "measured": ("groups", "groups")}
+    items, apart = of_task.get(comparison.task, ("questions", "shapes"))
     if len(tests) > 1:
         test = "exact McNemar test; sign flips for means over several runs"
     elif tests == {SIGN_FLIP}:
@@ -192,7 +194,9 @@ def _legend(comparison: Comparison) -> list[str]:
         " as the differences spread here; none: no difference, or none can be told.",
         *(
             f"warning: {text}"
-            for text in (too_few_warning(comparison.clusters, "scenes") if rooms else ())
+            for text in (
+                too_few_warning(comparison.clusters, items) if items != "questions" else ()
+            )
         ),
     ]
 
@@ -235,7 +239,7 @@ def html_report(
         remark = ROOMS_REMARK if examples else _NO_PICTURES
         sections.append(Section("Scenes", remarks=[remark], examples=examples))
         sections += curves_section(files)
-    else:
+    elif comparison.task == "iqtt":
         sections += kinds_sections(files)
     return html_page(
         f"Compared with {comparison.reference}",
