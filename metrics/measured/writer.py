@@ -132,7 +132,8 @@ def _unit(normal: Array, item: Source) -> Array:
         raise TruthError(f"{item.name}: normal", f"shape {normal.shape}", f"{(*item.size, 3)}")
     vectors = np.where(np.isfinite(normal).all(axis=-1, keepdims=True), normal, 0.0).astype(float)
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+    unit = np.divide(vectors, length, out=np.zeros_like(vectors), where=length > 0.0)
+    return np.asarray(unit)
 
 
 def _padded(values: Array, height: int, width: int, fill: float) -> Array:

@@ -139,8 +139,10 @@ def _further(
         scores |= boundary_scores(fitted, truth.depth, mask)
     if normal is not None and truth.normal is not None:
         shown = mask & truth.normal.any(axis=-1)
-        angles = angular_errors_degrees(normal, truth.normal, shown) if shown.any() else []
-        scores |= normal_scores(np.asarray(angles, np.float64))
+        angles = np.zeros(0)
+        if shown.any():
+            angles = angular_errors_degrees(normal, truth.normal, shown)
+        scores |= normal_scores(angles)
     return scores
 
 

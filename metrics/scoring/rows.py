@@ -304,7 +304,8 @@ def _scorer(
 
 def _opened(job: Job, opening: ExitStack) -> RowScorer | MeasuredScorer:
     """Open the files of a job, until the stack is closed."""
-    truth = opening.enter_context(open_images(job[1]))
+    truth = open_images(job[1])
+    opening.enter_context(truth)
     files = [open_predictions(path, tried=identity) for path, identity in job[0]]
     for file in files:
         opening.enter_context(file)

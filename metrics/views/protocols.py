@@ -10,7 +10,7 @@ from metrics.scoring.metric_names import HEADLINE
 from metrics.scoring.records import ScoreFile
 from metrics.views.figures import COLUMN, draw_scores
 from metrics.views.score_tables import INTERVAL, score_cell, title_of
-from metrics.views.table import Table, make_table, to_markdown, to_text
+from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
 from scenegen.common.text_table import piped
 
 
@@ -33,7 +33,7 @@ def protocols_report(
 def protocols_table(scores: Sequence[ScoreFile]) -> Table:
     """Return the headline under each protocol."""
     names = [name for name in HEADLINE["measured"] if name in scores[0].metrics]
-    rows = []
+    rows: list[Sequence[Cell | str]] = []
     for file in scores:
         protocol = BY_NAME[file.protocol]
         share = f"{file.columns['pixels'].sum() / scores[0].columns['pixels'].sum():.0%}"

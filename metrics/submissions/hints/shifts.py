@@ -87,7 +87,7 @@ def _crop(rows: Array, columns: Array, size: tuple[int, int]) -> tuple[Array, Ar
         return rows, columns
     inside = np.argwhere(crop_mask((NYU,), *size))
     first, tall = inside[0], np.ptp(inside, axis=0) + 1
-    return tuple(  # type: ignore[return-value]
+    return tuple(
         (v + 0.5 - f) * n / t - 0.5
         for v, f, n, t in zip((rows, columns), first, size, tall, strict=True)
     )

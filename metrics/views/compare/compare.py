@@ -221,16 +221,18 @@ def _paired(
     weights = reference.weights
     if weights is not None:
         weight = weights[orders[1]][there]
-        x, y = (pooled_means_of(name, values, clusters, weight) for values in (a, b))
-        return _Paired(a, b, float(x.mean()), float(y.mean()), x - y, x - y, x - y)
+        ours, theirs = (pooled_means_of(name, v, clusters, weight) for v in (a, b))
+        apart = ours - theirs
+        value, reference_value = float(ours.mean()), float(theirs.mean())
+        return _Paired(a, b, value, reference_value, apart, apart, apart)
     apart = cluster_means(a - b, clusters)
-    both = [float(cluster_means(values, clusters).mean()) for values in (a, b)]
+    x, y = (float(cluster_means(values, clusters).mean()) for values in (a, b))
     if reference.task == "rooms":
-        return _Paired(a, b, *both, apart, apart, apart)
+        return _Paired(a, b, x, y, apart, apart, apart)
     shapes = reference.items.get("shape", reference.ids)[orders[1]][there]
     index = np.unique(shapes, return_inverse=True)[1]
     sums = np.bincount(index, apart).astype(np.float64)
-    return _Paired(a, b, *both, apart, linearised_means(apart, shapes)[:, 0], sums)
+    return _Paired(a, b, x, y, apart, linearised_means(apart, shapes)[:, 0], sums)
 
 
 def _interval(means: Array, seed: int, resamples: int) -> tuple[float | None, float | None]:
