@@ -19,7 +19,7 @@ command -v chromium > /dev/null || echo "No Chromium: tests of pages are skipped
 $(PIP) --no-compile -e '.[$(1)]'; status=$$?; wait; exit $$status
 endef
 
-.PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results fuzz torture harnesses dist clean
+.PHONY: demo demo-summary demo-model docs test test-all check bench bench-gpu results torture harnesses dist clean
 
 demo: $(VENV)/.runtime
 	mkdir -p demo
@@ -120,9 +120,6 @@ bench-gpu: $(VENV)/.test
 # Hours; stop it when you like, and start it again. RESULTS="--only questions --seeds 1" runs a part.
 results: $(VENV)/.model
 	$(BIN)/python -m benchmarks.results $(RESULTS)
-
-fuzz: $(VENV)/.test
-	$(BIN)/python -m fuzz --seconds 600 --corpus fuzz-corpus
 
 # Fifteen minutes of runs that meet kills, signals, full disks and more, and then go on.
 torture: $(VENV)/.test

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from baselines.picture import outline_mask, residual
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.submissions.layout import Shown
 from scenegen.camera import pixel_directions, pixel_size, transform_points
@@ -81,7 +81,8 @@ def _camera(rooms: RoomsFile, row: int) -> tuple[Array, float]:
 
 
 def _empty(rooms: RoomsFile, row: int) -> Array:
-    return empty_room(*_camera(rooms, row), rooms.spec.height, rooms.spec.width)[0]
+    size = rooms.spec.height, rooms.spec.width
+    return empty_room(*_camera(rooms, row), *size, rooms.room_size(row))[0]
 
 
 def _mask(rooms: RoomsFile, row: int) -> Array:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.features import nearest, of_length_one
+from baselines.features import cosines_with_reference, of_length_one
 from iqtt.files.reader import QuestionsFile, open_questions
 from iqtt.files.split import ANSWERS
 from metrics.prediction_writer import write_answers
@@ -119,7 +119,10 @@ def _cosines(
         pictures = srgb_bytes(decode_image(stored))
         count, shown = pictures.shape[:2]
         layers = features(pictures.reshape(-1, *pictures.shape[2:]))
-        yield [nearest(of_length_one(layer.reshape(count, shown, -1))) for layer in layers]
+        yield [
+            cosines_with_reference(of_length_one(layer.reshape(count, shown, -1)))
+            for layer in layers
+        ]
         progress(count)
 
 

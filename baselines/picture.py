@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from scenegen.camera import back_project, transform_points
 
 Array = NDArray[Any]

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.files.reader import open_questions
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.submissions.layout import Shown
 from scenegen.common.errors import SpecError
@@ -69,7 +69,7 @@ def write_room_baseline(
                     matrix = rooms.read("camera/world_from_camera", row)
                     fov = float(rooms.read("camera/fov_y_degrees", row))
                     size = rooms.spec.height, rooms.spec.width
-                    submission.add(row, *empty_room(matrix, fov, *size))
+                    submission.add(row, *empty_room(matrix, fov, *size, rooms.room_size(row)))
                 progress(1, len(rooms))
 
 

@@ -56,7 +56,7 @@ Make = Callable[[Path, str], Made]  # makes a file or folder at a path with a de
 
 def sets(count: int) -> Iterator[tuple[str, int, Make]]:
     """Yield name, number of images and function of each request, with `count` images or so."""
-    for name in PRESETS:
+    for name in (name for name, it in PRESETS.items() if not it.settings.get("interior")):
         views = len(preset_spec(name).views)
         scenes = max(1, count // views)
         yield f"rooms, `{name}`", scenes * views, partial(_rooms, name, scenes)

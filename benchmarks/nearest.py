@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.timing import repeat
-from metrics.measures.chamfer_hausdorff import NearestDistances, nearest_distances
-from metrics.measures.image_search import nearest_distances_on_image
+from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, nearest_distances
+from metrics.measures.surfaces.image_search import nearest_distances_on_image
 from scenegen.camera import back_project
 
 Array = NDArray[np.float64]

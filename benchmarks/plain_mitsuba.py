@@ -76,7 +76,7 @@ def questions(count: int, repeats: int, variant: str) -> dict[str, Any]:
     The cubes of a shape enter as one mesh, made outside the clock, in the camera's frame.
     """
     spec = SplitSpec()
-    batches = render_questions(spec, make_pools(spec), "train", 0, count)
+    batches = render_questions(make_pools(spec), "train", 0, count)
     made = [item.question for batch in batches for item in batch]
     _choose(variant)
     images = [_cubes(spec, question, i) for question in made for i in range(4)]

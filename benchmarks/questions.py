@@ -50,7 +50,7 @@ def pixels(count: int, repeats: int, cubes: bool) -> dict[str, Any]:
     from scenegen.rendering.renderer import launch_fields
 
     spec = SplitSpec()
-    made = render_questions(spec, make_pools(spec), "train", 0, count)
+    made = render_questions(make_pools(spec), "train", 0, count)
     batch = pack_questions(spec, [item.question for items in made for item in items])
     batch = replace(batch, cubes_only=cubes)
     record = measured(lambda: launch_fields(batch, ("image", "object_id"))(), repeats)  # noqa: PLW0108

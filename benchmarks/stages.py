@@ -54,7 +54,7 @@ def stages(preset: str, folder: str) -> Counter[str]:
         truth = timed("fetch", fetch)
         rooms = timed(
             "count visible pixels",
-            lambda: [room for room in _shown(scenes, packed, truth, None) if room],
+            lambda: [room for room in _shown(scenes, packed, truth.pixels(), None, "auto") if room],
         )
         done = timed("pack rows", lambda: pack_rooms(rooms, columns(spec), "gzip"))
         pixels = [values[0] for room in rooms for values in room.pixels.values()]

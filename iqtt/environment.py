@@ -108,7 +108,7 @@ def question(
     pools = _pools(spec)
     rng = item_rng(seed, index, Purpose.ENVIRONMENT)
     place, own_seed = int(rng.integers(answers)), int(rng.integers(1 << 62))
-    drawn = _first_within(replace(spec, seed=own_seed), pools, place, angle, device)
+    drawn = _first_within(replace(pools, spec=replace(spec, seed=own_seed)), place, angle, device)
     (pictures,) = draw_pictures(spec, [drawn], size, device)
     return EnvironmentQuestion(
         pictures=pictures,
@@ -170,16 +170,14 @@ class Questions(Sequence[dict[str, Any]]):
         return float(reading is not None and LETTERS[reading] == entry["answer"])
 
 
-def _first_within(
-    spec: SplitSpec, pools: Pools, place: int, angle: tuple[float, float], device: str
-) -> Question:
+def _first_within(pools: Pools, place: int, angle: tuple[float, float], device: str) -> Question:
     """Return the first candidate whose angle is within bounds and which shows every cube."""
     first = 0
     for count in ROUNDS:
         requests = [(candidate, place, 0) for candidate in range(first, first + count)]
-        for drawn in sample_questions(spec, pools, SPLIT, requests, Tally()):
+        for drawn in sample_questions(pools, SPLIT, requests, Tally()):
             within = angle[0] <= drawn.angle_degrees <= angle[1]
-            if within and shows_every_cube(spec, drawn, device):
+            if within and shows_every_cube(pools.spec, drawn, device):
                 return drawn
         first += count
     expected = f"a rotation of {angle[0]:g} to {angle[1]:g} degrees"

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from iqtt.audit.probes.rules import Probe, run_floor_probes
-from iqtt.audit.table import find_tables, read_table
+from iqtt.audit.table import open_paths, read_table
 from iqtt.files.make import make_split
 from iqtt.files.split import FILES
 from iqtt.floors import CHANCE, Floor, Measured, settings_of
@@ -76,8 +76,9 @@ def floor_specs(specs: Iterable[SplitSpec], count: int) -> dict[tuple[SplitSpec,
 
 def probe_file(path: Path, progress: Callable[[int], Any] = lambda done: None) -> tuple[Probe, ...]:
     """Run the probes without 3D that may beat chance on a file of labelled questions."""
-    source = next(source for source in find_tables([path]) if source.answered and source.count)
-    table = read_table(source, np.arange(source.count), progress)
+    with open_paths([path]) as opened:
+        name, questions = next(one for one in opened.items() if one[1].has_answers and len(one[1]))
+        table = read_table(name, questions, np.arange(len(questions)), progress)
     assert table.answers is not None
     return run_floor_probes(table.statistics, table.answers.astype(np.int64))
 

@@ -43,7 +43,6 @@ Fetch: TypeAlias = Callable[[], list[Rendered]]
 
 
 def render_questions(
-    spec: SplitSpec,
     pools: Pools,
     split: str,
     first: int,
@@ -61,7 +60,7 @@ def render_questions(
 
     Raises PlacementError where the bounded search finds no question that meets the spec.
     """
-    tally = tally or Tally()
+    spec, tally = pools.spec, tally or Tally()
     places = answer_positions(spec, split, first, count)
     pending = deque[Fetch]()
     begin, end = (rows.start, rows.stop) if rows else (0, count)
@@ -69,18 +68,16 @@ def render_questions(
     starts = [begin, *range(min(begin + few, end), end, SAMPLED), end]
     for start, stop in itertools.pairwise(starts):
         requests = [(first + i, int(places[i]), 0) for i in range(start, stop)]
-        sampled = sample_questions(spec, pools, split, requests, tally)
+        sampled = sample_questions(pools, split, requests, tally)
         for i in range(0, len(sampled), batch):
             pending.append(_launch(spec, sampled[i : i + batch], device))
             if len(pending) > AHEAD:
-                yield _checked(spec, pools, split, pending.popleft()(), tally, device)
+                yield _checked(pools, split, pending.popleft()(), tally, device)
     while pending:
-        yield _checked(spec, pools, split, pending.popleft()(), tally, device)
+        yield _checked(pools, split, pending.popleft()(), tally, device)
 
 
-def render_question(
-    spec: SplitSpec, pools: Pools, split: str, index: int, device: str = "auto"
-) -> Rendered:
+def render_question(pools: Pools, split: str, index: int, device: str = "auto") -> Rendered:
     """Make one question of a split again, bit for bit as its file has it.
 
     Args:
@@ -89,13 +86,14 @@ def render_question(
 
     Raises IndexError where the split has no such question.
     """
+    spec = pools.spec
     for first, count in groups(spec, split).values():
         if first <= index < first + count:
             place = int(answer_positions(spec, split, first, count)[index - first])
             tally = Tally()
-            questions = sample_questions(spec, pools, split, [(index, place, 0)], tally)
+            questions = sample_questions(pools, split, [(index, place, 0)], tally)
             done = _launch(spec, questions, device)()
-            return _checked(spec, pools, split, done, tally, device)[0]
+            return _checked(pools, split, done, tally, device)[0]
     raise IndexError(f"{split} has {getattr(spec, split)} questions, none with index {index}")
 
 
@@ -128,13 +126,14 @@ def _launch(spec: SplitSpec, questions: Sequence[Question], device: str) -> Fetc
 
 
 def _checked(
-    spec: SplitSpec, pools: Pools, split: str, done: list[Rendered], tally: Tally, device: str
+    pools: Pools, split: str, done: list[Rendered], tally: Tally, device: str
 ) -> list[Rendered]:
     """Make questions anew whose full images hide a cube after all."""
+    spec = pools.spec
     while hidden := [i for i, question in enumerate(done) if not _shows_all(spec, question)]:
         again = [done[i].question for i in hidden]
         requests = [(q.index, q.shapes.answer, q.attempt + 1) for q in again]
-        anew = sample_questions(spec, pools, split, requests, tally)
+        anew = sample_questions(pools, split, requests, tally)
         for i, question in zip(hidden, _launch(spec, anew, device)(), strict=True):
             done[i] = question
     return done

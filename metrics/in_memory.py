@@ -77,7 +77,12 @@ def evaluate_room(
         geometry.fov_y_degrees,
     )
     view = TrueView(
-        truth.depth, truth.normal, truth.object_id, truth.fov_y_degrees, truth.world_from_camera
+        truth.depth,
+        truth.normal,
+        truth.object_id,
+        truth.fov_y_degrees,
+        truth.world_from_camera,
+        truth.truth.get("room/size"),
     )
     reference = reference_of(view)
     scores = score_prediction(predicted, view, reference, non_finite=non_finite).scores

@@ -21,6 +21,11 @@ CONVENTIONS = (
     "world: right-handed, y up, room = unit box with floor y = 0 and walls x = 0, z = 0; camera:"
     " x right, y up, looks along -z; pixels: row 0 on top, centres at +0.5; see docs/conventions.md"
 )
+INTERIOR_CONVENTIONS = (
+    "world: right-handed, y up, metres, room = box from the origin to room/size with floor y = 0;"
+    " camera: x right, y up, looks along -z; pixels: row 0 on top, centres at +0.5; see"
+    " docs/interiors.md"
+)
 VARIANT = "(llvm_ad|cuda_ad|scalar)_rgb"  # of Mitsuba
 RELEASE = r"unknown|\d\S*"  # of a library that rendered
 FORMAT = Format(
@@ -34,7 +39,7 @@ FORMAT = Format(
         "mitsuba_version": RELEASE,
         "drjit_version": RELEASE,
         "llvm_version": RELEASE,
-        "conventions": re.escape(CONVENTIONS),
+        "conventions": f"{re.escape(CONVENTIONS)}|{re.escape(INTERIOR_CONVENTIONS)}",
         "creation_command": ".*",
         "fingerprint": DIGEST,
         TRUTH_DIGEST: DIGEST,
@@ -43,6 +48,13 @@ FORMAT = Format(
     },
     optional=frozenset((WITHHELD,)),
 )
+OTHER_PROPERTY = 40  # of the list of labels of NYU40, what has no label of its own
+NYU40 = {  # Gupta et al., "Perceptual organization and recognition of indoor scenes" (2013)
+    "armchair": 6, "bag": 37, "bed": 4, "book": 23, "books": 23, "box": 29, "cabinet": 3,
+    "chair": 5, "coffee_table": 7, "curtain": 16, "cushion": 18, "desk": 14, "floor_lamp": 35,
+    "lamp": 35, "nightstand": 32, "pendant": 35, "picture": 11, "rug": 20, "screen": 25,
+    "shelf": 15, "sofa": 6, "stool": 5, "table": 7,
+}  # fmt: skip
 # The datasets that scores depend on: the root attribute TRUTH_DIGEST is their joint digest.
 SCORED = (
     "depth",
@@ -54,7 +66,8 @@ SCORED = (
     "camera/fov_y_degrees",
 )
 # Sizes of axes that are the same in all files; those of the others follow from the spec.
-FIXED = {"channel": 3, "offset": 2, "xyz": 3, "matrix_row": 4, "matrix_column": 4, "coefficient": 2}
+FIXED = {"channel": 3, "offset": 2, "xyz": 3, "matrix_row": 4, "matrix_column": 4, "coefficient": 2,
+         "setting": 5}  # fmt: skip
 MATRIX = ("matrix_row", "matrix_column")
 
 
@@ -118,6 +131,15 @@ FIELDS = (
            "pixels that show the object"),
     _column("scene", (), "text", "-", "-", "full description of the scene, JSON"),
 )
+INTERIOR = (  # columns of closed rooms
+    _column("object/stands_on", ("object_slot",), "int8", "1", "object ids",
+           "what an object stands on: 0 the room (floor, wall, ceiling or sill), k the k-th object;"
+           " -1 in unused slots"),
+    _column("room/size", ("xyz",), "float64", "scene unit", "world", "inner size of the room"),
+    _column("exposure", ("setting",), "float64", "1", "-",
+           "how the picture was developed: factor of radiance, factors of red, green and blue, and"
+           " the exposed radiance that is white (docs/interiors.md has the tone curve)"),
+)
 FURTHER = {  # columns of `DatasetSpec.truth`, by its names
     "amodal": (
         _column("object/amodal_mask", ("object_slot", "y", "x"), "uint8",
@@ -149,7 +171,13 @@ FURTHER = {  # columns of `DatasetSpec.truth`, by its names
 
 def fields(spec: DatasetSpec) -> list[Column]:
     """Return the columns of a file that answers that spec, without the sizes of their axes."""
-    return [*FIELDS, *(column for name in spec.truth for column in FURTHER[name])]
+    interior = INTERIOR if spec.interior else ()
+    return [*FIELDS, *interior, *(column for name in spec.truth for column in FURTHER[name])]
+
+
+def conventions(spec: DatasetSpec) -> str:
+    """Return the root attribute of that name."""
+    return INTERIOR_CONVENTIONS if spec.interior else CONVENTIONS
 
 
 def columns(spec: DatasetSpec) -> list[Column]:
@@ -161,9 +189,15 @@ def columns(spec: DatasetSpec) -> list[Column]:
         "image": {"scale": 1 / 255 if spec.image_dtype == "uint8" else 1.0},
         "object/shape": {"names": list(spec.shapes)},
     }
+    if spec.interior:
+        more["image"]["encoding"] = "sRGB" if spec.image_dtype == "uint8" else "linear radiance"
+        numbers = [NYU40.get(name, OTHER_PROPERTY) for name in spec.shapes]
+        more["object/shape"]["nyu40"] = numbers
+    unit = "metre" if spec.interior else "scene unit"
     return [
         replace(
             field,
+            unit=field.unit.replace("scene unit", unit),
             shape=tuple(sizes[axis] for axis in field.axes or ()),
             dtype=spec.image_dtype if field.dtype == "image" else field.dtype,
             more=more.get(field.name, {}),

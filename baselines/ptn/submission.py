@@ -19,7 +19,7 @@ from baselines.ptn.rooms import SWAPPED, RoomImages
 from baselines.training.checkpoint import bundled, load_weights
 from baselines.training.images import Array
 from baselines.training.questions import Progress, each_question, is_question_file, open_test
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError

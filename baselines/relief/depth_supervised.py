@@ -26,7 +26,7 @@ def lessons_of(rooms: Rooms, settings: Settings, _folder: Path, _progress: Any) 
 
     def target(rows: Tensor) -> tuple[Tensor, Tensor]:
         poses, depth = rooms.world_from_camera[rows], depths[rows]
-        walls, _, _ = empty_rooms(poses, rooms.fov_y_degrees, settings.size)
+        walls, _, _ = empty_rooms(poses, rooms.fov_of(rows), settings.size)
         surface = depth.isfinite()
         return torch.where(surface, walls - depth, 0), surface.float()
 

@@ -54,6 +54,7 @@ class Batch:
         image: linear radiance, (B, 3, S, S), float16.
         pose, target_pose: of the image's camera and, if it is another one, of that asked for,
             (B, 4, 4).
+        fov_y_degrees: of both, a number for all or (B,).
         target, weight: relief, and how much each pixel counts, (B, S, S).
         inside: the object that each pixel lies inside, or 0, (B, S, S); None to learn relief alone.
         place: where windows lie, from 0 to 1, among the pixels that are inside objects, (B,).
@@ -62,6 +63,7 @@ class Batch:
     image: Tensor
     pose: Tensor
     target_pose: Tensor | None
+    fov_y_degrees: float | Tensor
     target: Tensor
     weight: Tensor
     inside: Tensor | None
@@ -116,7 +118,7 @@ def train(
 
         def losses(number: int) -> Iterator[Loss]:
             windows_only = number < (1 - WHOLE) * state.card.settings.iterations
-            loss = _loss(state.network, rooms.fov_y_degrees, next(batches), windows_only)
+            loss = _loss(state.network, next(batches), windows_only)
             yield Loss(loss, {"loss": loss})
 
         fit(folder, method, state, losses, learning_rate, machine, progress=progress)
@@ -149,6 +151,7 @@ def batches_of(rooms: Rooms, lessons: Lessons, settings: Settings, first: int) -
             rooms.image[rows],
             rooms.world_from_camera[rows],
             None if lessons.views is None else rooms.world_from_camera[seen],
+            rooms.fov_of(rows),
             target,
             weight,
             None if lessons.inside is None else lessons.inside[seen],
@@ -156,11 +159,11 @@ def batches_of(rooms: Rooms, lessons: Lessons, settings: Settings, first: int) -
         )
 
 
-def _loss(network: Relief, fov: float, batch: Batch, windows_only: bool) -> Tensor:
+def _loss(network: Relief, batch: Batch, windows_only: bool) -> Tensor:
     """Return the loss of a batch; where objects are told, of windows around them or of all."""
-    cameras = target_cameras = Cameras(batch.pose, fov)
+    cameras = target_cameras = Cameras(batch.pose, batch.fov_y_degrees)
     if batch.target_pose is not None:
-        target_cameras = Cameras(batch.target_pose, fov)
+        target_cameras = Cameras(batch.target_pose, batch.fov_y_degrees)
     channels = network.channels(batch.image.float(), cameras, target_cameras)
     target, weight, inside = batch.target, batch.weight, batch.inside
     if inside is not None and windows_only:

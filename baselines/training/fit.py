@@ -84,6 +84,7 @@ def fit(
         TrainingError: a loss, a gradient or a weight is not finite, or the GPU has too little
             memory. The files are those of the last checkpoint.
         LostProcessError: another process that trains with this one ended.
+        SpecError: a limit of time is over, or cannot be kept.
         OSError.
     """
     before, started = state.card.seconds, time.monotonic()
@@ -136,13 +137,17 @@ class _Plan:
     """How many iterations fit into a limit of time, by the pace of the last ones."""
 
     def __init__(self, machine: Machine, card: Card) -> None:
-        """Begin. Raises SpecError where several processes train, whose clocks differ."""
-        check(
-            processes() == 1, "minutes", machine.minutes, "no limit where several processes train"
-        )
-        self._machine, self._done, self._left = machine, card.iteration, machine.seconds_left()
+        """Begin.
+
+        Raises SpecError where the time is over already, or where several processes train, whose
+        clocks differ.
+        """
+        limit, left = f"{machine.minutes:g}", machine.seconds_left()
+        check(left > 0, "minutes", limit, "more: they passed while the data were read")
+        check(processes() == 1, "minutes", limit, "no limit where several processes train")
+        self._machine, self._done, self._left = machine, card.iteration, left
         self._iterations = card.settings.iterations if card.iteration else UNPLANNED
-        self._share = self._left / PLANS
+        self._share = left / PLANS
 
     def planned(self, card: CardT) -> CardT:
         """Return the card with as many iterations as there will be."""

@@ -12,11 +12,11 @@ from torch import Tensor
 from baselines.training.images import Array, channels_first, check_reducible, reduced
 from metrics.measures.shape import inside_objects
 from scenegen.common.errors import FileFormatError
-from scenegen.common.records import check
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.reader import RoomsFile
 
 FARTHEST = 1e4  # scene units; a camera farther away sees the whole room in less than a pixel
+WIDEST = 179.0  # degrees of a field of view
 UPRIGHT = 1e-3  # of products of a pose's axes, by which they may differ from those of a rotation
 
 
@@ -27,6 +27,7 @@ class Rooms:
     Attributes:
         image: linear radiance, (N, 3, S, S), float16.
         world_from_camera: (N, 4, 4).
+        fov_y_degrees: vertical angle of view: a number for all rows, or (N,) where they differ.
         scene: number of the scene, (N,); scenes of different files have different ones.
         angle: of the view, about the vertical axis from the scene's first one, degrees, (N,).
         rounded: whether radiance was stored in 8 bits.
@@ -38,7 +39,7 @@ class Rooms:
 
     image: Tensor
     world_from_camera: Tensor
-    fov_y_degrees: float
+    fov_y_degrees: float | Tensor
     scene: Tensor
     angle: Tensor
     rounded: bool
@@ -49,6 +50,11 @@ class Rooms:
     def __len__(self) -> int:
         return len(self.image)
 
+    def fov_of(self, rows: Tensor | Sequence[int]) -> float | Tensor:
+        """Return the angle of view of rows, a number for all or (B,)."""
+        fov = self.fov_y_degrees
+        return fov[rows] if isinstance(fov, Tensor) else fov
+
 
 def read_rooms(files: Sequence[RoomsFile], size: int, *, depth: bool = False) -> Rooms:
     """Read all rooms of files, their images reduced to size x size pixels.
@@ -57,26 +63,25 @@ def read_rooms(files: Sequence[RoomsFile], size: int, *, depth: bool = False) ->
         depth: whether depth and object ids are read, too.
 
     Raises FileFormatError where a camera or an image is not known or, if depth is asked for, an
-    image has none; SpecError where images cannot be reduced, or files have different fields of
-    view.
+    image has none; SpecError where images cannot be reduced.
     """
     parts, scenes = [], 0
     for file in files:
-        fov, first = file.spec.fov_y_degrees, files[0].spec.fov_y_degrees
-        expected = f"{first:g}, as {files[0].path} has"
-        check(fov == first, f"{file.path}: field of view", f"{fov:g} degrees", expected)
         part = _read_file(file, size, depth)
         parts.append(replace(part, scene=part.scene + scenes))
         scenes += int(part.scene.max()) + 1 if len(part) else 0
-    if len(parts) == 1:
-        return parts[0]
     names = [f.name for f in fields(Rooms) if isinstance(getattr(parts[0], f.name), Tensor)]
     together: dict[str, Any] = {
         name: torch.cat([getattr(part, name) for part in parts]) for name in names
     }
-    mark = " ".join(part.fingerprint for part in parts)
-    rounded = any(part.rounded for part in parts)
-    return replace(parts[0], **together, rounded=rounded, fingerprint=mark)
+    fov = together.pop("fov_y_degrees")
+    return replace(
+        parts[0],
+        **together,
+        fov_y_degrees=float(fov[0]) if len(fov.unique()) == 1 else fov.float(),
+        rounded=any(part.rounded for part in parts),
+        fingerprint=" ".join(part.fingerprint for part in parts),
+    )
 
 
 def _read_file(rooms: RoomsFile, size: int, depth: bool) -> Rooms:
@@ -96,7 +101,7 @@ def _read_file(rooms: RoomsFile, size: int, depth: bool) -> Rooms:
     return Rooms(
         torch.from_numpy(images),
         torch.from_numpy(poses),
-        rooms.spec.fov_y_degrees,
+        torch.from_numpy(bounded(rooms, "camera/fov_y_degrees", WIDEST)),
         torch.from_numpy(np.asarray(scene)),
         torch.from_numpy(np.asarray(angle)),
         rooms.spec.image_dtype == "uint8",

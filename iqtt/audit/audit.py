@@ -5,9 +5,8 @@ of it.
 """
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,8 @@ from iqtt.audit.proofs import explanations, images, kinds, splits, views
 from iqtt.audit.proofs import shapes as shape_proofs
 from iqtt.audit.proofs.shapes import Shapes
 from iqtt.audit.proofs.verdict import Proof
-from iqtt.audit.table import AuditTable, find_tables, lacking, read_table
+from iqtt.audit.table import AuditTable, read_table
+from iqtt.files.reader import QuestionsFile
 from scenegen.common.threads import one_thread
 from scenegen.files.row_file import writer_name
 from scenegen.files.sets.cluster import Cluster
@@ -107,40 +107,33 @@ def to_json(audits: Sequence[Audit]) -> str:
     return json.dumps(record, indent=2) + "\n"
 
 
-def question_count(paths: Sequence[str | Path]) -> int:
-    """Return how many questions `audit` will read. Raises as `audit`."""
-    return sum(source.count for source in find_tables(paths))
-
-
 @one_thread()
 def audit(
-    paths: Sequence[str | Path],
+    opened: Mapping[str, QuestionsFile],
     *,
+    lacking: Sequence[str] = (),
     probed: int = PROBED,
     progress: Callable[[int], Any] = lambda done: None,
     cluster: Cluster | None = None,
 ) -> Audit:
-    """Prove what can be proved of question files, and try to answer them without their shapes.
+    """Prove what can be proved of questions, and try to answer them without their shapes.
 
-    Files of answers are found beside the files of questions. Images are read once, in chunks.
+    Images are read once, in chunks.
 
     Args:
-        paths: question files, or folders of them; all ask questions of as many answers. Of a folder
-            of splits, audit each that `find_splits` gives.
+        opened: tables by name, as `table.open_paths` gives them.
+        lacking: what the result tells of files that are not there, as from `table.lacking`.
         probed: largest number of questions that probes look at, spread evenly.
         progress: is called with the number of questions that were read since the last call.
         cluster: whose workers read the images, which takes most of the time of large splits.
 
-    Raises:
-        OSError: no such file or folder, or a folder without question files.
-        FileFormatError: a file that is no question file, or damaged.
-        SpecError: no paths, or questions of different numbers of answers.
+    Raises FileFormatError where a file is damaged.
     """
-    sources = find_tables(paths)
-    measured = _spread([source.count if source.answered else 0 for source in sources], probed)
+    files = opened.values()
+    measured = _spread([len(t) if t.has_answers or t.has_truth else 0 for t in files], probed)
     tables = [
-        read_table(source, rows, progress, cluster)
-        for source, rows in zip(sources, measured, strict=True)
+        read_table(name, table, rows, progress, cluster)
+        for (name, table), rows in zip(opened.items(), measured, strict=True)
     ]
     shapes = shape_proofs.compare_shapes(tables)
     right = [
@@ -149,8 +142,7 @@ def audit(
     ]
     proofs = _prove(tables, shapes, right)
     probes = run_probes(_evidence(tables, shapes, right))
-    lacks = tuple(lacking(paths))
-    return Audit(tuple(map(_audited, tables, right)), tuple(proofs), probes, lacks)
+    return Audit(tuple(map(_audited, tables, right)), tuple(proofs), probes, tuple(lacking))
 
 
 def _spread(counts: Sequence[int], most: int) -> list[Array]:
@@ -255,5 +247,7 @@ def _audited(table: AuditTable, right: Array) -> AuditedTable:
     if table.answers is not None:
         answers = "stored"
     answered = int(np.count_nonzero(right[table.measured] >= 0))
-    path, split, mark = str(table.source.path), table.split, table.fingerprint
-    return AuditedTable(table.name, path, split, mark, len(table), answers, answered)
+    file = table.questions
+    return AuditedTable(
+        table.name, str(file.path), file.split, file.fingerprint, len(table), answers, answered
+    )

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from iqtt.audit.congruence import MIRROR_X, congruent_rows
+from iqtt.audit.proofs.shapes import whole_and_count
 from scenegen.common.errors import FileFormatError
 
 Array = NDArray[Any]
@@ -182,7 +183,7 @@ def _faults(place: str, question: Mapping[str, Any], distance: float) -> dict[st
     if len(set(counts)) > 1:
         faults["unlike cube counts"] = ", ".join(map(str, counts))
     for (cubes, _), name in zip(views, names, strict=True):
-        if not _in_one_piece(cubes):
+        if not whole_and_count(cubes[None, None])[0][0]:
             faults.setdefault("more than one piece", name)
     _check_key(question, faults)
     pictures = []
@@ -217,19 +218,6 @@ def _check_key(question: Mapping[str, Any], faults: dict[str, str]) -> None:
 
 def _same(a: Array, b: Array) -> bool:
     return len(a) == len(b) and bool(congruent_rows(a[None], b[None])[0])
-
-
-def _in_one_piece(cubes: Array) -> bool:
-    left = {tuple(cube) for cube in cubes.tolist()}
-    waiting = [left.pop()]
-    while waiting:
-        x, y, z = waiting.pop()
-        for step in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)):
-            cube = (x + step[0], y + step[1], z + step[2])
-            if cube in left:
-                left.remove(cube)
-                waiting.append(cube)
-    return not left
 
 
 def _depth_and_pixels(cubes: Array, rotation: Array, distance: float) -> tuple[Array, Array]:

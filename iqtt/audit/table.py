@@ -1,8 +1,9 @@
 """Find tables of questions, and read them for the audit: images once, in chunks."""
 
 import hashlib
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.audit.features.statistics import border, border_color, measure, silhouettes
-from iqtt.files.layout import NO_CUBE, SCORED
-from iqtt.files.reader import QuestionsFile, answers_beside, parts
+from iqtt.files.layout import FORMAT, NO_CUBE, SCORED
+from iqtt.files.reader import QuestionsFile, answers_beside, table_names
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.records import check
 from scenegen.files.content import ColumnDigest, column_digest, dataset_digest, joint_digest
+from scenegen.files.input_file import checking
 from scenegen.files.rows import content_problems as problems_of_file
 from scenegen.files.sets.cluster import Cluster
-from scenegen.files.sets.shards import OpenFile, name_of_set
+from scenegen.files.sets.shards import OpenFile, cut, name_of_set
 
 Array = NDArray[Any]
 ROLES = ("train", "val", "test", "test-answers")
@@ -31,41 +33,12 @@ TRUTH = (
 
 
 @dataclass(frozen=True, eq=False)
-class Source:
-    """Where a table of questions lies.
-
-    Attributes:
-        name: short name, such as "iqtt-train.h5 labeled"; no two tables have the same.
-        part: "labeled" or "unlabeled" of a training file, else "".
-        answers: the file with the answers, if it is another one.
-        answered: whether the right answers are known, from answers or from shapes.
-        count, images: number of questions, and of images of each.
-    """
-
-    name: str
-    path: Path
-    part: str
-    answers: Path | None
-    answered: bool
-    count: int
-    images: int
-
-    def anywhere(self) -> "Source":
-        """Return the same source for processes that are in another folder."""
-        answers = None if self.answers is None else self.answers.absolute()
-        return replace(self, path=self.path.absolute(), answers=answers)
-
-    def open(self) -> QuestionsFile:
-        """Open the table. Raises as `QuestionsFile`."""
-        return QuestionsFile(self.path, self.part, self.answers)
-
-
-@dataclass(frozen=True, eq=False)
 class AuditTable:
     """What was read of a table of Q questions: everything except the pixels.
 
     Attributes:
-        spec, split, fingerprint: as in the file; None for a released file.
+        name: short name, such as "iqtt-train.h5 labeled"; no two tables have the same.
+        questions: the open table.
         answers: which of the answers is right, (Q,); None if the file does not tell.
         truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
         contents: digest of each dataset that was read, by its file and its name there; empty if
@@ -80,11 +53,8 @@ class AuditTable:
         statistics: of those rows, as `statistics.measure` gives them.
     """
 
-    source: Source
-    spec: SplitSpec | None
-    split: str | None
-    fingerprint: str | None
-    image_dtype: str
+    name: str
+    questions: QuestionsFile
     answers: Array | None
     truth: dict[str, Array]
     contents: dict[tuple[Path, str], str]
@@ -98,14 +68,14 @@ class AuditTable:
     statistics: Array
 
     @property
-    def name(self) -> str:
-        """Name of the source."""
-        return self.source.name
+    def spec(self) -> SplitSpec | None:
+        """The settings of the file; None for a released one."""
+        return self.questions.spec
 
     @property
     def images(self) -> int:
         """Number of images of a question: the reference, and its answers."""
-        return self.source.images
+        return 1 + self.questions.answers
 
     @property
     def cubes(self) -> Array:
@@ -114,19 +84,21 @@ class AuditTable:
         return self.truth["cubes"] if self.truth else np.full(blank, NO_CUBE)
 
     def __len__(self) -> int:
-        return self.source.count
+        return len(self.digests)
 
 
-def find_tables(paths: Sequence[str | Path]) -> list[Source]:
-    """Find the tables of question files; of a folder, those of all its files.
+@contextmanager
+def open_paths(paths: Sequence[str | Path]) -> Iterator[dict[str, QuestionsFile]]:
+    """Open the tables of question files, by name; of a folder, those of all its files.
 
     Of a folder that `iqtt make-split` wrote these are iqtt-*.h5, of another all its *.h5, such as
-    the released ones. A file of answers stands for the file of questions beside it.
+    the released ones. A file of answers stands for the file of questions beside it, which is opened
+    with its answers.
 
     Raises:
         OSError: no such file or folder, or a folder without question files.
         FileFormatError: not a question file.
-        SpecError: no paths.
+        SpecError: no paths, or tables with questions of different numbers of answers.
     """
     check(len(paths) > 0, "paths", "none", "question files, or folders of them")
     files: dict[Path, Path] = {}
@@ -139,20 +111,20 @@ def find_tables(paths: Sequence[str | Path]) -> list[Source]:
             chosen = questions_file if questions_file.is_file() else file
             files.setdefault(chosen.resolve(), chosen)
     names = [path.name for path in files.values()]
-    sources: list[Source] = []
-    for path in files.values():
-        shown = path.name if names.count(path.name) == 1 else str(path)
-        for part in parts(path):
-            beside = answers_beside(path)
-            with QuestionsFile(path, part, beside) as questions:
-                name = f"{shown} {part}".rstrip()
-                answered = questions.has_answers or questions.has_truth
-                images = questions.read("questions", slice(0, 0)).shape[1]
-                sources.append(Source(name, path, part, beside, answered, len(questions), images))
-    counts = sorted({source.images - 1 for source in sources})
-    expected = "the same number in every file; audit the others apart"
-    check(len(counts) == 1, "answers of a question", " and ".join(map(str, counts)), expected)
-    return sources
+    tables: dict[str, QuestionsFile] = {}
+    with ExitStack() as stack:
+        for path in files.values():
+            shown = path.name if names.count(path.name) == 1 else str(path)
+            opened = stack.enter_context(OpenFile(path, FORMAT.kind))
+            with checking(opened.file):
+                parts = table_names(opened, QuestionsFile.CONTENT)
+            for part in parts:
+                table = QuestionsFile(opened, part, answers_beside(path))
+                tables[f"{shown} {part}".rstrip()] = stack.enter_context(table)
+        counts = sorted({table.answers for table in tables.values()})
+        expected = "the same number in every file; audit the others apart"
+        check(len(counts) == 1, "answers of a question", " and ".join(map(str, counts)), expected)
+        yield tables
 
 
 def find_splits(paths: Sequence[str | Path]) -> list[list[Path]]:
@@ -195,83 +167,91 @@ def _files(folder: Path) -> list[Path]:
 
 
 def read_table(
-    source: Source,
+    name: str,
+    questions: QuestionsFile,
     measured: Array,
     progress: Callable[[int], Any] = lambda done: None,
     cluster: Cluster | None = None,
 ) -> AuditTable:
-    """Read a table.
+    """Read an open table.
 
     Args:
         measured: rows to take statistics of, in rising order.
-        cluster: whose workers read the images; None for this process.
+        cluster: whose workers open the file again and read the images; None for this process.
         progress: is called with the number of questions that were read since the last call.
 
-    Raises OSError and FileFormatError as `QuestionsFile` and its `read`.
+    Raises OSError and FileFormatError as `QuestionsFile.read`.
     """
-    with source.open() as questions:
-        everything = slice(0, source.count)
-        names = TRUTH if questions.has_truth else ()
-        chunk = max(1, CHUNK_PIXELS // (source.images * questions.height * questions.width))
-        first = questions.read("questions", slice(0, min(chunk, source.count)))
-        background = border_color(first)
-        scans: list[tuple[Array, ...]] = []
-        digests_of_images: list[bytes] = []
-        step = chunk if cluster is None else CHUNKS * chunk
-        tasks = [
-            range(start, min(start + step, source.count)) for start in range(0, source.count, step)
-        ]
-        scan = partial(_scan_images, source.anywhere(), chunk, background, measured)
-        for parts, digest in map(scan, tasks) if cluster is None else cluster.in_order(scan, tasks):
-            scans += parts
-            digests_of_images.append(digest)
-            progress(sum(len(part[0]) for part in parts))
-        scans = scans or [_scan(first, background, measured)]
-        truth = {name: questions.read(name, everything) for name in names}
-        answers = questions.read("answers", everything) if questions.has_answers else None
-        read = truth if answers is None else {"answers": answers, **truth}
-        digests = {name: dataset_digest(values) for name, values in read.items()}
-        digests["questions"] = column_digest(digests_of_images)
-        contents = {questions.stored_at(name): digest for name, digest in digests.items()}
-        has_digests = questions.spec is not None  # released files tell no digests
-        scored = joint_digest({name: digests[name] for name in SCORED if name in digests})
-        return AuditTable(
-            source,
-            questions.spec,
-            questions.split,
-            questions.fingerprint,
-            questions.image_dtype,
-            answers,
-            truth,
-            contents if has_digests else {},
-            has_digests and questions.has_answers and scored != questions.stored_truth_digest,
-            background,
-            measured,
-            *map(np.concatenate, zip(*scans, strict=True)),
-        )
+    count, everything = len(questions), slice(None)
+    pixels = (1 + questions.answers) * questions.height * questions.width
+    chunk = max(1, CHUNK_PIXELS // pixels)
+    first = questions.read("questions", slice(0, min(chunk, count)))
+    background = border_color(first)
+    scans: list[tuple[Array, ...]] = []
+    digests_of_images: list[bytes] = []
+    tasks = cut(count, chunk if cluster is None else CHUNKS * chunk)
+    opening: Callable[[], AbstractContextManager[QuestionsFile]] = questions.reopener()
+    if cluster is None:
+        opening = lambda: nullcontext(questions)  # noqa: E731
+    scan = partial(_scan_images, opening, chunk, background, measured)
+    for parts, digest in map(scan, tasks) if cluster is None else cluster.in_order(scan, tasks):
+        scans += parts
+        digests_of_images.append(digest)
+        progress(sum(len(part[0]) for part in parts))
+    scans = scans or [_scan(first, background, measured)]
+    names = TRUTH if questions.has_truth else ()
+    truth = {name: questions.read(name, everything) for name in names}
+    answers = questions.read("answers", everything) if questions.has_answers else None
+    read = truth if answers is None else {"answers": answers, **truth}
+    digests = {name: dataset_digest(values) for name, values in read.items()}
+    digests["questions"] = column_digest(digests_of_images)
+    contents = {questions.stored_at(name): digest for name, digest in digests.items()}
+    has_digests = questions.spec is not None  # released files tell no digests
+    scored = joint_digest({name: digests[name] for name in SCORED if name in digests})
+    return AuditTable(
+        name,
+        questions,
+        answers,
+        truth,
+        contents if has_digests else {},
+        has_digests and questions.has_answers and scored != questions.stored_truth_digest,
+        background,
+        measured,
+        *map(np.concatenate, zip(*scans, strict=True)),
+    )
 
 
 def content_problems(tables: Sequence[AuditTable]) -> list[str]:
-    """Return what is not as the digests of the tables' files say; each file is opened once.
+    """Return what is not as the digests of the tables' files say.
 
-    Raises OSError and FileFormatError as `open_file`.
+    Raises FileFormatError where a file cannot be read.
     """
     wrong = "the answers, and what else scores depend on, are not those of its truth_digest"
     problems = [f"{table.name}: {wrong}" for table in tables if table.truth_changed]
+    files = {Path(opened.file.filename): opened for table in tables for opened in _opened(table)}
     contents = {place: digest for table in tables for place, digest in table.contents.items()}
     for path in dict.fromkeys(path for path, _ in contents):
         digests = {name: digest for (where, name), digest in contents.items() if where == path}
-        with OpenFile(path, "question file") as opened:
-            problems += [f"{path.name}: {text}" for text in problems_of_file(opened, digests)]
+        problems += [f"{path.name}: {text}" for text in problems_of_file(files[path], digests)]
     return problems
 
 
+def _opened(table: AuditTable) -> list[OpenFile]:
+    """Return the open file of a table, and that of its answers if it is another one."""
+    beside = table.questions.beside
+    return [table.questions.opened, *([] if beside is None else [beside.opened])]
+
+
 def _scan_images(
-    source: Source, chunk: int, background: Array, measured: Array, rows: range
+    opening: Callable[[], AbstractContextManager[QuestionsFile]],
+    chunk: int,
+    background: Array,
+    measured: Array,
+    rows: range,
 ) -> tuple[list[tuple[Array, ...]], bytes]:
     """Return what `_scan` finds in these rows, `chunk` at a time, and the digests of the rows."""
     scans, digest = [], ColumnDigest(keep_rows=True)
-    with source.open() as questions:
+    with opening() as questions:
         for start in range(rows.start, rows.stop, chunk):
             stop = min(start + chunk, rows.stop)
             images = questions.read("questions", slice(start, stop))

@@ -3,8 +3,10 @@
 Heavy modules are imported inside the commands, so that `--help` is fast.
 """
 
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -112,8 +114,8 @@ def audit(
     """
     from iqtt.audit import report
     from iqtt.audit.audit import audit as audit_files
-    from iqtt.audit.audit import question_count, to_json
-    from iqtt.audit.table import find_splits
+    from iqtt.audit.audit import to_json
+    from iqtt.audit.table import find_splits, lacking, open_paths
     from scenegen.files.new_file import check_writable, write_text
     from scenegen.files.row_file import program_version
 
@@ -124,13 +126,14 @@ def audit(
     if cubes is not None:
         ctx.exit(_audit_cubes(cubes, json_path, overwrite))
     groups = find_splits(splits)
-    with (
-        on_scheduler(scheduler, 0, program_version) as cluster,
-        progress_bar(sum(map(question_count, groups)), "question") as bar,
-    ):
+    with on_scheduler(scheduler, 0, program_version) as cluster, ExitStack() as stack:
+        opened = [stack.enter_context(open_paths(group)) for group in groups]
+        count = sum(len(table) for tables in opened for table in tables.values())
+        bar = stack.enter_context(progress_bar(count, "question"))
+        how: dict[str, Any] = {"probed": probed, "progress": bar.update, "cluster": cluster}
         found = [
-            audit_files(group, probed=probed, progress=bar.update, cluster=cluster)
-            for group in groups
+            audit_files(tables, lacking=lacking(group), **how)
+            for tables, group in zip(opened, groups, strict=True)
         ]
     if json_path:
         write_text(json_path, to_json(found), overwrite)

@@ -10,7 +10,7 @@ from typing import Any
 from iqtt.files.reader import QuestionsFile
 from iqtt.files.split import MANIFEST, split_part, split_plan
 from iqtt.files.work import QuestionsWork
-from iqtt.questions.distractors import make_pools
+from iqtt.questions.distractors import Pools, make_pools
 from iqtt.questions.specs import SUITE, SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.render import DEFAULT_BATCH
@@ -42,6 +42,7 @@ def make_split(
     secret: bool = False,
     cluster: Cluster | None = None,
     progress: Callable[[int], Any] = lambda done: None,
+    pools: Pools | None = None,
 ) -> Tally:
     """Write the files of a split to a folder, each of which appears when it is complete.
 
@@ -60,6 +61,7 @@ def make_split(
         secret: keep the seed out of the file of the test answers too.
         cluster: whose workers make the files; all of them must see the folder, or it is a URL.
         progress: is called with the number of questions that were written since the last call.
+        pools: of the spec, where they are made already.
 
     Returns how many views were proposed and refused.
 
@@ -74,7 +76,7 @@ def make_split(
     plan = split_plan(spec, {"variant": variant, **versions()}, compression, command, secret)
     tally = Tally()
     with _folder(as_place(folder)) as place:
-        work = QuestionsWork(spec, make_pools(spec), batch, device, compression)
+        work = QuestionsWork(pools or make_pools(spec), batch, device, compression)
         make_set(
             place / MANIFEST, plan, work, shard_size,
             workers=workers or useful_workers(count * (1 + spec.answers), variant),
@@ -103,11 +105,11 @@ def make_suite(
     }
     tally, complete = Tally(), 0
     with _folder(as_place(folder)) as home:
-        for of_split in specs.values():
-            make_pools(of_split)
+        pools = {name: make_pools(of_split) for name, of_split in specs.items()}
         for name, of_split in specs.items():
+            how: dict[str, Any] = {"pools": pools.pop(name), "overwrite": overwrite, **options}
             try:
-                tally.add(make_split(home / name, of_split, overwrite=overwrite, **options))
+                tally.add(make_split(home / name, of_split, **how))
             except FileExistsError:
                 complete += 1
         if complete == len(specs):

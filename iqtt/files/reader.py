@@ -162,14 +162,14 @@ class QuestionsFile(RowFile):
         """
         self.spec: SplitSpec | None = None
         self.fingerprint: str | None = None
-        self.beside: AnswersFile | None = None
+        self.beside: QuestionsFile | None = None
         self.height, self.width, self.image_dtype = 0, 0, ""
         self._known_answers: Array | None = None
         self._part = part
         super().__init__(path if isinstance(path, OpenFile) else OpenFile(path, FORMAT.kind))
         if answers is not None:
             try:
-                self._join(answers)
+                self.join(answers)
             except BaseException:
                 self.close()
                 raise
@@ -250,14 +250,21 @@ class QuestionsFile(RowFile):
         if self.spec is not None:
             self._schema["answers"] = self.opened.file[self.part or "/"], answer_column()
 
-    def _join(self, answers: str | Path) -> None:
-        """Add answers and truth of another file, if they belong to the questions of this one."""
+    def join(self, answers: "str | Path | QuestionsFile") -> None:
+        """Add answers and truth of another file, which is closed with this one.
+
+        Raises SpecError where this file has its own, and FileFormatError where they belong to the
+        questions of another one.
+        """
+        place = answers.path if isinstance(answers, QuestionsFile) else answers
         if self.has_answers:
-            raise SpecError("answers", answers, f"none, as {self.path} has its own")
-        self.beside = beside = AnswersFile(answers, self.part)
+            raise SpecError("answers", place, f"none, as {self.path} has its own")
+        if not isinstance(answers, QuestionsFile):
+            answers = AnswersFile(answers, self.part)
+        self.beside = beside = answers
         if (len(beside), beside.fingerprint) != (len(self), self.fingerprint):
             expected = f"{_identity(self)}, as in {self.path}"
-            raise FileFormatError(f"{answers}: answers", _identity(beside), expected)
+            raise FileFormatError(f"{place}: answers", _identity(beside), expected)
         self._stored |= beside._stored
         self._schema |= beside._schema
         self._known_answers = beside._known_answers
@@ -329,8 +336,8 @@ class QuestionsFile(RowFile):
 
     def reopener(self) -> "Callable[[], QuestionsFile]":
         """Return a function, which can be pickled, that opens the same table again."""
-        answers = None if self.beside is None else self.beside.path
-        return partial(type(self), self.path, self.part, answers)
+        answers = None if self.beside is None else self.beside.path.absolute()
+        return partial(type(self), self.path.absolute(), self.part, answers)
 
     def close(self) -> None:
         """Close the file, and the file of its answers; idempotent."""

@@ -1,6 +1,7 @@
 """Check the files of a split: checksums or digests, rows, and some questions made again."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -52,20 +53,21 @@ def verify_split(
         checks += _against_manifest(folder, read_manifest(folder / MANIFEST), progress)
         if not all(check.ok for check in checks):
             return checks
-    told: dict[str, str] = {}
-    spec: SplitSpec | None = None
-    for name in names:  # the file of answers, which may tell the seed, comes after the others
-        tables = open_tables(folder / name)
-        with tables[0]:
+    with ExitStack() as stack:
+        opened: dict[str, list[QuestionsFile]] = {}
+        spec: SplitSpec | None = None
+        for name in names:  # the file of answers, which may tell the seed, comes after the others
+            tables = opened[name] = open_tables(folder / name)
+            stack.enter_context(tables[0])
             problems = [problem for table in tables for problem in table.problems()]
             problems += content_problems(tables[0].opened, {})
-            told, spec = tables[0].attributes, tables[0].spec
-        checks.append(listed_check(name, "every value and attribute, by SHA-256", problems))
-        if spec is None:
-            raise FileFormatError(folder / name, "a released file", "one of iqtt make-split")
-    assert spec is not None
-    again = spec if seed is None else replace(spec, seed=seed)
-    return [*checks, _made_again(folder, again, told, items, device)]
+            checks.append(listed_check(name, "every value and attribute, by SHA-256", problems))
+            spec = tables[0].spec
+            if spec is None:
+                raise FileFormatError(folder / name, "a released file", "one of iqtt make-split")
+        assert spec is not None
+        again = spec if seed is None else replace(spec, seed=seed)
+        return [*checks, _made_again(opened, again, items, device)]
 
 
 def _against_manifest(
@@ -98,29 +100,31 @@ def _gaps(manifest: Manifest, spec: SplitSpec, name: str) -> Iterator[str]:
 
 
 def _made_again(
-    folder: Path, spec: SplitSpec, told: dict[str, str], items: int, device: str
+    opened: Mapping[str, Sequence[QuestionsFile]], spec: SplitSpec, items: int, device: str
 ) -> Check:
-    """Make some questions of each file again; `told` are the texts of a file of the split."""
+    """Make some questions of each file again; `opened` are the tables of each, by its name."""
     title = "made again from the seed"
     if spec == spec.public():
         return Check(title, True, "not checked: the files do not tell the seed")
     here = {"format_version": FORMAT_VERSION, **exact_kind(select_variant(device))}
-    others = made_elsewhere(told, here)
+    told = [tables[0].attributes for tables in opened.values()]
+    others = made_elsewhere(told[-1], here)
     if others:
         return Check(title, True, f"not checked: {'; '.join(others)}")
     pools, wrong, count = make_pools(spec), [], 0
     for split in SPLITS:
-        path, answers = folder / FILES[split][0], folder / FILES[split][-1]
-        for part, (first, rows) in groups(spec, split).items() if path.is_file() else ():
-            beside = answers if answers != path and answers.is_file() else None
-            with QuestionsFile(path, part, beside) as questions:
-                for row in spread_rows(rows, items):
-                    again = render_question(spec, pools, split, first + row, device)
-                    stored, count = questions[row], count + 1
-                    same = np.array_equal(stored.images, again.images)
-                    if stored.truth is not None:
-                        cubes = again.question.shapes.cubes
-                        same &= np.array_equal(stored.truth.cubes, cubes)
-                    if not same:
-                        wrong.append(f"{path.name} {part} row {row}".replace("  ", " "))
+        name, answers = FILES[split][0], FILES[split][-1]
+        for part, (first, rows) in groups(spec, split).items() if name in opened else ():
+            table = opened[name][0].table(part)
+            if answers != name and answers in opened:
+                table.join(opened[answers][0])
+            for row in spread_rows(rows, items):
+                again = render_question(pools, split, first + row, device)
+                stored, count = table[row], count + 1
+                same = np.array_equal(stored.images, again.images)
+                if stored.truth is not None:
+                    cubes = again.question.shapes.cubes
+                    same &= np.array_equal(stored.truth.cubes, cubes)
+                if not same:
+                    wrong.append(f"{name} {part} row {row}".replace("  ", " "))
     return listed_check(title, f"{count} questions, bit for bit", wrong)

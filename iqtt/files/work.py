@@ -32,12 +32,11 @@ class QuestionsWork:
     """What is done to questions; a `making.Work`.
 
     Attributes:
-        spec, pools: what they show.
+        pools: what they show.
         batch: questions rendered at once.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
     """
 
-    spec: SplitSpec
     pools: Pools
     batch: int
     device: str
@@ -51,10 +50,11 @@ class QuestionsWork:
     def packed_rows(self, block: Block, workers: int) -> Generator[Packed, None, Tally]:
         """Render questions in order, and meanwhile pack them in threads; return their tally."""
         share_processors(workers, self.device)
+        spec = self.pools.spec
         split, part, tally = block.part.bundle, block.part.name, Tally()
-        first, count = groups(self.spec, split)[part]
+        first, count = groups(spec, split)[part]
         rendered = render_questions(
-            self.spec, self.pools, split, first, count,
+            self.pools, split, first, count,
             rows=block.items, batch=self.batch, device=self.device, tally=tally,
         )  # fmt: skip
         pieces = (some[i : i + PACKED] for some in rendered for i in range(0, len(some), PACKED))
@@ -63,7 +63,7 @@ class QuestionsWork:
             values = {
                 "questions": [one.images for one in questions],
                 "answers": np.array([one.question.shapes.answer for one in questions], np.uint8),
-                **_truth(self.spec, questions),
+                **_truth(spec, questions),
             }
             sheets = block.part.sheets
             return [pack_rows(values, sheet.columns, self.compression) for sheet in sheets]

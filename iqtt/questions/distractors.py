@@ -78,9 +78,10 @@ def question_rng(
 
 @dataclass(frozen=True, eq=False)
 class Pools:
-    """The shapes that questions are drawn from.
+    """The shapes that questions of a split are drawn from.
 
     Attributes:
+        spec: what the questions are.
         classes: the shape classes of training, validation and test, by number of cubes.
         matched: for the same, the rows of matched classes (`matched_rows`); empty where no question
             needs them.
@@ -88,6 +89,7 @@ class Pools:
             that no number allows are left out.
     """
 
+    spec: SplitSpec
     classes: dict[int, tuple[Array, ...]]
     matched: dict[int, tuple[Array, ...]]
     sizes: dict[str, tuple[int, ...]]
@@ -108,9 +110,9 @@ def make_pools(spec: SplitSpec) -> Pools:
     matched = {}
     if "matched" in spec.kinds:
         matched = {n: tuple(map(matched_rows, parts)) for n, parts in classes.items()}
-    pools = Pools(classes, matched, {})
+    pools = Pools(spec, classes, matched, {})
     for kind in spec.kinds:
-        allowed = tuple(n for n in classes if _has_distractors(spec, pools, kind, n))
+        allowed = tuple(n for n in classes if _has_distractors(pools, kind, n))
         if allowed:
             pools.sizes[kind] = allowed
     if not pools.sizes:
@@ -125,8 +127,9 @@ def make_pools(spec: SplitSpec) -> Pools:
     return pools
 
 
-def _has_distractors(spec: SplitSpec, pools: Pools, kind: str, cubes: int) -> bool:
+def _has_distractors(pools: Pools, kind: str, cubes: int) -> bool:
     """Return whether at least every twentieth reference of every split has such distractors."""
+    spec = pools.spec
     for split in range(len(SPLITS)):
         if len(pools.classes[cubes][split]) < (spec.answers if kind == "other" else 1):
             return False
@@ -136,7 +139,7 @@ def _has_distractors(spec: SplitSpec, pools: Pools, kind: str, cubes: int) -> bo
             item_rng(spec.seed or 0, cubes, Purpose.CATALOGUE, 1 + split * TRIALS + trial)
             for trial in range(TRIALS)
         ]
-        made = _draw(spec, pools, kind, cubes, split, rngs)
+        made = _draw(pools, kind, cubes, split, rngs)
         if sum(drawn is not None for drawn in made) < TRIALS / 20:
             return False
     return True
@@ -157,9 +160,7 @@ def answer_positions(spec: SplitSpec, split: str, first: int, count: int) -> Arr
     return np.asarray(rng.permutation(np.arange(count) % spec.answers).astype(np.uint8))
 
 
-def draw_shapes(
-    spec: SplitSpec, pools: Pools, split: str, requests: Sequence[tuple[int, int]]
-) -> list[Drawn]:
+def draw_shapes(pools: Pools, split: str, requests: Sequence[tuple[int, int]]) -> list[Drawn]:
     """Draw the shapes of some questions.
 
     Args:
@@ -169,7 +170,8 @@ def draw_shapes(
     Raises PlacementError where no reference is found that has the distractors asked for.
     """
     rngs = [
-        question_rng(spec, split, index, Purpose.QUESTION, attempt) for index, attempt in requests
+        question_rng(pools.spec, split, index, Purpose.QUESTION, attempt)
+        for index, attempt in requests
     ]
     kinds = tuple(pools.sizes)
     groups: dict[tuple[str, int], list[int]] = {}
@@ -181,7 +183,7 @@ def draw_shapes(
         rows = waiting
         for _ in range(SHAPE_ATTEMPTS):
             generators = [rngs[i] for i in rows]
-            made = _draw(spec, pools, kind, cubes, SPLITS.index(split), generators)
+            made = _draw(pools, kind, cubes, SPLITS.index(split), generators)
             for i, shapes in zip(rows, made, strict=True):
                 drawn[i] = shapes
             rows = [i for i in rows if drawn[i] is None]
@@ -190,8 +192,8 @@ def draw_shapes(
         if rows:
             raise PlacementError(
                 f"{split} question {requests[rows[0]][0]}",
-                f"none of {SHAPE_ATTEMPTS} {spec.shapes} shapes of {cubes} cubes to have {kind!r}"
-                " distractors that no other split may use",
+                f"none of {SHAPE_ATTEMPTS} {pools.spec.shapes} shapes of {cubes} cubes to have"
+                f" {kind!r} distractors that no other split may use",
                 hint="take more --cubes, or another kind of --distractors",
             )
     return [shapes for shapes in drawn if shapes is not None]
@@ -202,15 +204,10 @@ def _either_hand(cubes: Array, rng: np.random.Generator) -> Array:
 
 
 def _draw(
-    spec: SplitSpec,
-    pools: Pools,
-    kind: str,
-    cubes: int,
-    split: int,
-    rngs: Sequence[np.random.Generator],
+    pools: Pools, kind: str, cubes: int, split: int, rngs: Sequence[np.random.Generator]
 ) -> list[Drawn | None]:
     """Draw the shapes of a question with each generator; None where they are not all found."""
-    pool = pools.classes[cubes][split]
+    spec, pool = pools.spec, pools.classes[cubes][split]
     if kind in ("near", "mirror"):
         return _near_questions(spec, kind, pool, split, rngs)
     if kind == "mirror-pair":
@@ -296,8 +293,8 @@ def arrange(drawn: Drawn, answer: int, rng: np.random.Generator) -> Shapes:
 
 
 # Which of (shape, its mirror image, near shape) are the right answer and the two distractors, and
-# of what kinds these are. Where the near shape is right, the shape is near to it, and its mirror
-# image is `near-mirror`.
+# of what kinds these are. Where the mirror image is right, the near shape is near to what that
+# mirrors, so it is `near-mirror`. Where the near shape is right, the mirror image is so to it.
 _MIRROR_ROLES = np.array(
-    [[[0, 1, 2], [-1, 2, 1]], [[1, 0, 2], [-1, 2, 1]], [[2, 0, 1], [-1, 1, 4]]]
+    [[[0, 1, 2], [-1, 2, 1]], [[1, 0, 2], [-1, 2, 4]], [[2, 0, 1], [-1, 1, 4]]]
 )

@@ -15,7 +15,7 @@ from scenegen.common.records import check, check_range, from_json, normalise, to
 from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 
 SPLITS = ("train", "val", "test")
-# Of wrong answers, seen from the reference; append only. "near-mirror" mirrors a "near" answer.
+# Of wrong answers, seen from the reference; append only. "near-mirror" mirrors a "near" shape.
 DISTRACTOR_KINDS = ("other", "near", "mirror", "matched", "near-mirror")
 QUESTION_KINDS = ("other", "near", "mirror", "matched", "mirror-pair")
 LETTERS = "ABC"  # of answers, wherever people look; files count them from 0

@@ -41,11 +41,7 @@ class Tally:
 
 
 def sample_questions(
-    spec: SplitSpec,
-    pools: Pools,
-    split: str,
-    requests: Sequence[tuple[int, int, int]],
-    tally: Tally,
+    pools: Pools, split: str, requests: Sequence[tuple[int, int, int]], tally: Tally
 ) -> list[Question]:
     """Draw shapes, views and lights of questions until every cube shows in every image.
 
@@ -56,8 +52,8 @@ def sample_questions(
 
     Raises PlacementError where the bounded search finds no question.
     """
+    spec, waiting = pools.spec, list(requests)
     done: dict[int, Question] = {}
-    waiting = list(requests)
     while waiting:
         for index, _, attempt in waiting:
             if attempt >= QUESTION_ATTEMPTS:
@@ -68,7 +64,7 @@ def sample_questions(
                     f" colours differ by {FACE_STEPS} of 255",
                     "try a smaller --min-cube-pixels, fewer --cubes or more --lights",
                 )
-        drawn = draw_shapes(spec, pools, split, [(i, attempt) for i, _, attempt in waiting])
+        drawn = draw_shapes(pools, split, [(i, attempt) for i, _, attempt in waiting])
         shapes = []
         for (index, place, attempt), unplaced in zip(waiting, drawn, strict=True):
             rng = question_rng(spec, split, index, Purpose.ANSWERS, attempt)

@@ -20,6 +20,7 @@ from pathlib import Path
 
 from iqtt.quiz.study import MOST_QUESTIONS, Settings
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.common.text_table import printable
 from scenegen.files.new_file import written_beside
 
 VERSION = 1
@@ -173,7 +174,7 @@ def check_content(db: sqlite3.Connection, path: Path) -> None:
             raise FileFormatError(path, f"another schema, such as {other:.60}", ", ".join(TABLES))
         trouble = db.execute("PRAGMA quick_check(1)").fetchone()[0]  # of the tables' rules, too
         if trouble != "ok":
-            raise FileFormatError(path, f"damage: {trouble:.200}", "a whole file")
+            raise FileFormatError(path, f"damage: {_line(trouble):.200}", "a whole file")
         if db.execute("SELECT count(*) FROM study").fetchone() != (1,):
             raise FileFormatError(f"{path}: study", "no settings, or several", "one row")
         for problem, query in CONTRADICTIONS.items():
@@ -203,14 +204,19 @@ def _require_same(path: Path, begun: Settings, now: Settings) -> None:
             raise SpecError(f"{path}: {field.name}", stored, expected, hint)
 
 
+def _line(text: object) -> str:
+    """Return what SQLite says in one line that a terminal may show; it quotes the file."""
+    return printable(" ".join(str(text).split()))
+
+
 @contextmanager
 def explained(path: Path) -> Iterator[None]:
     """Raise what SQLite raises as AnswersError, or FileFormatError where the file is damaged."""
     try:
         yield
-    except sqlite3.Error as error:
-        text = str(error)
-        damaged = isinstance(error, sqlite3.DatabaseError) and not isinstance(
+    except (sqlite3.Error, UnicodeDecodeError) as error:
+        text = _line(error)
+        damaged = isinstance(error, sqlite3.DatabaseError | UnicodeDecodeError) and not isinstance(
             error, sqlite3.OperationalError
         )
         if damaged or "malformed" in text or text == "interrupted":

@@ -41,6 +41,8 @@ def read_array(path: Path, name: str | None = None, vectors: bool = False) -> Ar
     reader = READERS.get(path.suffix.lower())
     if reader is None:
         raise ArrayFileError(path, f"the ending {path.suffix!r:.20}", ", ".join(READERS))
+    if path.exists() and not path.is_file():  # a pipe would be waited for
+        raise ArrayFileError(path, "no regular file", "an array of numbers")
     with path.open("rb") as file:
         if not file.read(1):
             raise ArrayFileError(path, "an empty file", "an array of numbers")

@@ -10,7 +10,8 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Callable
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -75,7 +76,7 @@ class HuggingFace:
         outputs = self.network(pixels)
         sizes = [(height, width)] * len(images)
         after: Callable[..., Any] = self.processor.post_process_depth_estimation
-        if "source_sizes" in after.__code__.co_varnames:  # ZoeDepth, which takes its padding off
+        if "source_sizes" in signature(after).parameters:  # ZoeDepth, which takes its padding off
             results = after(outputs, source_sizes=sizes, target_sizes=sizes)
         else:
             results = after(outputs, target_sizes=sizes)
@@ -114,7 +115,7 @@ class MoGe:
         self.network.to(device).eval()
         self.half = dtype == torch.float16
         self.ending = "metric" if hasattr(self.network, "scale_head") else UP_TO_SCALE
-        self._told = provenance_of(self.network, name, revision, device, dtype, "dlr-moge")
+        self._told = provenance_of(self.network, name, revision, device, dtype, "moge")
 
     def provenance(self) -> dict[str, str]:
         """Return what made a submission, in texts."""
@@ -186,5 +187,15 @@ def provenance_of(
         "device": torch.cuda.get_device_name(device) if cuda else device,
         "cuda": str(torch.version.cuda) if cuda else "",
         "python": platform.python_version(),
-        **{one: version(one) for one in (library, "torch", "numpy")},
+        **{one: _version(one) for one in (library, "torch", "numpy")},
     }
+
+
+def _version(package: str) -> str:
+    """Return the version that is installed; MoGe comes under two names, or as a folder."""
+    for name in {"moge": ("dlr-moge", "moge")}.get(package, (package,)):
+        try:
+            return version(name)
+        except PackageNotFoundError:
+            pass
+    return ""

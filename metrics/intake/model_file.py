@@ -27,7 +27,10 @@ from scenegen.files.pool import ended
 
 LIBRARIES = ("hf:", "moge:")  # what begins the names of models that `doors` loads
 DOORS = Path(__file__).with_name("doors.py")
-PACKAGES = {"transformers": "transformers torch", "moge": "dlr-moge torch"}  # of modules
+PACKAGES = {  # what to install, by the module that is missing
+    "transformers": "transformers torch torchvision",
+    "moge": "dlr-moge torch",
+}
 # For `python -c`: runs a file without its folder among those of imports; -P is of Python 3.11.
 BOOT = (
     "import runpy, sys; sys.path = [p for p in sys.path if p];"
@@ -56,6 +59,7 @@ class Model:
 
     Attributes:
         name: its file, or its name with that of its library before it.
+        named: whether it is a public model by its name.
         path: the file that makes it.
         sha256: of that file and of the name; of a user's file, also of names, sizes and dates of
             the weights beside it.
@@ -75,9 +79,13 @@ class Model:
         self._timeout, self._note = timeout, note
         command = [str(python or sys.executable), "-c", BOOT, model_runner.__file__]
         # Of its own session, so that Ctrl-C is not told to it, and what it starts ends with it.
-        self._process = subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
-        )
+        try:
+            self._process = subprocess.Popen(
+                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
+            )
+        except OSError as error:
+            found = f"{command[0]}: {error.strerror}"
+            raise ModelError("--python", found, "a Python that starts") from error
         for pipe in (self._process.stdin, self._process.stdout):
             _widen(pipe)
         self._asking = ThreadPoolExecutor(1, thread_name_prefix="model")

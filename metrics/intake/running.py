@@ -104,6 +104,7 @@ def run_model(
     texts: dict[str, Any] = {"method": method, "run": run, "notes": notes, "overwrite": overwrite}
     kept = {name: value for name, value in (options or {}).items() if name != "batch"}
     settings = {"model": model.sha256, **call.settings, "options": kept}
+    settings |= {"weights": model.provenance["weights_sha256"]} if model.named else {}
     runner = _run_questions if questions else _run_rooms
     return runner(model, data, out, call, texts, settings, keep, progress)
 
@@ -182,11 +183,8 @@ def _geometries(
                 )  # fmt: skip
             except OutputError as error:
                 raise error.inside(f"{model.name}: row {row}") from error
-            if (
-                model.metres
-                and geometry.alignment == "none"
-                and not (isinstance(rooms, MeasuredFile) or getattr(rooms.spec, "in_metres", False))
-            ):
+            in_metres = isinstance(rooms, MeasuredFile) or rooms.spec.interior
+            if model.metres and geometry.alignment == "none" and not in_metres:
                 geometry = replace(geometry, alignment="scale")
             yield row, geometry
 
@@ -261,6 +259,8 @@ def _run_questions(
 ) -> str:  # fmt: skip
     from iqtt.files.reader import QuestionsFile
 
+    if model.named:
+        raise ModelError(model.name, f"questions in {data}", "rooms, whose depth it predicts")
     values = []
     with QuestionsFile(data) as questions:
         settings |= {"data": questions.fingerprint or ""}

@@ -1,11 +1,11 @@
 """The scores themselves: functions that take arrays and return numbers.
 
-`chamfer_hausdorff` holds the point-cloud distances, and `image_search` finds nearest neighbours
-between two depth images quickly; `depth` and `normals` compare maps, `objects` and `relief` look at
-what stands before the `empty_room`, `answers` counts right answers to questions, `statistics` gives
-confidence intervals, and `skill` sets a score against that of a floor. Every function refuses bad
-input by the errors of `checks`.
+`surfaces` holds distances between points and between surfaces, and the errors of normals; `depth`
+compares depth maps after an `alignment`, and `boundaries` their jumps; `objects`, `shape`, `relief`
+(with the empty room) and `behind` (with `guesses`) look at objects; `answers` reads answers to
+questions, `statistics` gives confidence intervals, and `skill` sets a score against that of a
+floor. Every function refuses bad input by the errors of `checks`.
 
 Nothing here reads a file. Of the project, these modules import only `scenegen.camera` and
-`scenegen.common`. Start reading in `chamfer_hausdorff`.
+`scenegen.common`. Start reading in `surfaces.chamfer_hausdorff`.
 """

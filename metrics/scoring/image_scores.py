@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 from metrics.measures.alignment import Alignment
 from metrics.measures.behind import behind_scores, hidden_from
 from metrics.measures.boundaries import boundary_scores
-from metrics.measures.chamfer_hausdorff import (
+from metrics.measures.depth import DepthPair, compare_depth, depth_scores, mse_depth
+from metrics.measures.guesses import balls_and_blocks, depth_of_balls, depth_of_blocks
+from metrics.measures.objects import counted_objects, object_means, single_objects
+from metrics.measures.relief import depth_along, empty_room, relief_scores
+from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores
+from metrics.measures.surfaces.chamfer_hausdorff import (
     NearestDistances,
     chamfer,
     hausdorff,
@@ -21,16 +26,14 @@ from metrics.measures.chamfer_hausdorff import (
     paper_scores,
     point_scores,
 )
-from metrics.measures.depth import DepthPair, compare_depth, depth_scores, mse_depth
-from metrics.measures.empty_room import depth_along, empty_room
-from metrics.measures.guesses import balls_and_blocks, depth_of_balls, depth_of_blocks
-from metrics.measures.image_search import nearest_distances_on_image
-from metrics.measures.normals import angular_errors_degrees, normal_scores, normals_from_points
-from metrics.measures.objects import counted_objects, object_means, single_objects
-from metrics.measures.points import departures, local_point_scores, point_map_scores
-from metrics.measures.relief import relief_scores
-from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores
-from metrics.measures.surface import Surface, surface_distances, surface_of
+from metrics.measures.surfaces.image_search import nearest_distances_on_image
+from metrics.measures.surfaces.normals import (
+    angular_errors_degrees,
+    normal_scores,
+    normals_from_points,
+)
+from metrics.measures.surfaces.patches import Surface, surface_distances, surface_of
+from metrics.measures.surfaces.points import departures, local_point_scores, point_map_scores
 from metrics.scoring.geometry import (
     Geometry,
     alignments_scored,
@@ -114,7 +117,8 @@ class Reference:
 def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
     """Return the reference of a true view; `first` is None where it is the first one itself."""
     mask, fov = truth.mask, truth.fov_y_degrees
-    empty, _ = empty_room(truth.world_from_camera, fov, *truth.depth.shape)
+    height, width = truth.depth.shape
+    empty, _ = empty_room(truth.world_from_camera, fov, height, width, truth.room_size)
     pitch = pixel_size(len(mask), fov)
     points = back_project(truth.depth, fov)[mask]
     surface = surface_of(points, truth.normal[mask].astype(np.float64), pitch, mask)
@@ -210,9 +214,12 @@ def _hidden(truth: TrueView, counted: Array, first: FirstView | None) -> Array:
     return hidden
 
 
-def true_relief(depth: Array, world_from_camera: Array, fov_y_degrees: float) -> Array:
+def true_relief(
+    depth: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+) -> Array:
     """Return the relief of a true view of this depth, (H, W), scene units; NaN where no depth."""
-    empty, _ = empty_room(world_from_camera, fov_y_degrees, *depth.shape)
+    height, width = depth.shape
+    empty, _ = empty_room(world_from_camera, fov_y_degrees, height, width, room_size)
     return np.asarray(empty - depth)
 
 
@@ -315,7 +322,7 @@ def _scores_of_relief(
     if not geometry.on_rays:
         ahead = geometry.points[:, 2] < 0.0
         lines = geometry.points[ahead] / -geometry.points[ahead, 2:]
-        room[ahead] = depth_along(lines, truth.world_from_camera)
+        room[ahead] = depth_along(lines, truth.world_from_camera, truth.room_size)
     said = room - geometry.depth[mask]
     relief = relief_scores(said, (reference.empty - truth.depth)[mask])
     if other_relief is None:

@@ -100,7 +100,7 @@ _DIGESTS = {
         "237cbe80134f7096f1d4571d44c43bd975463eadc11b2cc8b5c7539348bc95d1",
     ),
     "rotation-1/mirror": (
-        "6aac54d28cd180b1e0377308fd3b23bbd28633d064a3a15a078853397fa1ecd8",
+        "b5d9481c8f6ac819383869de64c514c1a05dccbb6bbaba66892681a6eacd43f0",
         "23b685fb1fcd5bd170ecb34acaa926904013188bd16413ed81ff4efc3cf6049a",
     ),
 }

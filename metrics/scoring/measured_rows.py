@@ -17,8 +17,8 @@ from metrics.measured.reader import MeasuredView
 from metrics.measures.alignment import Alignment, align_points
 from metrics.measures.boundaries import boundary_scores
 from metrics.measures.depth import DepthPair, depth_scores
-from metrics.measures.normals import angular_errors_degrees, normal_scores
-from metrics.measures.points import point_map_scores
+from metrics.measures.surfaces.normals import angular_errors_degrees, normal_scores
+from metrics.measures.surfaces.points import point_map_scores
 from metrics.scoring.geometry import alignments_scored, scored_alignment
 from metrics.scoring.metric_names import metric
 from metrics.submissions.problems import PredictionError

@@ -186,7 +186,8 @@ class RowScorer:
             seen = ("depth", "camera/world_from_camera", "camera/fov_y_degrees")
             relief, first_view = None, None
             if other != row:
-                relief = true_relief(*(self._truth.read(name, other) for name in seen))
+                depth, pose, fov = (self._truth.read(name, other) for name in seen)
+                relief = true_relief(depth, pose, float(fov), self._truth.room_size(other))
             if first not in (row, -1):
                 seen = ("depth", "object_id", "camera/world_from_camera")
                 first_view = FirstView(*(self._truth.read(name, first) for name in seen))

@@ -47,6 +47,7 @@ class TrueView:
         object_id: (H, W).
         fov_y_degrees: vertical field of view.
         world_from_camera: (4, 4), rigid.
+        room_size: of a closed room, (3,); None for the paper's room.
     """
 
     depth: Array
@@ -54,6 +55,7 @@ class TrueView:
     object_id: Array
     fov_y_degrees: float
     world_from_camera: Array
+    room_size: Array | None = None
 
     @property
     def mask(self) -> Array:
@@ -160,6 +162,7 @@ def read_true_view(truth: RoomsFile, row: int) -> TrueView:
         truth.read("object_id", row),
         float(truth.read("camera/fov_y_degrees", row)),
         truth.read("camera/world_from_camera", row),
+        truth.room_size(row),
     )
     depth, surface = view.depth, view.object_id >= 0
     normal = as_doubles(view.normal)

@@ -9,8 +9,7 @@ import numpy as np
 
 from metrics.measured.reader import Images, open_images
 from metrics.submissions.hints.no_value import no_value_hints
-from metrics.submissions.hints.questions import answer_hints
-from metrics.submissions.hints.rooms import room_hints
+from metrics.submissions.hints.tasks import answer_hints, room_hints
 from metrics.submissions.problems import HINT, MOST_IDS, Problem
 from metrics.submissions.reader import (
     Predictions,

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.questions.specs import LETTERS
+from metrics.measured.reader import Images, MeasuredFile
 from metrics.measures.answers import ABSTAINED
 from metrics.scoring.geometry import depth_as_scored
 from metrics.scoring.metric_names import HEADLINE, metric
@@ -50,10 +51,10 @@ class Example:
 Lists = list[tuple[str, list[Example]]]  # titles and examples
 
 
-def examples_of(
-    scores: ScoreFile, truth: "RoomsFile | AnswersFile", submission: Predictions
-) -> Lists:
+def examples_of(scores: ScoreFile, truth: "Images | AnswersFile", submission: Predictions) -> Lists:
     """Return titles and examples: the best, median and worst scenes, or answers right and wrong.
+
+    Of measured truth there are none.
 
     Raises OSError and FileFormatError where a file, all of which are open, cannot be read.
     """
@@ -61,6 +62,8 @@ def examples_of(
         assert isinstance(submission, RoomPredictions)
         name = shown_score(scores)
         return _scenes(scores, truth, submission, name) if name else []
+    if isinstance(truth, MeasuredFile):
+        return []
     assert isinstance(submission, QuestionPredictions)
     return _questions(scores, truth.path, submission)
 

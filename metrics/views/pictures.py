@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from metrics.measures.normals import normals_from_depth
+from metrics.measures.surfaces.normals import normals_from_depth
 from metrics.views.plots import load_matplotlib
 from scenegen.common.text_table import number
 from scenegen.rooms.preview import srgb_bytes

@@ -62,9 +62,7 @@ def html_report(
     else:
         remark, title = ROOMS_REMARK, "Scenes"
         remark += " Of each scene it is the view whose score is nearest to the scene's mean."
-    # Pictures of measured truth are its own: `bench truth` says where they come from.
-    shown = runs is not None and scores.task != "measured"
-    examples = [] if not shown or runs is None else examples_of(scores, runs.truth, runs.files[0])
+    examples = [] if runs is None else examples_of(scores, runs.truth, runs.files[0])
     if examples:
         sections.append(Section(title, remarks=[remark], examples=examples))
     if scores.task == "rooms":

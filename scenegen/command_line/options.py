@@ -9,6 +9,7 @@ import click
 
 from scenegen.command_line.paths import InputPath, OutputFolder
 
+PICTURE_FILES = (".exr", ".jpeg", ".jpg", ".png")
 MESH_FILES = (".glb", ".obj", ".off", ".ply", ".stl")
 NUMBER = r"[0-9]+(?:\.[0-9]*)?(?:[eE][+-]?[0-9]+)?"
 Command = Callable[..., Any]
@@ -169,6 +170,14 @@ UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_defau
                   help="Axis that points up in the meshes; in ShapeNet it is y.")
 CACHE_DIR = click.option("--cache-dir", type=OutputFolder(),
                          help="Folder for meshes that are ready to render [the user's cache].")
+ASSETS = together(  # what others made for pictures of interiors
+    click.option("--materials", type=InputPath(within=PICTURE_FILES),
+                 help="Folder of materials for interiors, as ambientCG and Poly Haven deliver them:"
+                 " maps of colour, roughness and normals."),
+    click.option("--environment", type=InputPath(),
+                 help="Surroundings of interiors instead of sun and sky: an equirectangular HDR or"
+                 " EXR picture."),
+)
 MESHES = together(  # the folder of meshes that objects are taken from
     click.option("--shapenet-root", type=InputPath(within=MESH_FILES),
                  help="Folder of ShapeNetCore 1 or 2 with the objects."),

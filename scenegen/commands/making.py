@@ -14,6 +14,7 @@ import click
 
 from scenegen.command_line.groups import EXAMPLE, creation_command
 from scenegen.command_line.options import (
+    ASSETS,
     COMPRESSION,
     DEVICE,
     IMAGE_DTYPE,
@@ -34,6 +35,7 @@ from scenegen.command_line.paths import InputPath, NewHdf5
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 SHARED = ("parquet", "webdataset")  # and of files of many
+NOISY_SPP = 256  # samples per pixel of pictures that are not denoised
 
 
 def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> list[str]:
@@ -105,6 +107,13 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
               help="More truth to store: some of amodal,coordinates,flow,albedo. That is masks of"
               " whole objects and their visible fractions, object coordinates (NOCS), optical flow"
               " to the next view with occlusion, reflectance of each pixel.")
+@click.option("--hours", type=Range(float),
+              help="Hours of the day of interiors; it is night after 18 [7-21].")
+@click.option("--denoise/--no-denoise", default=None,
+              help="Whether pictures of interiors are denoised [if the extra `denoise` is there].")
+@click.option("--sensor-noise", type=float,
+              help="Noise of the camera of interiors, as a share of white [0].")
+@ASSETS
 @IMAGE_DTYPE
 @COMPRESSION
 @click.option("--batch", type=int, default=64, show_default=True,
@@ -155,6 +164,12 @@ def render(
         chosen["fov_degrees"], chosen["fov_spread_degrees"] = fov[0], fov[1] - fov[0]
     if size is not None:
         chosen["height"], chosen["width"] = size
+    chosen = _with_denoiser(preset, chosen)
+    assets = [chosen.pop(name, None) for name in ("materials", "environment")]
+    if any(assets):
+        from scenegen.rendering.pictures.assets import use_assets
+
+        chosen |= use_assets(*assets)
     source = object_source(preset, **objects)
     spec = preset_spec(preset, **chosen, **source.settings)
     images = count * len(spec.views)
@@ -194,6 +209,26 @@ def render(
 
 
 # fmt: on
+def _with_denoiser(preset: str, chosen: dict[str, Any]) -> dict[str, Any]:
+    """Add whether interiors are denoised, and how many samples they need, where that is not told.
+
+    Raises BackendError where no denoiser is installed, and one is asked for.
+    """
+    from scenegen.description.presets import PRESETS
+    from scenegen.rendering.pictures.denoiser import check_denoiser, has_denoiser
+
+    if not PRESETS.get(preset) or not PRESETS[preset].settings.get("interior"):
+        return chosen
+    if chosen.get("denoise"):
+        check_denoiser()
+    if "denoise" not in chosen and has_denoiser():
+        return {**chosen, "denoise": True}
+    if not chosen.get("denoise") and "spp" not in chosen:
+        print_line(f"no denoiser: {NOISY_SPP} samples a pixel instead; the extra `denoise` has one")
+        return {**chosen, "spp": NOISY_SPP}
+    return chosen
+
+
 def _truth_place(out: str, overwrite: bool) -> str:
     """Return the file of truth that belongs to a file to be handed out. Raises OSError, SpecError.
 

@@ -11,7 +11,7 @@ from typing import Any
 import click
 
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import DEVICE, ENCODING, MESHES, OVERWRITE, Items
+from scenegen.command_line.options import ASSETS, DEVICE, ENCODING, MESHES, OVERWRITE, Items
 from scenegen.command_line.output import print_checks, print_line, progress_bar
 from scenegen.command_line.paths import (
     InputPath,
@@ -76,9 +76,19 @@ def info(file: str) -> None:
     help="Number of rows to draw from the seed and render again.",
 )
 @MESHES
+@ASSETS
 @DEVICE
 @click.pass_context
-def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: Any) -> None:
+def verify(
+    ctx: click.Context,
+    /,
+    file: str,
+    items: int,
+    device: str,
+    materials: str | None,
+    environment: str | None,
+    **meshes: Any,
+) -> None:
     """Check digests and values of every row of a file, and render some rows again.
 
     Of a folder with a manifest, check the SHA-256 of every file and that every row is there once.
@@ -89,9 +99,11 @@ def verify(ctx: click.Context, /, file: str, items: int, device: str, **meshes: 
     from scenegen.files.verify import Check
     from scenegen.layout import FORMAT_NAME
     from scenegen.objects.sources import file_objects
+    from scenegen.rendering.pictures.places import ASSETS as PLACES
     from scenegen.rooms.reader import RoomsFile
     from scenegen.rooms.verify import verify_file, verify_set
 
+    PLACES.use(materials, environment)
     paths: list[tuple[Path, Manifest | None]] = [(Path(file), None)]
     if Path(file).is_dir():
         sets = manifests_in(Path(file), FORMAT_NAME)

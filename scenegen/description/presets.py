@@ -5,6 +5,7 @@ from typing import Any
 
 from scenegen.common.names import check_choice
 from scenegen.common.records import check
+from scenegen.description.scenes import FAMILY_NAMES, FURNITURE_NAMES
 from scenegen.description.specs import DatasetSpec
 
 VESSELS = ("bag", "bottle", "bowl", "can", "cap", "lamp", "mug")
@@ -54,6 +55,21 @@ PRESETS = {
         "one to five lights of any place and strong colours",
         {"lights": (1, 5), "light_saturation": 1.0},
     ),
+    "interiors": Preset(
+        "closed rooms with furniture in metres, path-traced with textures",
+        {
+            "interior": True,
+            "source": "families",
+            "shapes": FAMILY_NAMES + FURNITURE_NAMES,
+            "objects": (12, 60),
+            "shading": "path",
+            "spp": 16,
+            "fov_degrees": 45.0,
+            "fov_spread_degrees": 30.0,
+            "height": 256,
+            "width": 256,
+        },
+    ),
     "views": Preset("basic shapes seen from 0, 5, 35, 55 and 80 degrees", {"views": PAPER_VIEWS}),
 }
 
@@ -70,7 +86,8 @@ def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
     """
     check_choice("preset", preset, PRESETS)
     chosen = {**PRESETS[preset].settings, **settings}
-    if len(chosen.get("views", ())) > 1 and "object_radius" not in settings:
+    interior = chosen.get("interior", False)
+    if len(chosen.get("views", ())) > 1 and not interior and "object_radius" not in settings:
         low, high = chosen.get("object_radius", DatasetSpec.object_radius)
         chosen["object_radius"] = (VIEWS_SHRINK * low, VIEWS_SHRINK * high)
     path = chosen.get("shading") == "path"

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import Camera
+from scenegen.common.records import from_json
+from scenegen.description.interiors import Interior
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 
 Array = NDArray[Any]
@@ -32,6 +34,7 @@ class SceneArrays:
         ambient, attenuation: (S, 3) and (S, 2).
         room_reflectance: (S, 3); NaN where there is no room.
         background: (S, 3).
+        interior: closed rooms as JSON, (S,) texts; empty for others.
     """
 
     names: Sequence[str]
@@ -54,6 +57,7 @@ class SceneArrays:
     attenuation: Array
     room_reflectance: Array
     background: Array
+    interior: Array
 
     def __len__(self) -> int:
         return len(self.index)
@@ -70,6 +74,8 @@ class SceneArrays:
         kinds = {"cameras": Camera, "objects": PlacedObject, "lights": Light}
         for name, kind in kinds.items():
             parts[name] = [kind(**_with_tuples(part)) for part in parts[name]]
+        if self.interior[row]:
+            parts["interior"] = from_json(Interior, self.interior[row], "interior")
         return SceneSpec(**_with_tuples(parts))
 
     def to_json(self, row: int) -> str:
@@ -118,6 +124,7 @@ class SceneArrays:
             "attenuation": self.attenuation[row].tolist(),
             "room_reflectance": None if room[0] != room[0] else room,
             "background": self.background[row].tolist(),
+            **({"interior": json.loads(self.interior[row])} if self.interior[row] else {}),
         }  # fmt: skip
 
 

@@ -1,18 +1,24 @@
 """Description of one scene, as JSON and back: everything that the renderer needs.
 
-Lengths are in scene units (the room's edge), frames as in `camera.py`.
+Lengths are in scene units (the room's edge; metres in closed rooms), frames as in `camera.py`.
 """
 
 from dataclasses import dataclass
 
 from scenegen.camera import Camera, Vector3
 from scenegen.common.records import check, from_json, to_json
+from scenegen.description.interiors import Interior
 
 SHAPE_NAMES = (
     "box", "sphere", "cone", "torus", "cylinder", "teapot", "capsule", "pyramid", "prism",
     "tetrahedron", "octahedron", "dodecahedron", "icosahedron",
 )  # fmt: skip
 FAMILY_NAMES = ("bag", "bottle", "bowl", "can", "cap", "chair", "lamp", "mug", "table")
+FURNITURE_NAMES = (  # families that came with closed rooms
+    "armchair", "basket", "bed", "book", "books", "box", "cabinet", "clock", "coffee_table", "cup",
+    "curtain", "cushion", "desk", "floor_lamp", "nightstand", "pendant", "picture", "plant",
+    "plate", "rug", "screen", "shelf", "sofa", "stool", "tall_plant", "vase",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -73,6 +79,7 @@ class SceneSpec:
         attenuation: (k_l, k_q) of the shading equation.
         room_reflectance: the RGB of rho of floor and walls; None where there is no room.
         background: radiance of rays that meet nothing.
+        interior: the closed room; None for the paper's floor and two walls.
     """
 
     index: int
@@ -83,14 +90,19 @@ class SceneSpec:
     attenuation: tuple[float, float]
     room_reflectance: Vector3 | None
     background: Vector3 = (0.0, 0.0, 0.0)
+    interior: Interior | None = None
 
     def __post_init__(self) -> None:
         check(0 <= self.index < 2**63, "index", self.index, "0 or more, below 2**63")
         check(len(self.cameras) > 0, "cameras", "none", "at least one")
+        if self.interior:
+            count, expected = len(self.interior.stands_on), f"one for each of {len(self.objects)}"
+            check(count == len(self.objects), "stands on", f"{count} objects", expected)
 
     def to_json(self) -> str:
         """Return the description as one line of JSON; floats keep every bit."""
-        return to_json(self)
+        parts = vars(self)
+        return to_json(parts if self.interior else {k: parts[k] for k in parts if k != "interior"})
 
     @classmethod
     def from_json(cls, text: str | bytes) -> "SceneSpec":

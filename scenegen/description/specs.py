@@ -5,15 +5,19 @@ Lengths are in scene units (the room's edge), frames as in `camera.py`.
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from scenegen.camera import Camera, Vector3
 from scenegen.common.names import check_choice
 from scenegen.common.records import check, check_range, from_json, normalise, to_json
-from scenegen.description.scenes import FAMILY_NAMES, SHAPE_NAMES
+from scenegen.description.scenes import FAMILY_NAMES, FURNITURE_NAMES, SHAPE_NAMES
 
 IMAGE_DTYPES = ("uint8", "float16", "float32")
-BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES}
+BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES + FURNITURE_NAMES}
 FOLDERS = ("shapenet-v1", "shapenet-v2", "folder")
 SPLITS = ("all", "train", "val", "test")
 TRUTHS = ("amodal", "coordinates", "flow", "albedo")
@@ -21,6 +25,7 @@ MAX_CLASSES = 4000  # their names are an attribute, of which HDF5 allows 64 kB
 MAX_LIGHTS = 16
 MAX_PIXELS = 4096 * 4096
 MAX_VIEWS = 64
+LEAST_SEEN = 4  # objects of a closed room that show `min_visible_pixels`, in every view
 VISIBLE_SHARE = 0.003  # least share of the pixels of an image that show an object, by default
 FROM_SIZE = -(2**62)  # stands for the number that follows from the size of the image
 MOST_TURN = 80.0  # degrees between two views; at 90 all input views would be the same
@@ -33,12 +38,28 @@ LIMITS: dict[str, tuple[float, float]] = {  # of settings that are a number or a
     "lights": (0, MAX_LIGHTS),
     "light_level": (0.0, 100.0),
     "light_saturation": (0.0, 1.0),
+    "hours": (0.0, 24.0),
+    "sensor_noise": (0.0, 1.0),
 }
+# Settings of the paper's room, which closed rooms do not have.
+PAPER_ONLY = (
+    "object_radius", "pose", "lights", "shadows", "allow_cropped", "camera_radius",
+    "camera_target", "light_radius", "light_level", "ambient", "attenuation", "light_saturation",
+    "reflectance", "room_reflectance", "random_reflectance", "specular", "shininess",
+    "own_reflectance",
+)  # fmt: skip
+INTERIOR_ONLY = ("hours", "denoise", "sensor_noise", "materials", "environment")
 FOV = (1.0, 120.0)  # degrees
 LATER: dict[str, object] = {
     "truth": (),
     "own_reflectance": False,
     "fov_spread_degrees": 0.0,
+    "interior": False,
+    "hours": (7.0, 21.0),
+    "denoise": False,
+    "sensor_noise": 0.0,
+    "materials": "",
+    "environment": "",
 }  # fields that came after 1.0, with their defaults
 CHOICES = {
     "image_dtype": IMAGE_DTYPES,
@@ -72,8 +93,8 @@ class DatasetSpec:
         shadows: whether lights are occluded (the paper's shading equation has no visibility term).
         spp: colour samples per pixel; 1 shades the ground-truth hit itself.
         image_dtype: "uint8" (linear radiance 0..1 as 0..255), "float16" or "float32" (radiance).
-        min_visible_pixels: every object shows at least so many pixels in every view; by default
-            VISIBLE_SHARE of the image's, at least 1.
+        min_visible_pixels: every object shows at least so many pixels in every view, in closed
+            rooms LEAST_SEEN objects; by default VISIBLE_SHARE of the image's, at least 1.
         allow_cropped: let the image's border cut objects (their centres stay in the image).
         fov_degrees: field of view of a square image; others have its diagonal.
         camera_radius: distance from camera to target, scene units.
@@ -91,6 +112,13 @@ class DatasetSpec:
             truth then has "albedo", as no other column tells it.
         fov_spread_degrees: how much wider than `fov_degrees` a scene's field of view can be; each
             scene draws its own, uniformly.
+        interior: closed rooms with furniture, in metres (`description.interiors`), instead of the
+            paper's floor and two walls. The settings of PAPER_ONLY are then unused.
+        hours: earliest and latest hour of the day; each scene draws its own, uniformly.
+        denoise: whether pictures are denoised.
+        sensor_noise: standard deviation of noise that is added to pictures, as a share of white.
+        materials: digest of a folder of materials; empty for those that are drawn.
+        environment: digest of a picture of the surroundings; empty for sun and sky.
     """
 
     seed: int = 0
@@ -127,6 +155,12 @@ class DatasetSpec:
     truth: tuple[str, ...] = ()
     own_reflectance: bool = False
     fov_spread_degrees: float = 0.0
+    interior: bool = False
+    hours: tuple[float, float] = (7.0, 21.0)
+    denoise: bool = False
+    sensor_noise: float = 0.0
+    materials: str = ""
+    environment: str = ""
 
     def __post_init__(self) -> None:
         normalise(self)
@@ -139,11 +173,23 @@ class DatasetSpec:
         _check_objects(self)
         _check_places(self)
         _check_truth(self)
+        _check_interior(self)
 
     @property
     def object_slots(self) -> int:
         """Length of the object axis of every array; at least 1, which HDF5 needs."""
         return max(1, self.objects[1])
+
+    def seen_enough(self, visible: NDArray[Any], count: NDArray[Any]) -> NDArray[Any]:
+        """Return whether images show enough of their objects, (B,).
+
+        Args:
+            visible: pixels of each object, (B, K).
+            count: of objects of each image, (B,).
+        """
+        seen = (visible >= self.min_visible_pixels) & (np.arange(visible.shape[1]) < count[:, None])
+        least = np.minimum(count, LEAST_SEEN) if self.interior else count
+        return np.asarray(seen.sum(axis=1) >= least)
 
     @property
     def light_slots(self) -> int:
@@ -259,3 +305,19 @@ def _check_truth(spec: DatasetSpec) -> None:
     object.__setattr__(spec, "truth", tuple(name for name in TRUTHS if name in spec.truth))
     expected = "two views or more, such as --views 0,35"
     check("flow" not in spec.truth or len(spec.views) > 1, "flow", "one view", expected)
+
+
+def _check_interior(spec: DatasetSpec) -> None:
+    """Refuse settings of closed rooms elsewhere, and the paper's settings in closed rooms."""
+    defaults = {field.name: field.default for field in fields(DatasetSpec)}
+    foreign = PAPER_ONLY if spec.interior else INTERIOR_ONLY
+    for name in foreign:
+        where = "preset interiors" if spec.interior else "a preset other than interiors"
+        unused = getattr(spec, name) == defaults[name]
+        check(unused, name.replace("_", " "), f"{getattr(spec, name)} with {where}", "none")
+    if spec.interior:
+        check(spec.shading == "path", "shading", f"{spec.shading} with interiors", "path")
+        most = int(LIMITS["objects"][1]) - 1  # as the shell is cast as one more
+        check(spec.objects[1] <= most, "objects", spec.objects[1], f"at most {most} in interiors")
+        families = spec.source == "families"
+        check(families, "objects", f"{spec.source} with interiors", "the built-in families")

@@ -1,7 +1,7 @@
 """The catalogue of a data set's objects: its classes, the models of each, and their shapes."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from scenegen.common.errors import SpecError
@@ -11,9 +11,11 @@ from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families.members import MEMBERS, member_shape
 from scenegen.objects.families.store import MEMBER_STORE
+from scenegen.objects.furniture import furniture_shape
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import object_split
 from scenegen.objects.meshes.store import MeshStore
+from scenegen.objects.room_shell import PREFIX, shell_shape
 from scenegen.objects.solids import Mesh, UnitShape, without_triangles
 
 
@@ -43,7 +45,8 @@ def objects_of(spec: DatasetSpec) -> Objects:
     if spec.source not in ("shapes", "families"):
         option = f"--{'objects' if spec.source == 'folder' else 'shapenet'}-root"
         raise SpecError("objects", f"meshes ({spec.source})", f"their folder, by {option}")
-    return _built_in(spec.source, spec.shapes, spec.object_split)
+    found = _built_in(spec.source, spec.shapes, spec.object_split)
+    return replace(found, shape=interior_shape) if spec.interior else found
 
 
 def mesh_objects(store: MeshStore) -> Objects:
@@ -63,6 +66,17 @@ def changed_meshes(objects: Objects, scene: SceneSpec) -> list[str]:
         if not same:
             wrong.append(item.shape)
     return wrong
+
+
+def interior_shape(name: str) -> UnitShape:
+    """Return a member of a family as furniture, or the shell of a closed room.
+
+    Raises SpecError for any other name.
+    """
+    if name.startswith(PREFIX):
+        return shell_shape(name)
+    _family_and_number(name)
+    return furniture_shape(name)
 
 
 def built_in_shape(name: str) -> UnitShape:

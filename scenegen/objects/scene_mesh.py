@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SceneSpec
 from scenegen.objects.basic_shapes import unit_shape
+from scenegen.objects.room_shell import shell
 from scenegen.objects.solids import UnitShape
 
 
@@ -40,7 +41,7 @@ def scene_parts(
     scene: SceneSpec, shape_of: Callable[[str], UnitShape] = unit_shape
 ) -> list[ScenePart]:
     """Return the planes of the room, if there is one, and the objects of a scene."""
-    parts = [] if scene.room_reflectance is None else _planes()
+    parts = [] if scene.room_reflectance is None else _room(scene)
     for k, item in enumerate(scene.objects, start=1):
         shape = shape_of(item.shape)
         mesh = welded(shape)
@@ -48,6 +49,15 @@ def scene_parts(
         normals = shape.normals @ rotation_matrix(item.rotation).T
         parts.append(ScenePart(f"object_{k}_{item.shape}", k, mesh, normals))
     return parts
+
+
+def _room(scene: SceneSpec) -> list[ScenePart]:
+    if scene.interior is None:
+        return _planes()
+    found = shell(scene.interior)
+    faces = np.arange(3 * len(found.corners)).reshape(-1, 3)
+    mesh = trimesh.Trimesh(found.corners.reshape(-1, 3), faces, process=False)
+    return [ScenePart("room", 0, mesh, np.repeat(found.normals[:, None], 3, axis=1))]
 
 
 def room_mesh() -> trimesh.Trimesh:

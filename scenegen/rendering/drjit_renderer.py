@@ -66,7 +66,8 @@ def launch_pixels(
     if batch.spec.own_reflectance:
         own = [batch.shape_of(name).colors.reshape(-1, 9) for name in shown]
         colors = upload_rows([np.ones((0, 9)), *own])[0]
-    everything = _trace(batch, scenes, cameras, cubes, meshes, colors)
+    sampled = "image" in fields and batch.spec.spp > 1
+    everything = _trace(batch, scenes, cameras, cubes, meshes, colors, sampled)
     components = {name: everything[name] for name in fields}
     dr.eval(components)
     spec, count = batch.spec, len(batch)
@@ -153,10 +154,12 @@ def _trace(
     cubes: Cubes | None,
     meshes: Triangles | None,
     colors: Any,
+    sampled: bool,
 ) -> dict[str, list[Any]]:
     """Return the components of the fields of `GroundTruth` for every ray, not yet evaluated.
 
-    `colors` are those of the corners of all triangles, (F, 9), or None.
+    `colors` are those of the corners of all triangles, (F, 9), or None. The image is the mean of
+    the spec's samples if it is `sampled`.
     """
     spec = batch.spec
     height, width, rays = spec.height, spec.width, padded_rays(spec)
@@ -202,7 +205,7 @@ def _trace(
     # Positions in a pixel are variables for the rasteriser, whose kernel serves all of them.
     middle = dr.opaque(mi.Float, 0.5) if meshes else 0.5
     t, object_id, n, image, own = look(middle, middle)
-    if spec.spp > 1:
+    if sampled:
         total = image if spec.spp % 2 else mi.Vector3f(0)
         image = _sum_of_samples(total, spec.spp // 2 * 2, look, bool(meshes)) / spec.spp
     if spec.image_dtype == "uint8":

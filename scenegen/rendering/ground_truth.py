@@ -24,6 +24,8 @@ class GroundTruth:
         object_id: (B, H, W) int8; -1 nothing, 0 the room, k the k-th object, counting from 1.
         albedo: linear RGB reflectance, (B, H, W, 3) float32, NaN where the ray hits nothing; None
             unless objects have colours of their own, as it then follows from object ids.
+        exposure: how pictures of closed rooms were developed, (B, 5) as
+            `pictures.development.EXPOSURE`; None for other images.
     """
 
     image: Array
@@ -31,6 +33,7 @@ class GroundTruth:
     normal: Array
     object_id: Array
     albedo: Array | None = None
+    exposure: Array | None = None
 
     def pixels(self) -> dict[str, Array]:
         """Return the fields that there are, by name."""
@@ -49,6 +52,13 @@ def decode_image(image: Array) -> Array:
     if image.dtype == np.uint8:
         return image.astype(np.float32) / np.float32(255.0)
     return image.astype(np.float32)
+
+
+def undeveloped(image: Array) -> Array:
+    """Return the linear light, 0 to 1 float32, of an sRGB picture in 8 bits (IEC 61966-2-1)."""
+    levels = np.arange(256) / 255
+    curve = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
+    return np.asarray(curve.astype(np.float32)[image])
 
 
 def visible_pixels(object_id: Array, slots: int) -> NDArray[np.int32]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import look_at
 from scenegen.common.errors import SpecError
-from scenegen.common.records import check
+from scenegen.common.records import check, to_json
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.scenes import SceneSpec
@@ -47,6 +47,7 @@ class SceneBatch:
         has_room: (B,) bool.
         background: radiance of rays that hit nothing, (B, 3).
         attenuation: (k_l, k_q), (B, 2).
+        interior: closed rooms as JSON, (B,) texts, empty for others; None where there are none.
         cubes_only: whether each image shows only boxes of one size and orientation, and no room.
             They are then cast faster, with the same result within rounding. The caller sets it:
             an image's bits must not depend on the rest of its batch.
@@ -72,6 +73,7 @@ class SceneBatch:
     attenuation: Array
     has_room: Array
     background: Array
+    interior: Array | None = None
     cubes_only: bool = False
 
     def __len__(self) -> int:
@@ -163,6 +165,7 @@ def pack_arrays(
         attenuation=each(scenes.attenuation),
         has_room=each(has_room),
         background=each(scenes.background),
+        interior=each(scenes.interior) if spec.interior else None,
     )
     # All basic shapes are listed, used or not, so that their Mitsuba scene is built only once.
     return batch if spec.source == "shapes" else batch.rows(0, len(batch))
@@ -210,6 +213,7 @@ def _arrays(spec: DatasetSpec, scenes: Sequence[SceneSpec], views: Sequence[int]
             [scene.room_reflectance or (np.nan,) * 3 for scene in scenes], float
         ),
         background=np.array([scene.background for scene in scenes], float),
+        interior=np.array([to_json(s.interior) if s.interior else "" for s in scenes], object),
     )
 
 

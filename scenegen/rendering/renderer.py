@@ -1,7 +1,6 @@
 """Render a batch of scenes on the best backend: the entry point of this folder."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from functools import lru_cache
 from typing import Any
 
@@ -9,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import BackendError
+from scenegen.description.specs import DatasetSpec
 from scenegen.files.sets.workers import processors
 from scenegen.objects.catalogue import face_count
 from scenegen.objects.solids import UnitShape
@@ -16,9 +16,11 @@ from scenegen.rendering.backend import HOW_TO_GET_LLVM, select_variant
 from scenegen.rendering.ground_truth import GroundTruth
 from scenegen.rendering.numpy_renderer import render_in_numpy, smooth_normals
 from scenegen.rendering.packing import SceneBatch
+from scenegen.rendering.shells import with_shells, without_shells
 from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
 Array = NDArray[Any]
+PICTURE = ("image", "exposure", "albedo")  # fields that depend on materials
 MOST_WORKERS = 8  # that are used unasked; each takes about 0.4 GiB
 WORTHWHILE = 2000  # images for each worker; below, starting it takes longer than it saves
 MOST_FACES = 2_000_000  # of the models of one launch; the rasteriser takes 96 bytes a face
@@ -57,11 +59,22 @@ def launch(batch: SceneBatch, device: str = "auto") -> Callable[[], GroundTruth]
     The caller can do other work in between. The scalar fallback does all its work in the second
     call.
     """
-    names = [field.name for field in fields(GroundTruth)]
-    if not batch.spec.own_reflectance:
-        names.remove("albedo")
+    names = truth_fields(batch.spec) + picture_fields(batch.spec)
     fetch = launch_fields(batch, names, device)
     return lambda: GroundTruth(**fetch())
+
+
+def truth_fields(spec: DatasetSpec) -> list[str]:
+    """Return the fields of `GroundTruth` that come from the ray through each pixel's centre."""
+    own = ["albedo"] if spec.own_reflectance else []
+    return ["depth", "normal", "object_id", *own]
+
+
+def picture_fields(spec: DatasetSpec) -> list[str]:
+    """Return the other ones, which path tracing computes for pictures."""
+    if not spec.interior:
+        return ["image"]
+    return [name for name in PICTURE if name != "albedo" or "albedo" in spec.truth]
 
 
 def launch_fields(
@@ -69,8 +82,13 @@ def launch_fields(
 ) -> Callable[[], dict[str, Array]]:
     """Start to render some fields of `GroundTruth`; the others are not computed. See `launch`."""
     variant = select_variant(device)
-    if batch.spec.shading == "path" and "image" in names:
-        return _with_traced_image(batch, names, variant, device)
+    pictures = [name for name in names if name in PICTURE]
+    if batch.spec.shading == "path" and pictures:
+        fetch_truth = launch_fields(batch, [x for x in names if x not in PICTURE], device)
+        return lambda: {**fetch_truth(), **trace(batch, pictures, device)}
+    if batch.interior is not None and batch.has_room.any():
+        fetch_shell = launch_fields(with_shells(batch), names, device)
+        return lambda: without_shells(fetch_shell(), batch.spec)
     if variant == "scalar_rgb":
         if batch.spec.own_reflectance:
             raise BackendError("own reflectance", "no LLVM", hint=HOW_TO_GET_LLVM)
@@ -98,22 +116,20 @@ def launch_fields(
     return fetch_all
 
 
-def _with_traced_image(
-    batch: SceneBatch, names: Sequence[str], variant: str, device: str
-) -> Callable[[], dict[str, Array]]:
+def trace(batch: SceneBatch, names: Sequence[str], device: str = "auto") -> dict[str, Array]:
+    """Return the path-traced fields of `GroundTruth`, some of PICTURE. Raises BackendError."""
+    variant = select_variant(device)
     if variant == "scalar_rgb":
         raise BackendError("shading path", "no LLVM", hint=HOW_TO_GET_LLVM)
+    if batch.spec.interior:
+        from scenegen.rendering.pictures.tracer import trace_pictures
+
+        return trace_pictures(batch, names, variant)
     from scenegen.rendering.meshes.model_scene import MODELS  # imports drjit, as above
     from scenegen.rendering.path_tracing.path_tracer import trace_images
 
-    fetch = launch_fields(batch, [name for name in names if name != "image"], device)
-
-    def fetch_all() -> dict[str, Array]:
-        pixels = fetch()
-        MODELS.clear()  # otherwise Dr.Jit compiles every one of them into the path kernel
-        return {**pixels, "image": trace_images(batch, variant)}
-
-    return fetch_all
+    MODELS.clear()  # otherwise Dr.Jit compiles every one of them into the path kernel
+    return {"image": trace_images(batch, variant)}
 
 
 def parts(batch: SceneBatch) -> list[SceneBatch]:

@@ -15,16 +15,17 @@ from scenegen.files.sets.manifest import manifest_path
 from scenegen.files.sets.plan import Bundle, Mark, Part, Plan, Sheet
 from scenegen.files.sets.sets import merge_file
 from scenegen.layout import (
-    CONVENTIONS,
     FORMAT_NAME,
     FORMAT_VERSION,
     SCORED,
     TRUTH_DIGEST,
     columns,
+    conventions,
 )
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.rendering.backend import select_variant, versions
+from scenegen.rendering.pictures.places import ASSETS
 from scenegen.rendering.renderer import useful_workers
 from scenegen.rooms.reader import RoomsFile
 from scenegen.rooms.render import RoomsWork
@@ -85,7 +86,8 @@ def make_dataset(
     check_writable(place, overwrite=True)
     renderer = {"variant": variant, **versions()}
     plan = rooms_plan(place.name, spec, count, renderer, compression, command)
-    work = RoomsWork(spec, batch, device, objects, compression, MEMBER_STORE.folder)
+    work = RoomsWork(spec, batch, device, objects, compression, MEMBER_STORE.folder,
+                     (ASSETS.materials, ASSETS.environment))  # fmt: skip
     make_set(
         manifest_path(place), plan, work, shard_size,
         workers=workers or useful_workers(count * views, variant),
@@ -111,7 +113,7 @@ def rooms_plan(
         "format_version": FORMAT_VERSION,
         "writer": writer_name(),
         "spec": spec.to_json(),
-        "conventions": CONVENTIONS,
+        "conventions": conventions(spec),
         "creation_command": command,
         **renderer,
     }

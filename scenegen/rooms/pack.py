@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.common.records import from_json
+from scenegen.description.interiors import Interior
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.files.schema import Column
 from scenegen.files.table import PackedRows, pack_rows
@@ -76,7 +78,9 @@ def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
     models = np.array([*batch.names, ""], object)  # -1, an unused slot, takes the last
     classes = [spec.shapes.index(name.partition("/")[0]) for name in batch.names]
     shape, view = batch.shape[images], batch.view[images]
+    interior = _interior(batch, images) if batch.interior is not None else {}
     return {
+        **interior,
         "scene_index": batch.index[images],
         "view_index": view,
         "view_angle_degrees": np.array(spec.views)[view],
@@ -96,3 +100,13 @@ def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
         "object/world_from_object": batch.world_from_object[images],
         "object/scale": batch.object_scale[images],
     }
+
+
+def _interior(batch: SceneBatch, images: Array) -> dict[str, Array]:
+    """Return the columns of `layout.INTERIOR` that scenes say."""
+    assert batch.interior is not None
+    rooms = [from_json(Interior, text, "interior") for text in batch.interior[images]]
+    stands_on = np.full((len(images), batch.spec.object_slots), -1, np.int8)
+    for row, room in zip(stands_on, rooms, strict=True):
+        row[: len(room.stands_on)] = room.stands_on
+    return {"object/stands_on": stands_on, "room/size": np.array([room.size for room in rooms])}

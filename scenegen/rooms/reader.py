@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, overload
 
 import h5py
+import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import back_project, transform_points
@@ -20,8 +21,8 @@ from scenegen.files.content import SHA256, joint_digest
 from scenegen.files.input_file import describing
 from scenegen.files.rows import RowDataset, RowFile, chosen_rows
 from scenegen.files.sets.shards import OpenFile
-from scenegen.layout import FORMAT, FURTHER, SCORED, TRUTH_DIGEST, WITHHELD, columns
-from scenegen.rendering.ground_truth import decode_image
+from scenegen.layout import FORMAT, FURTHER, INTERIOR, SCORED, TRUTH_DIGEST, WITHHELD, columns
+from scenegen.rendering.ground_truth import decode_image, undeveloped
 
 Array = NDArray[Any]
 # What a file without truth holds.
@@ -39,7 +40,7 @@ INPUT = (
 class Room:
     """One row of a rooms file; frames, units and shapes as in `layout.FIELDS`.
 
-    `truth` has the columns of `layout.FURTHER` that the file holds, by name.
+    `truth` has the columns of `layout.FURTHER` and `layout.INTERIOR` that the file holds, by name.
     """
 
     index: int
@@ -56,8 +57,9 @@ class Room:
 
     @property
     def radiance(self) -> Array:
-        """Linear RGB radiance, (H, W, 3) float32."""
-        return decode_image(self.image)
+        """Linear RGB radiance, (H, W, 3) float32; of developed pictures, that which they show."""
+        developed = self.scene.interior is not None and self.image.dtype == np.uint8
+        return undeveloped(self.image) if developed else decode_image(self.image)
 
     @property
     def points(self) -> Array:
@@ -102,6 +104,7 @@ class RoomsFile(RowFile):
         with describing(f"{self.path}: attribute 'spec'"):
             self.spec = DatasetSpec.from_json(self.attributes["spec"])
         self.further = [c.name for name in self.spec.truth for c in FURTHER[name]]
+        self.further += [c.name for c in INTERIOR if self.spec.interior]
         self._count_rows("image")
         if not len(self):
             raise FileFormatError(f"{self.path}: image", "no rows", "at least one")
@@ -148,6 +151,10 @@ class RoomsFile(RowFile):
     def _described(self, row: int, text: bytes) -> SceneSpec:
         with describing(f"{self.path}: scene, row {row}"):
             return SceneSpec.from_json(text)
+
+    def room_size(self, row: int) -> Array | None:
+        """Return the inner size of a closed room, (3,), metres; None for the paper's room."""
+        return np.asarray(self.read("room/size", row)) if self.spec.interior else None
 
     def check_field(self, name: str) -> None:
         """Raise SpecError unless `read` takes this name, FileFormatError if it is withheld."""

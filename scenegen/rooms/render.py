@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.description.scene_arrays import SceneArrays
@@ -22,9 +21,16 @@ from scenegen.layout import columns
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.rendering.amodal import amodal_masks
-from scenegen.rendering.ground_truth import GroundTruth, visible_pixels
+from scenegen.rendering.ground_truth import visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack_arrays
-from scenegen.rendering.renderer import launch, share_processors
+from scenegen.rendering.pictures.places import ASSETS
+from scenegen.rendering.renderer import (
+    launch_fields,
+    picture_fields,
+    share_processors,
+    trace,
+    truth_fields,
+)
 from scenegen.rooms.pack import RenderedScene, pack_rooms
 from scenegen.rooms.truth import further_truth
 from scenegen.sampling.proposals import ProposalQueue
@@ -34,7 +40,8 @@ BLOCK = 512  # images that a worker process makes in one go
 PACKED = 16  # scenes that a thread packs in one go
 WINDOW = 8  # batches that may be begun while the oldest item is still being proposed again
 
-_Begun = tuple[SceneArrays, SceneBatch, Callable[[], GroundTruth]]  # a batch being rendered
+_Fetch = Callable[[], dict[str, Array]]
+_Begun = tuple[SceneArrays, SceneBatch, _Fetch]  # a batch being rendered
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +53,7 @@ class RoomsWork:
         batch: images rendered at once.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         cache_dir: where members of families are kept.
+        assets: places of materials and surroundings, as `pictures.places.Places.use` takes them.
     """
 
     spec: DatasetSpec
@@ -54,6 +62,7 @@ class RoomsWork:
     objects: Objects
     compression: str
     cache_dir: Path | None
+    assets: tuple[Path | None, Path | None] = (None, None)
 
     @property
     def block(self) -> int:
@@ -66,6 +75,7 @@ class RoomsWork:
         Returns why models were refused, by name.
         """
         MEMBER_STORE.use(self.cache_dir)
+        ASSETS.use(*self.assets)
         share_processors(workers, self.device)
         fields = columns(self.spec)
         groups = (
@@ -96,7 +106,8 @@ def render_items(
     more than WINDOW batches behind.
     """
     objects = objects or objects_of(spec)
-    views = range(len(spec.views))
+    views, traced = range(len(spec.views)), spec.shading == "path"
+    names = truth_fields(spec) + ([] if traced else picture_fields(spec))
     batch = max(1, batch // len(views))  # scenes
     proposals = ProposalQueue(spec, indices, objects)
     finished: dict[int, RenderedScene] = {}
@@ -108,7 +119,7 @@ def render_items(
         return None if scenes is None else (scenes, pack_arrays(spec, scenes, views, objects))
 
     def begin(proposed: tuple[SceneArrays, SceneBatch] | None) -> _Begun | None:
-        return None if proposed is None else (*proposed, launch(proposed[1], device))
+        return None if proposed is None else (*proposed, launch_fields(proposed[1], names, device))
 
     begun: _Begun | None = None
     while begun := begun or begin(propose()):
@@ -118,7 +129,7 @@ def render_items(
         masks = amodal_masks(packed, device) if "amodal" in spec.truth else None
         begun = begin(following)
         for item, shown in zip(
-            scenes.index.tolist(), _shown(scenes, packed, truth, masks), strict=True
+            scenes.index.tolist(), _shown(scenes, packed, truth, masks, device), strict=True
         ):
             if shown is None:
                 proposals.refuse(item)
@@ -134,19 +145,28 @@ def render_items(
 
 
 def _shown(
-    scenes: SceneArrays, batch: SceneBatch, truth: GroundTruth, masks: Array | None
+    scenes: SceneArrays,
+    batch: SceneBatch,
+    truth: dict[str, Array],
+    masks: Array | None,
+    device: str,
 ) -> Iterator[RenderedScene | None]:
-    """Yield each scene with its pixels, or None where an object shows too few in some view."""
+    """Yield each scene with its pixels, or None where some view shows too little of its objects.
+
+    Path-traced pictures take long: they are made of scenes that are accepted.
+    """
     spec = batch.spec
-    visible = visible_pixels(truth.object_id, spec.object_slots)
-    missing: Array = np.arange(spec.object_slots) >= batch.object_count[:, None]
-    enough = np.asarray((missing | (visible >= spec.min_visible_pixels)).all(axis=1))
+    visible = visible_pixels(truth["object_id"], spec.object_slots)
+    enough = spec.seen_enough(visible, batch.object_count)
     for row, first in enumerate(range(0, len(batch), len(spec.views))):
         images = slice(first, first + len(spec.views))
         if not enough[images].all():
             yield None
             continue
-        pixels = {name: values[images] for name, values in truth.pixels().items()}
+        pixels = {name: values[images] for name, values in truth.items()}
+        if spec.shading == "path":
+            shown = batch.rows(images.start, images.stop)
+            pixels |= trace(shown, picture_fields(spec), device)
         whole = None if masks is None else masks[images]
         pixels |= further_truth(batch, first, pixels, whole)
         yield RenderedScene(scenes, row, batch, first, pixels, visible[images])

@@ -27,6 +27,7 @@ Array = NDArray[Any]
 UNIT_TOLERANCE = 1e-5  # by which the length of a normal may differ from 1
 PLANE_TOLERANCE = 1e-5  # scene units that float32 depths may put a surfel off its plane
 RADIANCE_TOLERANCE = 1e-5  # float32's rounding in the shading equation, for radiance up to 1
+OUTSIDE = 0.25  # metres beyond the inner walls to which windows reach
 LOBE_TOLERANCE = 4e-7  # relative rounding of a highlight for each unit of its exponent
 PIXELS = ("image", "depth", "normal", "object_id")
 _RULES = {
@@ -138,7 +139,11 @@ def _depth_problems(room: Room, points: Array) -> Iterable[str]:
     if not np.isnan(room.depth[~hit]).all():
         yield "a pixel without a hit has a depth"
     walls = np.abs(points[room.object_id == 0])
-    if walls.size and not (walls.min(axis=1) < PLANE_TOLERANCE).all():
+    if room.scene.interior:
+        size = np.array(room.scene.interior.size) / 2
+        if walls.size and not (np.abs(points[room.object_id == 0] - size) < size + OUTSIDE).all():
+            yield "a surfel of the room lies beyond its walls"
+    elif walls.size and not (walls.min(axis=1) < PLANE_TOLERANCE).all():
         yield "a surfel of the room lies off floor and walls"
 
 
@@ -170,8 +175,8 @@ def _object_problems(spec: DatasetSpec, room: Room, shown: Array) -> Iterable[st
     visible = visible_pixels(room.object_id[None], spec.object_slots)[0]
     if not np.array_equal(visible, shown):
         yield "object/visible_pixels does not count them"
-    if (visible[:count] < spec.min_visible_pixels).any():
-        yield f"an object shows {visible[:count].min()} pixels"
+    if not spec.seen_enough(visible[None], np.array([count]))[0]:
+        yield f"too few objects show {spec.min_visible_pixels} pixels"
 
 
 def _image_problems(

@@ -152,7 +152,11 @@ def truth_problems(
             yield "flow", "flow is not that of depth and cameras"
         if (stored["flow_occluded"] != occluded).mean() > EDGE_SHARE:
             yield "flow", "occlusion is not that of depth and cameras"
-    if "albedo" in truth:
+    if "albedo" in truth and spec.interior:
+        values, hit = stored["albedo"], view.object_id >= 0
+        if not ((values[hit] >= 0) & (values[hit] <= 1)).all():
+            yield "albedo", "albedo is not from 0 to 1"
+    elif "albedo" in truth:
         rho = albedo(view.object_id, stored["material/reflectance"]).astype(np.float32)
         own = (view.object_id > 0) & spec.own_reflectance
         if not np.array_equal(stored["albedo"][~own], rho[~own], equal_nan=True):

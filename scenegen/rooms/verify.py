@@ -35,7 +35,7 @@ from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.rendering.amodal import amodal_masks
 from scenegen.rendering.backend import EXACT_VARIANT, exact_kind, select_variant
 from scenegen.rendering.packing import pack
-from scenegen.rendering.renderer import render
+from scenegen.rendering.renderer import PICTURE, render
 from scenegen.rooms.reader import Room, RoomsFile
 from scenegen.rooms.row_rules import (
     LOBE_TOLERANCE,
@@ -55,6 +55,10 @@ EDGE_NORMAL = 0.05  # difference of a normal's component from a neighbour's at a
 NORMAL_TOLERANCE = 1e-3
 IMAGE_TOLERANCE = {"uint8": 0.0, "float16": 2.0**-10, "float32": 1e-4}
 PATH_TOLERANCE = 0.1  # share by which the mean of a path-traced image's channel may differ
+PATCH = 16  # pixels of a side; pictures of closed rooms agree if the means of all patches do,
+PATCH_TOLERANCE = 0.03  # by this share of white. Rounding turns few paths, so noise is alike
+EXPOSURE_TOLERANCE = 0.02
+ALBEDO_SHARE = 0.01  # of values of albedo that may differ, at edges
 EDGE_SHARE = 1e-3  # of a row's pixels that may disagree
 AMODAL = "object/amodal_mask"
 BLOCK_PIXELS = 2**20  # of the rows that are read at once
@@ -159,8 +163,9 @@ def _sampled_again(rooms: RoomsFile, rows: Sequence[int], objects: Objects) -> C
 
 def _proposals(rooms: RoomsFile, index: int, objects: Objects) -> Iterator[SceneSpec]:
     """Yield what the seed proposes for an item, some at a time, as few are mostly enough."""
-    for first in range(0, MAX_ATTEMPTS, TRIED_AT_ONCE):
-        attempts = range(first, min(first + TRIED_AT_ONCE, MAX_ATTEMPTS))
+    step = 1 if rooms.spec.interior else TRIED_AT_ONCE  # closed rooms take long, one by one
+    for first in range(0, MAX_ATTEMPTS, step):
+        attempts = range(first, min(first + step, MAX_ATTEMPTS))
         _, drawn = sample_scenes(rooms.spec, [index] * len(attempts), attempts, objects)
         yield from (drawn.scene(k) for k in range(len(drawn)))
 
@@ -184,7 +189,7 @@ def _rendered_again(rooms: RoomsFile, rows: Sequence[int], device: str, objects:
             name for name, pair in pairs.items() if not np.array_equal(*pair, equal_nan=True)
         ]
         off += bool(differs)
-        rounded = differs if others else ["image"] if rooms.spec.shading == "path" else []
+        rounded = differs if others else PICTURE if rooms.spec.shading == "path" else []
         with np.errstate(all="ignore"):
             edges = _edges(pixels["object_id"], pixels["normal"])
             differs = [
@@ -253,12 +258,28 @@ def _edges(object_id: Array, normal: Array) -> Array:
     return np.asarray((ids > 0) | (normals > EDGE_NORMAL).any(axis=-1))
 
 
+def _same_picture(name: str, a: Array, b: Array) -> bool:
+    """Return whether two developed pictures, or what belongs to them, agree up to noise."""
+    if name == "exposure":
+        return bool(np.allclose(a, b, rtol=EXPOSURE_TOLERANCE))
+    if name == "albedo":
+        off = np.abs(a - b) > NORMAL_TOLERANCE
+        return bool(off.mean() <= ALBEDO_SHARE)
+    scale = 255.0 if a.max(initial=0.0) > 1.0 else max(float(b.mean()), 1e-9)
+    rows, columns = (-(-n // PATCH) * PATCH for n in a.shape[:2])
+    wide = [(0, rows - a.shape[0]), (0, columns - a.shape[1]), (0, 0)]
+    off = np.pad(a - b, wide).reshape(rows // PATCH, PATCH, columns // PATCH, PATCH, 3)
+    return bool(np.abs(off.mean(axis=(1, 3))).max() <= PATCH_TOLERANCE * scale)
+
+
 def _within_tolerance(
     name: str, stored: Array, again: Array, edges: Array, spec: DatasetSpec
 ) -> bool:
     """Return whether two arrays of pixels, (H, W, ...), agree as far as other variants can."""
     most: float | Array
     a, b = stored.astype(np.float64), again.astype(np.float64)
+    if spec.interior and name in PICTURE:
+        return _same_picture(name, a, b)
     if name != "image":
         tolerances = {"depth": DEPTH_TOLERANCE, "normal": NORMAL_TOLERANCE}
         most = {**tolerances, "albedo": NORMAL_TOLERANCE}.get(name, 0.0)

@@ -9,6 +9,7 @@ from scenegen.objects.catalogue import Objects
 from scenegen.sampling.scenes import MAX_ATTEMPTS, MAX_RENDERED, refusal, sample_scenes
 
 AHEAD = 512  # proposals drawn at once: with few, arrays are slow; with many, retries wait
+AHEAD_INTERIORS = 16  # closed rooms take long, one by one
 RETRIES = 3  # least number of attempts that are drawn at once for an item that needs another
 
 
@@ -18,6 +19,8 @@ class ProposalQueue:
     def __init__(self, spec: DatasetSpec, items: range, objects: Objects) -> None:
         """Draw nothing yet; `objects` are what the scenes are made of."""
         self._spec, self._objects, self._items = spec, objects, items
+        self._ahead = AHEAD_INTERIORS if spec.interior else AHEAD
+        self._retries = 1 if spec.interior else RETRIES
         self._begun = 0  # items that were proposed at least once
         self._stock: list[int] = []  # a heap of items whose next proposal is known
         self._again: list[int] = []  # a heap of items that need another attempt
@@ -30,7 +33,7 @@ class ProposalQueue:
 
         Raises PlacementError where MAX_ATTEMPTS proposals of an item were of no use.
         """
-        if self._left() and len(self._stock) < AHEAD:
+        if self._left() and len(self._stock) < self._ahead:
             self._draw()  # before it must be, so that items without room are tried again in time
         rows = defaultdict[int, list[int]](list)
         drawn: dict[int, SceneArrays] = {}
@@ -72,14 +75,18 @@ class ProposalQueue:
         is soon known to be one.
         """
         tries: list[tuple[int, int]] = []  # item, attempt
-        while self._again and len(tries) < AHEAD:
+        while self._again and len(tries) < self._ahead:
             item = heapq.heappop(self._again)
             first = self._attempts[item]
             if first == MAX_ATTEMPTS:
                 raise refusal(self._spec, item, self._taken[item])
-            more = range(first, min(first + max(first, RETRIES), MAX_ATTEMPTS))
+            more = range(first, min(first + max(first, self._retries), MAX_ATTEMPTS))
             tries += [(item, attempt) for attempt in more]
-        room = min(AHEAD - len(tries), 2 * AHEAD - len(self._stock), len(self._items) - self._begun)
+        room = min(
+            self._ahead - len(tries),
+            2 * self._ahead - len(self._stock),
+            len(self._items) - self._begun,
+        )
         new = self._items[self._begun : self._begun + max(room, 0)]
         self._begun += len(new)
         tries += [(item, 0) for item in new]

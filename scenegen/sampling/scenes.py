@@ -16,10 +16,11 @@ from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.common.rotations import product, rotation_matrix
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import LEAST_SEEN, DatasetSpec
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.sampling.bodies import MARGIN, bodies_of
 from scenegen.sampling.cameras import sample_cameras, sample_fov_y
+from scenegen.sampling.interiors.scenes import item_room, sample_interiors
 from scenegen.sampling.lights import sample_lights
 from scenegen.sampling.objects import Unplaced, sample_counts, sample_objects
 from scenegen.sampling.placement import (
@@ -62,6 +63,8 @@ def sample_scenes(
     Raises SpecError where no model of a class can be used.
     """
     index, attempt = np.asarray(index, np.int64), np.asarray(attempt, np.int64)
+    if spec.interior:
+        return sample_interiors(spec, index, attempt, objects or objects_of(spec))
     unplaced = sample_objects(spec, index, objects or objects_of(spec))
     cameras, fov_y_degrees = sample_cameras(spec, index), sample_fov_y(spec, index)
     frustums = make_frustums(spec, cameras, fov_y_degrees)
@@ -93,6 +96,7 @@ def sample_scenes(
         attenuation=same(spec.attenuation, 2),
         room_reflectance=same(spec.room_reflectance, 3),
         background=same((0.0, 0.0, 0.0), 3),
+        interior=np.full(len(index), "", object),
     )
     return placed, scenes.take(placed)
 
@@ -114,6 +118,15 @@ def refusal(
         placed_but_hidden: how many of its proposals found room and were rendered.
         attempts: how many were made.
     """
+    if spec.interior:
+        return PlacementError(
+            f"item {index}",
+            f"no room for its {item_room(spec, index)[1]} objects in {attempts} proposals"
+            if not placed_but_hidden
+            else f"{placed_but_hidden} proposals that show too few objects",
+            f"room for all of them, and a camera that sees {LEAST_SEEN}",
+            "try fewer --objects, more --classes, or views that are less far apart",
+        )
     objects = int(sample_counts(spec, np.array([index]))[0])
     if placed_but_hidden:
         return PlacementError(

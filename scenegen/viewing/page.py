@@ -20,9 +20,6 @@ from scenegen.rooms.reader import Room, RoomsFile
 from scenegen.viewing import drawing
 from scenegen.viewing.geometry import (
     COLORINGS,
-    RIGHT,
-    TOO_FAR,
-    TOO_NEAR,
     Mesh,
     ShapeOf,
     Surfels,
@@ -41,7 +38,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 Scenes = Sequence[tuple[int, ...]]  # of each scene the rows of its views
-ALL_VIEWS, ERROR = "All views", "Error of depth"
+ALL_VIEWS, ERROR = "All views", "Error: blue is too near, red too far"
 TRUTH, PREDICTION = "/truth", "/prediction"  # of the page's tree
 LAYERS = {  # controls that show a part of the scene
     "truth": "True surfels",
@@ -133,7 +130,6 @@ class RoomsPage:
                 hint = "Error of depth, in scene units, that has the full colour."
                 full = gui.add_number("Full colour at", 0.05, min=0.001, max=10, hint=hint)
                 self._add("full", full)
-            self._legend = gui.add_html("", visible=False)
             self._add("size", gui.add_slider("Size of surfels", 0.1, 4.0, 0.1, 2.0))
             # Cameras would hide predictions, which are looked at from behind them.
             later = () if predicted is None else ("cameras",)
@@ -156,6 +152,11 @@ class RoomsPage:
     def text(self) -> str:
         """What the page says of the scene, as HTML."""
         return str(self._about.content)
+
+    @property
+    def clicked(self) -> str:
+        """What the page says of the pixel that was clicked last, as HTML."""
+        return str(self._clicked.content)
 
     def show(self) -> None:
         """Draw what the controls say."""
@@ -221,13 +222,12 @@ class RoomsPage:
             clouds.append(Cloud(TRUTH, room, surfels, surfels.of_pixels(pixels)))
         if self._predicted is None:
             return clouds
-        full = self.controls["full"].value
-        self._legend.content, self._legend.visible = _legend(full), coloring == ERROR
         if self._is_on("prediction"):
             points = self._predicted.points(room)
             surfels = surfels_of(room, points)
             if coloring == ERROR:
-                colors = error_colors(surfels.of_pixels(-points[..., 2] - room.depth), full)
+                error = surfels.of_pixels(-points[..., 2] - room.depth)
+                colors = error_colors(error, self.controls["full"].value)
             else:
                 colors = surfels.of_pixels(pixel_colors(self._with_normal(room), coloring))
             if self._is_beside():
@@ -355,10 +355,3 @@ def _table(lines: Mapping[str, str]) -> str:
         for name, text in lines.items()
     )
     return f'<table style="{STYLE}">{rows}</table>'
-
-
-def _legend(full: float) -> str:
-    """Return the colours of errors and their limit, in scene units, as HTML."""
-    stops = ", ".join(f"rgb{color}" for color in (TOO_NEAR, RIGHT, TOO_FAR))
-    bar = f'<div style="height:0.8em;background:linear-gradient(to right, {stops})"></div>'
-    return f'<div style="{STYLE}">{bar}{full:g} too near, right, {full:g} too far</div>'

@@ -7,7 +7,7 @@ from refusals import refused
 
 from baselines.cut_outs import LEARNING, LIFT, NAMES, blob_balls, outline_features, write_cut_outs
 from baselines.picture import outline_mask
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.scoring.evaluate import score
 from scenegen.camera import back_project, look_at, pixel_directions, transform_points
 from scenegen.common.errors import SpecError

@@ -66,7 +66,7 @@ def failing(split_folder: Path, tmp_path: Path, few_explained: None) -> Callable
     It is audited together with copies of others. That the content has changed is asserted here, and
     left out.
     """
-    from iqtt.audit.audit import audit
+    from audit_tables import audited
 
     def fail(edit: Edit, name: str = "iqtt-val.h5", *others: str) -> set[str]:
         folder = tmp_path / "split"
@@ -75,7 +75,7 @@ def failing(split_folder: Path, tmp_path: Path, few_explained: None) -> Callable
             shutil.copy(split_folder / copied, folder)
         with h5py.File(folder / name, "r+") as file:
             edit(file)
-        found = audit([folder], probed=0)
+        found = audited([folder], probed=0)
         skipped = {proof.name for proof in found.proofs if proof.status == "skipped"}
         assert skipped <= {"splits apart"}
         failed = {proof.name for proof in found.proofs if proof.status == "FAIL"}

@@ -37,7 +37,7 @@ def pools_of(spec: SplitSpec) -> Pools:
 
 def rendered(spec: SplitSpec, split: str, group: str = "", **options) -> list[Rendered]:
     first, count = groups(spec, split)[group]
-    batches = list(render_questions(spec, pools_of(spec), split, first, count, **options))
+    batches = list(render_questions(pools_of(spec), split, first, count, **options))
     size = options.get("batch", module.DEFAULT_BATCH)
     assert all(0 < len(batch) <= size for batch in batches)
     return [one for batch in batches for one in batch]
@@ -154,7 +154,7 @@ def test_a_cube_hidden_in_the_full_image_after_all_has_its_question_made_anew(mo
         used = one.question.shapes.cubes.shape[1]
         assert (one.visible_pixels[:, :used] >= 5).all()
         assert not one.visible_pixels[:, used:].any()
-        assert bits(render_question(spec, pools_of(spec), "train", one.question.index)) == bits(one)
+        assert bits(render_question(pools_of(spec), "train", one.question.index)) == bits(one)
 
 
 def test_a_request_that_cannot_be_met_ends_after_a_few_questions(monkeypatch):
@@ -179,7 +179,8 @@ def test_every_cube_shows_in_every_image():
 
 def test_depth_comes_only_where_it_was_asked_for():
     without = replace(SPEC, with_depth=False)
-    one, other = render_question(without, pools_of(SPEC), "val", 2), rendered(SPEC, "val")[2]
+    pools = replace(pools_of(SPEC), spec=without)
+    one, other = render_question(pools, "val", 2), rendered(SPEC, "val")[2]
     assert one.depth is None
     assert one.images.tobytes() == other.images.tobytes()
 
@@ -200,7 +201,7 @@ def test_other_settings_of_the_image_leave_shapes_and_views_alone():
 def test_questions_that_a_split_does_not_have():
     for split, index in (("train", 12), ("train", -1), ("val", 4), ("test", 3)):
         with pytest.raises(IndexError, match=f"{split} .* {index}"):
-            render_question(SPEC, pools_of(SPEC), split, index)
+            render_question(pools_of(SPEC), split, index)
     empty = replace(SPEC, train=0, labeled=0, test=0)
     assert rendered(empty, "train", "labeled") == rendered(empty, "test") == []
     assert groups(replace(SPEC, labeled=12), "train") == {"labeled": (0, 12), "unlabeled": (12, 0)}

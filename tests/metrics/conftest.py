@@ -10,7 +10,7 @@ import pytest
 from hypothesis import settings
 from numpy.typing import ArrayLike, NDArray
 
-from metrics.submissions.hints.rooms import room_hints
+from metrics.submissions.hints.tasks import room_hints
 from metrics.submissions.reader import open_predictions
 from scenegen.camera import pixel_directions
 from scenegen.rooms.reader import RoomsFile

@@ -1,13 +1,20 @@
 """Tables of questions as the audit reads them, made from cubes and views without any file."""
 
-from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from iqtt.audit.audit import audit
 from iqtt.audit.proofs.shapes import Shapes, compare_shapes
-from iqtt.audit.table import AuditTable, Source
+from iqtt.audit.table import AuditTable, lacking, open_paths
 from iqtt.questions.specs import SplitSpec
+
+
+def audited(paths: Any, **how: Any) -> Any:
+    """Return the audit of files and folders."""
+    with open_paths(paths) as opened:
+        return audit(opened, lacking=lacking(paths), **how)
 
 
 def audit_table(
@@ -35,11 +42,8 @@ def audit_table(
     }
     none = np.zeros((count, images))
     table = AuditTable(
-        source=Source(split, Path(split), "", None, True, count, images),
-        spec=spec,
-        split=split,
-        fingerprint=None,
-        image_dtype="uint8",
+        name=split,
+        questions=SimpleNamespace(spec=spec, split=split, answers=images - 1),
         answers=None,
         truth=truth,
         contents={},

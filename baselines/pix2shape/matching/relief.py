@@ -66,7 +66,7 @@ def relief_of_row(rooms: Rooms, row: int, sides: tuple[list[int], list[int]]) ->
         rows = torch.tensor([row]).expand(len(others))
         images = rooms.image[rows].float(), rooms.image[others].float()
         cameras, other_cameras = (
-            Cameras(rooms.world_from_camera[views], rooms.fov_y_degrees) for views in (rows, others)
+            Cameras(rooms.world_from_camera[views], rooms.fov_of(views)) for views in (rows, others)
         )
         cost = matching_cost(images[0], cameras, images[1], other_cameras, noise)
         costs.append(cost.mean(dim=0, keepdim=True))

@@ -10,13 +10,11 @@ colour there: matte surfaces under fixed lights look the same from everywhere. T
 depth from several views rests on (Zhou et al. 2017; Godard et al. 2019).
 """
 
-import math
-
 import torch
 from torch import Tensor
 from torch.nn import functional
 
-from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms, rays
+from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms, half_slope, rays
 
 NEAR = 0.05  # scene units; points nearer to the other camera than this, or behind it, are not seen
 STEPS, STEP = 32, 0.02  # reliefs that are tried: 0, STEP, ..., scene units
@@ -46,12 +44,12 @@ def reprojected(
     """
     batch, count, size, _ = depth.shape
     other_from_camera = torch.linalg.solve(others.world_from_camera, cameras.world_from_camera)
-    toward = other_from_camera[:, :3, :3] @ rays(size, cameras.fov_y_degrees, depth).flatten(1)
+    toward = other_from_camera[:, :3, :3] @ rays(size, cameras.fov_y_degrees, depth).flatten(-2)
     points = (
         toward[:, :, None] * depth.flatten(2)[:, None] + other_from_camera[:, :3, 3, None, None]
     )
     away = -points[:, 2]
-    edge = math.tan(math.radians(others.fov_y_degrees) / 2) * away.clamp(min=NEAR)
+    edge = half_slope(others.fov_y_degrees) * away.clamp(min=NEAR)
     place = torch.stack([points[:, 0], -points[:, 1]], dim=3) / edge[..., None]
     shown = functional.grid_sample(values, place, padding_mode="border", align_corners=False)
     seen = (place.abs() < 1).all(dim=3) & (away > NEAR)

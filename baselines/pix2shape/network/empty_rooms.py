@@ -1,5 +1,6 @@
 """What is known of every room before an image is seen: where rays enter and leave the unit box."""
 
+import math
 from dataclasses import dataclass
 
 import torch
@@ -14,27 +15,45 @@ DEEPEST = 0.95  # of a ray's depth in the empty room; it enters the room before 
 
 @dataclass(frozen=True, eq=False)
 class Cameras:
-    """The cameras of B images, all of one field of view: world_from_camera (B, 4, 4)."""
+    """The cameras of B images.
+
+    Attributes:
+        world_from_camera: (B, 4, 4).
+        fov_y_degrees: vertical angle of view: a number for all, or (B,).
+    """
 
     world_from_camera: Tensor
-    fov_y_degrees: float
+    fov_y_degrees: float | Tensor
 
 
-def rays(size: int, fov_y_degrees: float, like: Tensor) -> Tensor:
-    """Return the rays (x, y, -1) through the pixels' centres, camera frame, (3, S, S)."""
-    x, y = pixel_rays(size, size, fov_y_degrees, like)
-    across, down = x.expand(size, size), y.expand(size, size)
-    return torch.stack([across, down, -torch.ones_like(across)])
+def half_slope(fov_y_degrees: float | Tensor) -> float | Tensor:
+    """Return the tangent of half the angle of view, a number or (B, 1, 1)."""
+    if isinstance(fov_y_degrees, Tensor):
+        return torch.tan(torch.deg2rad(fov_y_degrees) / 2)[:, None, None]
+    return math.tan(math.radians(fov_y_degrees) / 2)
+
+
+def rays(size: int, fov_y_degrees: float | Tensor, like: Tensor) -> Tensor:
+    """Return the rays (x, y, -1) through the pixels' centres, camera frame, (3, S, S).
+
+    They are (B, 3, S, S) where each camera has its own angle of view.
+    """
+    if isinstance(fov_y_degrees, Tensor):
+        x, y = (axis * half_slope(fov_y_degrees) for axis in pixel_rays(size, size, 90.0, like))
+    else:
+        x, y = pixel_rays(size, size, fov_y_degrees, like)
+    across, down = (axis.expand(*axis.shape[:-2], size, size) for axis in (x, y))
+    return torch.stack([across, down, -torch.ones_like(across)], dim=-3)
 
 
 def empty_rooms(
-    world_from_camera: Tensor, fov_y_degrees: float, size: int
+    world_from_camera: Tensor, fov_y_degrees: float | Tensor, size: int
 ) -> tuple[Tensor, Tensor, Tensor]:
     """Return what cameras see of rooms without objects.
 
     Args:
         world_from_camera: (B, 4, 4).
-        fov_y_degrees: vertical angle of view of all cameras.
+        fov_y_degrees: as of `Cameras`.
         size: S, pixels a side.
 
     Returns:
@@ -45,7 +64,7 @@ def empty_rooms(
         points: where rays meet floor and walls, world frame, (B, 3, S, S).
     """
     origin = world_from_camera[:, :3, 3, None]  # (B, 3, 1)
-    ahead = rays(size, fov_y_degrees, world_from_camera).flatten(1)
+    ahead = rays(size, fov_y_degrees, world_from_camera).flatten(-2)
     with torch.autocast(ahead.device.type, enabled=False):  # bfloat16 moves walls by 0.01
         toward = world_from_camera[:, :3, :3] @ ahead
     falling = toward < 0

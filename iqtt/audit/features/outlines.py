@@ -62,7 +62,7 @@ def _describe(masks: NDArray[np.bool_]) -> tuple[Array, Array]:
     short = min(masks.shape[1:])
     empty = ~np.asarray(masks.any(axis=(1, 2)))
     left, right, rows = _row_ends(masks)
-    middle, invariants = _moments(masks)
+    middle, invariants = moments(masks)
     points = np.stack([np.concatenate([left, right], 1), np.concatenate([rows, rows], 1)], 2)
     reach = _reaches((points - middle[:, None]) / short)
     half = DIRECTIONS // 2
@@ -164,7 +164,7 @@ def _perimeters(masks: NDArray[np.bool_]) -> Array:
     return np.asarray(np.pi / 8 * (count[0] + count[1] / np.sqrt(2)))
 
 
-def _moments(masks: NDArray[np.bool_]) -> tuple[Array, Array]:
+def moments(masks: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Return the middle, (N, 2) x and y in pixels, and moment invariants, (N, 7).
 
     The invariants are lengths: roots of the moduli of complex moments, which are

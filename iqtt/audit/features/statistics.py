@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.features.outlines import DISTANCES, FEATURES, outlines
+from iqtt.audit.features.outlines import DISTANCES, FEATURES, moments, outlines
 from iqtt.files.layout import NO_CUBE
 from scenegen.rendering.ground_truth import decode_image
 
@@ -30,7 +30,7 @@ def statistics_record(images: int) -> np.dtype[np.void]:
         ("mean_color", "f8", (3,)),  # mean of the silhouette's pixels
         ("contrast", "f8", ()),  # standard deviation of the grey of the silhouette's pixels
         ("colors", "f8", (LEVELS**3,)),  # colour histogram of the silhouette's pixels, shares
-        ("moments", "f8", (4,)),  # lengths from the silhouette's second and third moments
+        ("moments", "f8", (4,)),  # two of `outlines.moments` of each of second and third order
         ("thumbnails", "f4", (THUMBNAIL**2,)),  # small grey images
         ("pixel_distance", "f8", (images,)),  # root mean square differences of the images
         ("outline", "f4", (len(FEATURES),)),  # as `outlines.outlines` gives them
@@ -104,7 +104,7 @@ def measure(images: Array, shown: NDArray[np.bool_]) -> Array:
         "mean_color": mean_color,
         "contrast": np.sqrt((deviation**2).sum(axis=(1, 2)) / pixels),
         "colors": _color_shares(radiance, mask),
-        "moments": _moments(mask),
+        "moments": moments(mask)[1][:, [0, 1, 3, 2]],
         "thumbnails": thumbnails,
     }
     for name, values in columns.items():
@@ -140,33 +140,6 @@ def _color_shares(radiance: Array, mask: NDArray[np.bool_]) -> Array:
     code = level @ np.array([LEVELS**2, LEVELS, 1]) + boxes * np.nonzero(mask)[0]
     counts = np.bincount(code, minlength=boxes * len(mask)).reshape(-1, boxes)
     return np.asarray(counts / np.maximum(counts.sum(axis=1, keepdims=True), 1))
-
-
-def _moments(mask: NDArray[np.bool_]) -> Array:
-    """Return four lengths of each silhouette that turning and mirroring it keep, (N, 4).
-
-    They are shares of the image's shorter side: the standard deviations along the silhouette's two
-    principal axes, and the sixth roots of the third and fourth of Hu's invariants ("Visual pattern
-    recognition by moment invariants", 1962), which are not normalised for size.
-    """
-    height, width = mask.shape[1:]
-    short = min(height, width)
-    y, x = ((np.arange(n) + 0.5 - n / 2) / short for n in (height, width))
-    powers = np.arange(4)
-    # (N, 4, 4): sums of y^p x^q over each silhouette.
-    sums = (y ** powers[:, None]) @ mask.astype(np.float64) @ (x[:, None] ** powers)
-    m = np.moveaxis(sums / np.maximum(sums[:, :1, :1], 1), 0, 2)
-    v, u = m[1, 0], m[0, 1]  # the middle
-    yy, xy, xx = m[2, 0] - v * v, m[1, 1] - v * u, m[0, 2] - u * u
-    yyy = m[3, 0] - 3 * v * m[2, 0] + 2 * v**3
-    xxx = m[0, 3] - 3 * u * m[0, 2] + 2 * u**3
-    yyx = m[2, 1] - 2 * v * m[1, 1] - u * m[2, 0] + 2 * v * v * u
-    yxx = m[1, 2] - 2 * u * m[1, 1] - v * m[0, 2] + 2 * u * u * v
-    middle, half = (yy + xx) / 2, np.hypot((yy - xx) / 2, xy)
-    third = (xxx - 3 * yyx) ** 2 + (3 * yxx - yyy) ** 2
-    fourth = (xxx + yyx) ** 2 + (yxx + yyy) ** 2
-    spreads = np.sqrt(np.maximum([middle + half, middle - half], 0))
-    return np.stack([*spreads, *np.power([third, fourth], 1 / 6)], axis=1)
 
 
 def shape_statistics(

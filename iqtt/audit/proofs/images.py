@@ -64,9 +64,9 @@ def framing(tables: Sequence[AuditTable]) -> Proof:
     for table in tables:
         if table.spec is None or not len(table):
             continue
-        expected = encode_image(np.array(table.spec.background), table.image_dtype)
+        expected = encode_image(np.array(table.spec.background), table.questions.image_dtype)
         # The renderer may round a half up or down.
-        step = 1 if table.image_dtype == "uint8" else 1e-3
+        step = 1 if table.questions.image_dtype == "uint8" else 1e-3
         if np.abs(table.background.astype(float) - expected).max() > step:
             detail = f"{table.name}: the border's commonest colour is {table.background.tolist()}"
             return Proof("framing", "FAIL", f"{detail}; expected: {expected.tolist()} as specified")

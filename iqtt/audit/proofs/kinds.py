@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.audit.congruence import cube_codes, cube_rotations
+from iqtt.audit.congruence import cube_rotations
 from iqtt.audit.proofs.shapes import Shapes
 from iqtt.audit.proofs.verdict import Proof, judge
+from iqtt.audit.proofs.views import views_apart
 from iqtt.audit.table import AuditTable
 from iqtt.questions.specs import DISTRACTOR_KINDS
 
@@ -63,7 +64,7 @@ def labels(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that each wrong answer is to the reference what its label says.
 
     A `mirror` is its mirror image. All others are neither it nor its mirror image: a `near` is it
-    with one cube moved, and a `near-mirror` is the mirror image of an answer labelled `near`.
+    with one cube moved, and a `near-mirror` is its mirror image with one cube moved.
     """
     wrong = []
     for table, its_shapes in zip(tables, shapes, strict=True):
@@ -76,23 +77,26 @@ def labels(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
         known = np.isin(table.truth["distractor_kind"], range(len(DISTRACTOR_KINDS)))
         bad |= known & ~mirror & of_reference
         bad |= near & ~_one_cube_moved(table, its_shapes, near)
-        # (Q, answer, answer): a mirror image of a near answer.
-        mirrors = classes[:, 1:, None] == classes[:, None, 1:]
-        mirrors &= (names[:, 1:, None] != names[:, None, 1:]) & near[:, None]
-        bad |= near_mirror & ~mirrors.any(axis=2)
+        bad |= near_mirror & ~_one_cube_moved(table, its_shapes, near_mirror, mirrored=True)
         wrong.append(bad.any(axis=1) & its_shapes.whole)
     return judge(
         "labels",
         "mirror: the reference's mirror image; near: the reference with one cube moved;"
-        " near-mirror: a near answer's mirror image; none but mirror is the reference's",
+        " near-mirror: its mirror image with one cube moved; none but mirror is its mirror image",
         tables,
         wrong,
         lambda t, row: f"kinds {tables[t].truth['distractor_kind'][row].tolist()} are not so",
     )
 
 
-def _one_cube_moved(table: AuditTable, shapes: Shapes, chosen: Array) -> Array:
-    """Return which of the chosen answers are the reference with one cube moved, (Q, K) bool."""
+def _one_cube_moved(
+    table: AuditTable, shapes: Shapes, chosen: Array, mirrored: bool = False
+) -> Array:
+    """Return which of the chosen answers are the reference with one cube moved, (Q, K) bool.
+
+    With `mirrored` it is the reference's mirror image.
+    """
+    sides = np.array([-1 if mirrored else 1, 1, 1])
     result = np.zeros(chosen.shape, np.bool_)
     chosen = chosen & shapes.whole[:, None]
     for n in np.unique(shapes.count[chosen.any(axis=1)]).tolist():
@@ -102,7 +106,7 @@ def _one_cube_moved(table: AuditTable, shapes: Shapes, chosen: Array) -> Array:
             reference, other = (
                 table.cubes[row, image, :n].astype(np.int64) for image in (0, 1 + answer)
             )
-            result[row, answer] = _all_but_one_coincide(reference, other)
+            result[row, answer] = _all_but_one_coincide(reference * sides, other)
     return result
 
 
@@ -126,10 +130,13 @@ def mirror_images(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pro
 
     Rotations that the shape's own symmetry hides do not count.
     """
-    wrong = [
-        _angle_between(table, its_shapes, _is_kind(table, "mirror")) < _least_angle(table)
-        for table, its_shapes in zip(tables, shapes, strict=True)
-    ]
+    wrong = []
+    for table, its_shapes in zip(tables, shapes, strict=True):
+        mirrors = _is_kind(table, "mirror")
+        first, second = 1 + np.argsort(~mirrors, axis=1, kind="stable")[:, :2].T
+        angle = views_apart(table, its_shapes, first, second, mirrors.sum(axis=1) == 2)[0]
+        least = 0.0 if table.spec is None else table.spec.min_angle_degrees
+        wrong.append(angle < least - 1e-6)
     return judge(
         "mirror images",
         "two mirror images of the right one, from sides as far apart as the answers'",
@@ -137,33 +144,6 @@ def mirror_images(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pro
         wrong,
         lambda t, row: "they are seen from nearly one side",
     )
-
-
-def _least_angle(table: AuditTable) -> float:
-    return 0.0 if table.spec is None else table.spec.min_angle_degrees - 1e-6
-
-
-def _angle_between(table: AuditTable, shapes: Shapes, mirrors: Array) -> Array:
-    """Return how far apart two mirror images are seen, degrees, (Q,); infinite if not two."""
-    result = np.full(len(table), np.inf)
-    rows = np.flatnonzero((mirrors.sum(axis=1) == 2) & shapes.whole)
-    if table.images != 4 or not len(rows):
-        return result
-    views = table.truth["world_from_shape"]
-    order = np.argsort(~mirrors[rows], axis=1, kind="stable")[:, :2]
-    first_place, second_place = 1 + order[:, 0], 1 + order[:, 1]
-    for n in np.unique(shapes.count[rows]).tolist():
-        of_size = shapes.count[rows] == n
-        here, a, b = rows[of_size], first_place[of_size], second_place[of_size]
-        first, second = (table.cubes[here, k, :n].astype(np.int64) for k in (a, b))
-        target = cube_codes(second)
-        for turn in cube_rotations():
-            fits = (cube_codes(first @ turn.T) == target).all(axis=1)
-            between = views[here, b][fits] @ turn @ views[here, a][fits].swapaxes(1, 2)
-            cosine = (np.trace(between, axis1=1, axis2=2) - 1) / 2
-            angle = np.degrees(np.arccos(cosine.clip(-1, 1)))
-            result[here[fits]] = np.fmin(result[here[fits]], angle)
-    return result
 
 
 def matched(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:

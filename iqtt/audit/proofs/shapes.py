@@ -49,7 +49,7 @@ def compare_shapes(tables: Sequence[AuditTable]) -> list[Shapes]:
     results = []
     for table in tables:
         cubes = table.cubes
-        whole, count = _whole(cubes)
+        whole, count = whole_and_count(cubes)
         right = np.zeros((len(table), table.images - 1), np.bool_)
         for n in np.unique(count[whole]).tolist():
             rows = np.flatnonzero(whole & (count == n))
@@ -73,7 +73,7 @@ def compare_shapes(tables: Sequence[AuditTable]) -> list[Shapes]:
     return results
 
 
-def _whole(cubes: Array) -> tuple[Array, Array]:
+def whole_and_count(cubes: Array) -> tuple[Array, Array]:
     """Return `Shapes.whole` and `Shapes.count` of stored cubes, (Q, I, most, 3)."""
     used = (cubes != NO_CUBE).all(axis=3)
     count = used.sum(axis=2)

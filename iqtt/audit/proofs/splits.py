@@ -64,7 +64,7 @@ def splits_for_ever(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> P
             )
             distinct = table.cubes[rows, :, :n].reshape(-1, n, 3)[first]
             owner = class_splits(distinct, chains)[copy.reshape(len(rows), -1)]
-            wrong[t][rows] = (owner != SPLITS.index(table.split or "test")).any(axis=1)
+            wrong[t][rows] = (owner != SPLITS.index(table.questions.split or "test")).any(axis=1)
     rule = "every class of shapes is in the split that the hash of its canonical form names"
     return judge("splits for ever", rule, tables, wrong, lambda t, row: "a shape of another split")
 
@@ -128,7 +128,7 @@ def is_walk(cubes: Sequence[Sequence[int]]) -> bool:
 
 def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that no shape, nor its mirror image, is in two splits."""
-    names = [table.split or "" for table in tables]
+    names = [table.questions.split or "" for table in tables]
     owned: dict[str, Array] = dict.fromkeys(sorted(set(names)), np.zeros(0, np.int64))
     if len(owned) < 2:
         return Proof("splits apart", "skipped", f"one split alone: {', '.join(owned)}")

@@ -45,7 +45,7 @@ def rotations(tables: Sequence[AuditTable]) -> Proof:
 def angles(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     """Prove that right answers are turned far enough from the reference, and as far as stored."""
     least = [table.spec.min_angle_degrees if table.spec else 0.0 for table in tables]
-    turned = [_apart(table, s)[0] for table, s in zip(tables, shapes, strict=True)]
+    turned = [_right_apart(table, s)[0] for table, s in zip(tables, shapes, strict=True)]
     wrong = []
     for table, s, angle, low in zip(tables, shapes, turned, least, strict=True):
         as_stored = np.abs(angle - table.truth["angle_degrees"]) <= STORED_DEGREES
@@ -73,7 +73,7 @@ def lines_of_sight(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pr
     ]
     if not any(least):
         return Proof("lines of sight", "skipped", "no smallest angle is specified")
-    apart = [_apart(table, s)[1] for table, s in zip(tables, shapes, strict=True)]
+    sights = [_right_apart(table, s)[1] for table, s in zip(tables, shapes, strict=True)]
     return judge(
         "lines of sight",
         f"right answers seen from {max(least):g} degrees or more beside the reference's view,"
@@ -81,32 +81,46 @@ def lines_of_sight(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pr
         tables,
         [
             (s.place >= 0) & ~(angle >= low - LEAST_DEGREES)
-            for s, angle, low in zip(shapes, apart, least, strict=True)
+            for s, angle, low in zip(shapes, sights, least, strict=True)
         ],
-        lambda t, row: f"{apart[t][row]:.4f} degrees beside it",
+        lambda t, row: f"{sights[t][row]:.4f} degrees beside it",
     )
 
 
-def _apart(table: AuditTable, shapes: Shapes) -> Array:
-    """Return how far the right answer's view is from the reference's, degrees, (2, Q).
+def _right_apart(table: AuditTable, shapes: Shapes) -> Array:
+    """Return `views_apart` of the reference and the right answer."""
+    return views_apart(
+        table, shapes, np.zeros(len(table), np.int64), 1 + shapes.place, shapes.place >= 0
+    )
 
-    First the smallest rotation from one to the other, then the smallest angle between their lines
-    of sight, as axes. Both are infinite where there is not exactly one right answer.
+
+def views_apart(
+    table: AuditTable, shapes: Shapes, first: Array, second: Array, chosen: Array
+) -> Array:
+    """Return how far apart one shape is seen in two images of each question, degrees, (2, Q).
+
+    First the smallest rotation from one view to the other, then the smallest angle between their
+    lines of sight, as axes. Both are infinite where they show two shapes, and unless `chosen`.
+
+    Args:
+        first, second: the images, (Q,).
+        chosen: which questions to look at, (Q,) bool.
     """
     result = np.full((2, len(table)), np.inf)
-    for n in np.unique(shapes.count[shapes.place >= 0]).tolist():
-        rows = np.flatnonzero((shapes.place >= 0) & (shapes.count == n))
-        place = 1 + shapes.place[rows]
-        cubes = table.cubes[..., :n, :].astype(np.int64)
-        views = table.truth["world_from_shape"]
-        reference, target = cubes[rows, 0], cube_codes(cubes[rows, place])
+    chosen = chosen & shapes.whole
+    views = table.truth["world_from_shape"]
+    for n in np.unique(shapes.count[chosen]).tolist():
+        rows = np.flatnonzero(chosen & (shapes.count == n))
+        a, b = first[rows], second[rows]
+        one, target = (table.cubes[rows, image, :n].astype(np.int64) for image in (a, b))
+        target = cube_codes(target)
         for turn in cube_rotations():
-            # Where this turn takes the stored reference to the stored right answer, the rotation
-            # between the views is: back by the reference's own, this turn, the answer's own. It
-            # leaves the camera's axis, which is z, where it is if both see the shape along a line.
-            fits = (cube_codes(reference @ turn.T) == target).all(axis=1)
+            # Where this turn takes the cubes of the first to those of the second, the rotation
+            # between the views is: back by the first's own, this turn, the second's own. It leaves
+            # the camera's axis, which is z, where it is if both see the shape along a line.
+            fits = (cube_codes(one @ turn.T) == target).all(axis=1)
             fitting = rows[fits]
-            between = views[fitting, place[fits]] @ turn @ views[fitting, 0].swapaxes(1, 2)
+            between = views[fitting, b[fits]] @ turn @ views[fitting, a[fits]].swapaxes(1, 2)
             far = np.linalg.norm(between - np.eye(3), axis=(1, 2)) / (2 * math.sqrt(2))
             angle = 2 * np.arcsin(np.minimum(far, 1))
             sight = np.arccos(np.minimum(np.abs(between[:, 2, 2]), 1))
@@ -128,11 +142,10 @@ def cast_again(
     problems: list[dict[int, str]] = []
     for table, its_shapes, rows in zip(tables, shapes, sample, strict=True):
         problems.append({})
-        with table.source.open() as questions:
-            for row in rows[its_shapes.whole[rows]].tolist():
-                problem = _difference(questions, row, int(its_shapes.count[row]))
-                if problem:
-                    problems[-1][row] = problem
+        for row in rows[its_shapes.whole[rows]].tolist():
+            problem = _difference(table.questions, row, int(its_shapes.count[row]))
+            if problem:
+                problems[-1][row] = problem
     return judge(
         "cast again",
         "images and visible pixels are what the stored cubes and lights give, and directions of"

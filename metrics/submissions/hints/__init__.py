@@ -5,7 +5,7 @@ truth: in most of the sampled images the error falls to half of what any simple 
 shift) leaves, and to half of what a constant would score. Good, middling, constant and random
 predictions do not get there. A hint never makes a submission invalid.
 
-`rooms` and `questions` gather the hints for the two tasks: start reading there. `depth`, `points`,
+`tasks` gathers the hints for the two tasks: start reading there. `depth`, `points`,
 `normals` (with the `frames` that these two may be in), `no_value` and `order` have the mistakes,
 `samples` reads the images that they look at. Imports the folder above it (`metrics.submissions`),
 `metrics.measures` and the reader of rooms.

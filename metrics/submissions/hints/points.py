@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.alignment import Alignment, align_points
-from metrics.measures.points import pixels_off_rays
+from metrics.measures.surfaces.points import pixels_off_rays
 from metrics.submissions.hints.frames import AXES, frame_text
 from metrics.submissions.hints.samples import Sample
 from metrics.submissions.problems import HINT, Problem

@@ -36,6 +36,9 @@ class Purpose(IntEnum):
     PICTURES = 16
     QUIZ = 17
     ENVIRONMENT = 18
+    ROOM = 19
+    ARRANGEMENT = 20
+    VIEWPOINT = 21
 
 
 def item_rng(

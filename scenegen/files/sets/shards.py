@@ -10,6 +10,7 @@ digests of the set follow from those of its shards, and a damaged row can be nam
 """
 
 import glob
+import os
 import re
 from collections import OrderedDict
 from collections.abc import Iterator
@@ -103,7 +104,7 @@ def _place_of_set(path: Path) -> Path:
     """Return the path beside which the shards of a set lie: its own, or what a link leads to."""
     if not path.is_symlink() or any(path.parent.glob(f"{glob.escape(path.stem)}-00000-of-*")):
         return path
-    return path.resolve()
+    return Path(os.path.realpath(path))  # Path.resolve raises RuntimeError at a link to itself
 
 
 class OpenFile:

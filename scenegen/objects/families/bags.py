@@ -6,7 +6,7 @@ from scenegen.objects.families.parts.boxes import box, boxes
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import moved
 from scenegen.objects.families.parts.profiles import Curve, arc, bezier, fillet, join, limited, line
-from scenegen.objects.families.parts.surfaces import Part, loft
+from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import hollow
 
@@ -46,7 +46,7 @@ def _hand_bag(rng: Generator) -> list[Part]:
         w, h = span(rng, 0.12, 0.6) * narrow, span(rng, 0.12, 0.45) * height
         y = span(rng, 0.15, 0.5) * height
         front = base + slope * (1.0 + 0.3 * bulge)
-        parts.append(boxes([box((-w, y, 0.0), (w, y + h, front + 0.06))]))
+        parts += made_of("strap", boxes([box((-w, y, 0.0), (w, y + h, front + 0.06))]))
     return parts
 
 
@@ -188,7 +188,9 @@ def _case(rng: Generator) -> list[Part]:
 
 def _strap(path: Curve, z: float, wide: float, thick: float) -> Part:
     """Sweep a flat band along a path in the plane of x and y at this z."""
-    return tube(path, wide, thick, origin=(0.0, 0.0, z), corner=thick, segments=16, thin=True)
+    place = (0.0, 0.0, z)
+    band = tube(path, wide, thick, origin=place, corner=thick, segments=16, thin=True)
+    return made_of("strap", band)[0]
 
 
 def _arch(rng: Generator, half: float, low: float, rise: float) -> Curve:

@@ -6,7 +6,7 @@ from numpy.random import Generator
 
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.profiles import Curve, arc, bezier, fillet, join, line, wave
-from scenegen.objects.families.parts.surfaces import Part, loft
+from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 from scenegen.objects.families.parts.sweeps import tube
 
 HEIGHT = 3.0  # of every bottle, without its closure
@@ -45,7 +45,7 @@ def bottle(rng: Generator) -> list[Part]:
             loft(body, size=(1.0, slope), corner=round_slope, base=base, segments=28),
             loft(join(line((neck, top - 0.02), (neck, top)), stem), segments=24),
         ]
-    return parts + _closure(rng, mouth)
+    return parts + made_of("closure", *_closure(rng, mouth))
 
 
 def _body(rng: Generator, radius: float, least: float, high: float) -> tuple[Curve, float]:

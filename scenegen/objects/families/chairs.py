@@ -9,7 +9,7 @@ from scenegen.objects.families.parts.boxes import box, boxes, spoke
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import buried
 from scenegen.objects.families.parts.profiles import arc, bezier, fillet, join, line
-from scenegen.objects.families.parts.surfaces import Part, loft
+from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 from scenegen.objects.families.parts.sweeps import tube
 
 Corners = list[tuple[float, float, float]]
@@ -30,9 +30,9 @@ def chair(rng: Generator) -> list[Part]:
     parts = _legs(rng, shrink, shrink * depth, under)
     rise = span(rng, 1.1, 2.6)
     upright, lean = _back(rng, depth, high, rise, 0.95 * shrink)
-    parts = [seat, *parts, *upright]
+    parts = [*made_of("seat", seat), *made_of("legs", *parts), *made_of("back", *upright)]
     if style != "round" and chance(rng, 0.4):
-        parts += _arms(rng, depth, high, lean, rise)
+        parts += made_of("legs", *_arms(rng, depth, high, lean, rise))
     return parts
 
 
@@ -75,10 +75,10 @@ def _tub(rng: Generator) -> list[Part]:
     x, z = 0.7 * radius, 0.55 * radius
     if chance(rng, 0.3):
         plate = line((0.7, 0.0), (0.7, 0.06), (0.12, 0.08), (0.12, foot + 0.1))
-        return [wall, seat, loft(plate, segments=32)]
+        return made_of("tub", wall, seat) + made_of("legs", loft(plate, segments=32))
     spots = [(x, 0.7 * deep), (-x, 0.7 * deep), (x, -z), (-x, -z)]
     feet = loft(line((0.06, 0.0), (0.1, foot + 0.15)), at=spots, segments=16)
-    return [wall, seat, feet]
+    return made_of("tub", wall, seat) + made_of("legs", feet)
 
 
 def _legs(rng: Generator, width: float, depth: float, under: float) -> list[Part]:

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.random import Generator
@@ -10,7 +11,7 @@ from scenegen.objects.families.parts.boxes import box, boxes
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import buried, moved, turn_about_x
 from scenegen.objects.families.parts.profiles import Curve, arc, bezier, join, limited, line
-from scenegen.objects.families.parts.surfaces import Part, loft
+from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import ring
 
@@ -70,9 +71,9 @@ def _stand(rng: Generator, height: float, shade: float) -> list[Part]:
         depth = span(rng, 0.6, 1.0)
         side = line((wide, 0.0), (wide * span(rng, 0.5, 1.1), top))
         corner = pick(rng, (0.0, 0.2))
-        return [loft(side, size=(1.0, depth), corner=corner, segments=24), rod]
+        return [*made_of("body", loft(side, size=(1.0, depth), corner=corner, segments=24)), rod]
     if style == "balls":
-        return [*_balls(rng, top, wide), rod]
+        return [*made_of("body", *_balls(rng, top, wide)), rod]
     neck, foot = wide * span(rng, 0.15, 0.45), wide * span(rng, 0.4, 0.9)
     if style == "vase":
         belly, high = wide * span(rng, 0.9, 1.5), span(rng, 0.2, 0.9)
@@ -85,7 +86,7 @@ def _stand(rng: Generator, height: float, shade: float) -> list[Part]:
             bezier((foot, 0.04), (1.4 * wide, 0.1 * top), (1.4 * wide, at), (waist, at), 9),
             bezier((waist, at), (1.3 * upper, at), (1.3 * upper, top), (neck, top), 9),
         )
-    return [loft(join(line((foot, 0.0), (foot, 0.04)), side)), rod]
+    return [*made_of("body", loft(join(line((foot, 0.0), (foot, 0.04)), side))), rod]
 
 
 def _tripod(rng: Generator, top: float, wide: float) -> list[Part]:
@@ -156,10 +157,10 @@ def _shade(rng: Generator, height: float, radius: float) -> list[Part]:
     stem = line((0.05, height - 0.05), (0.05, max(level + 2 * bar, height)))
     bulb = arc((0.0, level - 0.2 * rise), 0.16 * radius + 0.03, -80, 90, 8)
     parts = [
-        loft(ring(wall, thick), size=size, corner=corner, closed=True),
+        *made_of("shade", loft(ring(wall, thick), size=size, corner=corner, closed=True)),
         buried(boxes(cross)),
         loft(stem, segments=16),
-        loft(bulb, segments=16),
+        *made_of("glow", loft(bulb, segments=16)),
     ]
     if chance(rng, 0.3):  # a finial
         ball = span(rng, 0.05, 0.1)
@@ -175,7 +176,8 @@ def _globe(rng: Generator, height: float, radius: float) -> list[Part]:
     tall = radius * span(rng, 0.8, 1.4)
     collar = 0.4 * radius
     ball = arc((0.0, height + 0.9 * tall), (radius, tall), -75, 90, 16)
-    return [loft(line((collar, height - 0.08), (collar, height + 0.08 * tall))), loft(ball)]
+    neck = loft(line((collar, height - 0.08), (collar, height + 0.08 * tall)))
+    return [neck, *made_of("glow", loft(ball))]
 
 
 def _bowl(rng: Generator, height: float, radius: float) -> list[Part]:
@@ -185,7 +187,7 @@ def _bowl(rng: Generator, height: float, radius: float) -> list[Part]:
     begin = (radius * span(rng, 0.3, 1.0), low)
     wall = bezier((0.06, low), begin, bend, (radius, height + rise), 10)
     bulb = loft(arc((0.0, height), 0.12, -80, 90, 6), segments=16)
-    return [loft(ring(wall, 0.03), closed=True), bulb]
+    return [loft(ring(wall, 0.03), closed=True), *made_of("glow", bulb)]
 
 
 def _head(rng: Generator, room: float) -> tuple[Curve, float]:
@@ -213,6 +215,7 @@ def _hang(rng: Generator, at: tuple[float, float], tilt: float) -> list[Part]:
     offset = (0.0, at[1] - rise * math.cos(tilt), at[0] + rise * math.sin(tilt))
     lid = loft(line((crown + 0.01, rise - 0.05), (0.8 * crown, rise + 0.08)), segments=24)
     bulb = loft(arc((0.0, 0.45 * rise), 0.6 * crown, -80, 80, 8), segments=16)
+    bulb = replace(bulb, material="glow")
     stem = loft(line((0.3 * crown, 0.5 * rise), (0.3 * crown, rise)), segments=16)
     parts = [loft(ring(wall, 0.025), closed=True, segments=32), lid, buried(bulb), buried(stem)]
     return [moved(part, offset, turn) for part in parts]

@@ -9,7 +9,7 @@ from scenegen.objects.families.parts.boxes import box, boxes, spoke
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.objects.families.parts.moves import buried
 from scenegen.objects.families.parts.profiles import bezier, fillet, join, line
-from scenegen.objects.families.parts.surfaces import Part, loft
+from scenegen.objects.families.parts.surfaces import Part, loft, made_of
 from scenegen.objects.families.parts.sweeps import tube
 
 
@@ -25,9 +25,9 @@ def table(rng: Generator) -> list[Part]:
     under = height - thick + 0.02
     if outline in ("round", "oval"):
         kind = pick(rng, (_four, _four, _column, _column, _drum, _crossed))
-        return [top, *kind(rng, 0.68, 0.68 * depth, under)]
+        return made_of("top", top) + made_of("legs", *kind(rng, 0.68, 0.68 * depth, under))
     kind = pick(rng, (_four, _four, _four, _column, _panels, _trestle, _hairpins))
-    return [top, *kind(rng, 0.93, depth - 0.07, under)]
+    return made_of("top", top) + made_of("legs", *kind(rng, 0.93, depth - 0.07, under))
 
 
 def _top(rng: Generator, outline: str, depth: float, height: float, thick: float) -> Part:

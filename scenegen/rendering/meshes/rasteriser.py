@@ -31,6 +31,8 @@ NOTHING = 0xFFFFFFFF_FFFFFFFF  # the key of a pixel that no triangle covers
 SLACK = 0.01  # pixels by which bounding rectangles grow, as corners are rounded
 CHUNK = 24  # pixels that a thread visits at most; larger triangles take several threads
 NO_NORMALS = np.zeros((0, 3), np.float32)
+NEAR = 1e-3  # scene units; no ray meets a triangle nearer where it reaches behind the camera
+CUT_SLACK = 2.0  # pixels by which rectangles of such triangles grow
 BEHIND = 1e-6  # a corner nearer to the camera's plane than this has no place in the picture
 
 
@@ -290,28 +292,40 @@ def _rectangle(
 ) -> tuple[Any, Any, Any, Any]:
     """Return left column, top row, columns and rows of the pixels that a triangle may cover.
 
-    They are all pixels where a corner is not in front of the camera, none where no corner is.
+    Where a corner is not in front of the camera, they are those of the part that is farther than
+    NEAR; none where no corner is.
     """
     height, width = triangles.height, triangles.width
     corners = (a, b, c)
     across = [corner.x / (-corner.z * size) + width / 2 for corner in corners]
     down = [height / 2 - corner.y / (-corner.z * size) for corner in corners]
-    low_z = dr.minimum(a.z, dr.minimum(b.z, c.z))
-    high_z = dr.maximum(a.z, dr.maximum(b.z, c.z))
-    before = low_z < -BEHIND
-    whole = high_z >= -BEHIND
+    before = dr.minimum(a.z, dr.minimum(b.z, c.z)) < -BEHIND
+    whole = dr.maximum(a.z, dr.maximum(b.z, c.z)) < -NEAR
+    ahead = [corner.z < -NEAR for corner in corners]
+    cuts = []  # where edges pass the plane at NEAR
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        p, q = corners[i], corners[j]
+        share = (-NEAR - p.z) / dr.select(ahead[i] != ahead[j], q.z - p.z, 1)
+        right, up = p.x + share * (q.x - p.x), p.y + share * (q.y - p.y)
+        cut = right / (NEAR * size) + width / 2, height / 2 - up / (NEAR * size)
+        cuts.append((ahead[i] != ahead[j], *cut))
 
-    def span(values: list[Any], at: Any, most: int) -> tuple[Any, Any]:
+    def span(values: list[Any], part: int, at: Any, most: int) -> tuple[Any, Any]:
         low = dr.minimum(values[0], dr.minimum(values[1], values[2])) - at
         high = dr.maximum(values[0], dr.maximum(values[1], values[2])) - at
-        low = dr.select(whole, 0, dr.clip(dr.ceil(low - SLACK), 0, most))
-        high = dr.select(whole, most - 1, dr.clip(dr.floor(high + SLACK), -1, most - 1))
+        cut_low, cut_high = mi.Float(dr.inf), mi.Float(-dr.inf)
+        for shown, value in [*zip(ahead, values, strict=True), *((x[0], x[part]) for x in cuts)]:
+            cut_low = dr.minimum(cut_low, dr.select(shown, value - at - CUT_SLACK, dr.inf))
+            cut_high = dr.maximum(cut_high, dr.select(shown, value - at + CUT_SLACK, -dr.inf))
+        low, high = dr.select(whole, low, cut_low), dr.select(whole, high, cut_high)
+        low = dr.clip(dr.ceil(low - SLACK), 0, most)
+        high = dr.clip(dr.floor(high + SLACK), -1, most - 1)
         return mi.Int32(low), dr.select(
             before, dr.maximum(mi.Int32(high) - mi.Int32(low) + 1, 0), 0
         )
 
-    left, columns = span(across, x, width)
-    top, rows = span(down, y, height)
+    left, columns = span(across, 1, x, width)
+    top, rows = span(down, 2, y, height)
     return left, top, columns, rows
 
 

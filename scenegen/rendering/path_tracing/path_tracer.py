@@ -10,6 +10,7 @@ bright there as by the shading equation. Ambient light becomes an environment of
 """
 
 import math
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import drjit
@@ -47,10 +48,27 @@ def _trace_one(batch: SceneBatch, b: int, integrator: Any) -> Array:
     spec = batch.spec
     scene = _scene(batch, b)
     pixels = spec.height * spec.width
-    right, up, back, origin = (mi.Vector3f(*v) for v in batch.world_from_camera[b, :3].T.tolist())
-    size = pixel_size(spec.height, float(batch.fov_y_degrees[b]))
-    places = sample_positions(spec.spp)
+    axes = (mi.Vector3f(*v) for v in batch.world_from_camera[b, :3].T.tolist())
+    camera = (*axes, pixel_size(spec.height, float(batch.fov_y_degrees[b])))
     total = np.zeros((pixels, 3))
+    for ray, sampler, count in camera_rays(batch, b, camera):
+        radiance, valid, _ = integrator.sample(scene, sampler, ray)
+        radiance = dr.select(valid, radiance, mi.Color3f(*batch.background[b].tolist()))
+        values = np.asarray(dr.ravel(radiance), np.float64)
+        total += values.reshape(pixels, count, 3).sum(axis=1)
+    return (total / spec.spp).reshape(spec.height, spec.width, 3)
+
+
+def camera_rays(batch: SceneBatch, b: int, camera: Sequence[Any]) -> Iterator[tuple[Any, Any, int]]:
+    """Yield rays through the samples of all pixels, some samples at a time, with their sampler.
+
+    The last number is that of the samples of each pixel, which lie beside each other.
+
+    Args:
+        camera: right, up and back in the world, the position, and the size of a pixel at depth 1.
+    """
+    spec, (right, up, back, origin, size) = batch.spec, camera
+    pixels, places = spec.height * spec.width, sample_positions(spec.spp)
     at_once = max(1, RAYS_AT_ONCE // pixels)
     for number, start in enumerate(range(0, spec.spp, at_once)):
         positions = places[start : start + at_once]
@@ -69,12 +87,7 @@ def _trace_one(batch: SceneBatch, b: int, integrator: Any) -> Array:
         x = mi.Float(pixel % spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 0]), sample)
         y = mi.Float(pixel // spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 1]), sample)
         d = right * ((x - spec.width / 2) * size) + up * ((spec.height / 2 - y) * size) - back
-        ray = mi.RayDifferential3f(mi.Point3f(origin), unit(d))
-        radiance, valid, _ = integrator.sample(scene, sampler, ray)
-        radiance = dr.select(valid, radiance, mi.Color3f(*batch.background[b].tolist()))
-        values = np.asarray(dr.ravel(radiance), np.float64)
-        total += values.reshape(pixels, count, 3).sum(axis=1)
-    return (total / spec.spp).reshape(spec.height, spec.width, 3)
+        yield mi.RayDifferential3f(mi.Point3f(origin), unit(d)), sampler, count
 
 
 def _scene(batch: SceneBatch, b: int) -> Any:

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 WITHIN = 0.01  # of the size: rounded parts are made of flat faces
-SAMPLES = 20_000  # points of the surface
+SAMPLES = 8_000  # points of the surface
 NEAREST = 8
 FIRST, TRIED = 24, 500  # of them are turned: few suffice to tell most rotations from symmetries
 FEW = 62  # corners of a convex hull whose corners, edges and faces may hold an axis

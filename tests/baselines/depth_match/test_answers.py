@@ -14,7 +14,7 @@ from baselines.training.questions import question_images
 from iqtt import QuestionsFile, SplitSpec, make_split, open_questions
 from scenegen.camera import back_project
 
-KINDS = ("mirror-pair", "matched")
+KINDS = ("mirror-pair", pytest.param("matched", marks=pytest.mark.slow))
 SIZE = 64
 
 

@@ -9,9 +9,10 @@ from baselines.ptn.network import Settings
 from baselines.ptn.rooms import RoomImages
 from baselines.ptn.submission import FILES, seen, write_submission
 from baselines.ptn.training import train
+from baselines.training.data import TrainingFiles
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.scoring.evaluate import score
 from scenegen.rooms.reader import RoomsFile
 
@@ -53,9 +54,9 @@ def questions(tmp_path_factory):
 
 def test_answers_follow_labels_and_names(questions, tmp_path):
     train_file, test_file = (questions / f"iqtt-{name}.h5" for name in ("train", "test"))
-    weights = train(train_file, tmp_path / "none", Settings(**TINY, iterations=2))
-    told = train(train_file, tmp_path / "told", networks=str(weights), labels=4)
-    untold = train(train_file, tmp_path / "untold", networks=str(told))
+    weights = train(TrainingFiles(train_file), tmp_path / "none", Settings(**TINY, iterations=2))
+    told = train(TrainingFiles(train_file), tmp_path / "told", networks=str(weights), labels=4)
+    untold = train(TrainingFiles(train_file), tmp_path / "untold", networks=str(told))
     scores = {}
     for name, path in (("volumes", weights), ("told", told), ("untold", untold)):
         write_submission(test_file, tmp_path / f"{name}.h5", path)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.relief import depth_completed, depth_supervised, view_pairs
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.scoring.evaluate import score
 from scenegen.rooms.reader import RoomsFile
 

@@ -237,18 +237,6 @@ def test_damaged_files_are_refused(damage, saved, tmp_path):
         load_weights(path, METHOD)
 
 
-def test_what_is_no_file_is_refused(tmp_path):
-    for path in (tmp_path / "missing", tmp_path):
-        with pytest.raises(OSError, match=path.name):
-            load_weights(path, METHOD)
-    os.mkfifo(tmp_path / "pipe")
-    with refused(FileFormatError, "pipe", "pipe"):
-        load_weights(tmp_path / "pipe", METHOD)
-    with pytest.raises(FileNotFoundError) as none:
-        load_checkpoint(tmp_path, METHOD)
-    assert none.value.filename == str(tmp_path)
-
-
 def test_numbers_out_of_range_are_refused():
     with refused(SpecError, "seconds", "-1"):
         replace(CARD, seconds=-1)

@@ -1,14 +1,16 @@
 """Files to learn from: one kind of them, each opened once; several are one set of rows."""
 
-from pathlib import Path
-
 import pytest
 import torch
-from h5_edits import attribute
-from pix2shape_models import edited, in_memory
+from pix2shape_models import in_memory
 from refusals import refused
 
+from baselines.pix2shape.network.empty_rooms import empty_rooms
+from baselines.relief import depth_supervised
+from baselines.relief.network import Settings
+from baselines.training.checkpoint import load_weights
 from baselines.training.data import TrainingFiles, only, requests
+from baselines.training.machine import Machine
 from baselines.training.rooms import read_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 
@@ -48,12 +50,24 @@ def test_several_files_are_one_set_of_rows_and_a_card_lists_them(turned_path, ma
     assert told["data"].split("\n") == [file.spec.to_json() for file in files]
 
 
-def test_files_of_another_field_of_view_are_refused(turned_path: Path, tmp_path):
-    with TrainingFiles(turned_path) as data:
-        (rooms,) = data.rooms()
-        spec = rooms.spec.to_json()
-    wide = spec.replace('"fov_degrees":28.0', '"fov_degrees":40.0')
-    assert wide != spec
-    path = edited(turned_path, tmp_path / "wide.h5", attribute("spec", wide))
-    with TrainingFiles(turned_path, path) as data, refused(SpecError, str(path), "40", "28"):
-        read_rooms(data.rooms(), 32)
+def test_rows_of_files_that_differ_have_their_own_field_of_view(turned_path, make_rooms, tmp_path):
+    """Each row's rays meet floor and walls where they do in its own file."""
+    wide = make_rooms(
+        tmp_path / "wide.h5", 2, views=(0.0, 10.0), min_visible_pixels=2, fov_degrees=40.0
+    )
+    with TrainingFiles(turned_path, wide) as data:
+        files = data.rooms()
+        together = read_rooms(files, 32)
+        one, other = (read_rooms([file], 32) for file in files)
+        card = depth_supervised.train(
+            data, tmp_path / "run", Settings(32, 0.1, iterations=2, batch=13), Machine("cpu")
+        )
+    assert (one.fov_y_degrees, other.fov_y_degrees) == (28.0, 40.0)
+    rows = torch.tensor([10, 2])
+    expected = [
+        empty_rooms(part.world_from_camera[[row]], part.fov_y_degrees, 32)[0]
+        for part, row in ((other, 1), (one, 2))
+    ]
+    found = empty_rooms(together.world_from_camera[rows], together.fov_of(rows), 32)[0]
+    torch.testing.assert_close(found, torch.cat(expected), rtol=1e-5, atol=1e-6)
+    assert load_weights(card, depth_supervised.METHOD)[1].fingerprint == together.fingerprint

@@ -1,5 +1,6 @@
 """The loop: what each step sees, where it stops, what it writes, and how it goes on."""
 
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -22,6 +23,7 @@ from baselines.training.checkpoint import (
 )
 from baselines.training.fit import Loss, TrainingError, falling_late, fit
 from baselines.training.machine import Machine
+from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
 
 
@@ -250,6 +252,12 @@ def test_a_run_that_goes_on_gets_its_own_limit(tmp_path, monkeypatch):
 
     run(tmp_path / "run", state, machine=Machine(minutes=1, started=0.0), progress=pass_time)
     assert abs(state.card.iteration - 90) <= 1
+
+
+def test_a_limit_that_is_over_before_training_is_refused(tmp_path):
+    with refused(SpecError, "minutes", "0.5"):
+        run(tmp_path / "run", begun(), machine=Machine(minutes=0.5, started=time.monotonic() - 31))
+    assert not list((tmp_path / "run").iterdir())
 
 
 def test_losses_are_fetched_from_a_gpu_once_in_a_while(tmp_path, monkeypatch):

@@ -9,9 +9,10 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from audit_tables import audited
 from polycubes import are_congruent
 
-from iqtt.audit.audit import audit, question_count, to_json
+from iqtt.audit.audit import to_json
 from iqtt.audit.report import markdown, table
 from iqtt.files.layout import NO_CUBE
 from iqtt.questions.views import rotation_angle_degrees
@@ -222,10 +223,10 @@ def test_a_fair_split_passes_and_all_is_told(
 ) -> None:
     monkeypatch.setattr("iqtt.audit.audit.EXPLAINED", 8)
     told: list[int] = []
-    found = audit([split_folder], progress=told.append)
+    found = audited([split_folder], progress=told.append)
     assert {proof.name: proof.status for proof in found.proofs} == dict.fromkeys(PROOFS, "ok")
     assert found.passed
-    assert sum(told) == question_count([split_folder]) == 24
+    assert sum(told) == 24
     assert [(t.name, t.answers, t.probed) for t in found.tables] == [
         ("iqtt-test.h5", "stored", 6),
         ("iqtt-train.h5 labeled", "stored", 6),
@@ -246,33 +247,33 @@ def test_a_fair_split_passes_and_all_is_told(
 
 def test_files_that_cannot_be_audited(tmp_path: Path) -> None:
     with pytest.raises(SpecError) as error:
-        audit([])
+        audited([])
     assert error.value.where == "paths"
     with pytest.raises(FileNotFoundError):
-        audit([tmp_path])
+        audited([tmp_path])
     (tmp_path / "iqtt-val.h5").write_bytes(b"no HDF5")
     with pytest.raises(FileFormatError):
-        audit([tmp_path])
+        audited([tmp_path])
 
 
 @pytest.mark.usefixtures("few_explained")
 def test_a_file_of_answers_stands_for_its_questions(split_folder: Path) -> None:
     test, answers = (split_folder / f"iqtt-test{kind}.h5" for kind in ("", "-answers"))
-    found = audit([test])
-    assert audit([answers, test]).tables == found.tables
+    found = audited([test])
+    assert audited([answers, test]).tables == found.tables
     assert {p.name for p in found.proofs if p.status == "skipped"} == {"splits apart"}
 
 
 @pytest.mark.usefixtures("few_explained")
 def test_questions_without_answers(split_folder: Path, tmp_path: Path) -> None:
     shutil.copy(split_folder / "iqtt-test.h5", tmp_path)
-    found = audit([tmp_path])
+    found = audited([tmp_path])
     assert found.passed
     assert found.probes == ()
     assert "no right answers" in table(found)
     skipped = {proof.name for proof in found.proofs if proof.status == "skipped"}
     assert skipped == BY_CUBES | {"answer places"}
-    both = audit([tmp_path, split_folder / "iqtt-val.h5"])
+    both = audited([tmp_path, split_folder / "iqtt-val.h5"])
     assert "iqtt-test.h5" in both.proofs[0].detail
 
 
@@ -291,7 +292,7 @@ def failed(tmp_path: Path) -> Callable[..., set[str]]:
     def judge(images: Any, answers: Any) -> set[str]:
         with h5py.File(tmp_path / "plain.h5", "w") as file:
             file["questions"], file["answers"] = images, answers
-        found = audit([tmp_path / "plain.h5"], probed=0).proofs
+        found = audited([tmp_path / "plain.h5"], probed=0).proofs
         assert {proof.name for proof in found if proof.status != "skipped"} == set(OF_IMAGES)
         return {proof.name for proof in found if proof.status == "FAIL"}
 
@@ -315,7 +316,7 @@ def test_released_files(failed: Callable[..., set[str]]) -> None:
 def test_an_audit_of_no_questions_does_not_pass(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "iqtt-val.h5", "w") as file:
         file["questions"], file["answers"] = plain(0), np.zeros(0, np.uint8)
-    found = audit([tmp_path])
+    found = audited([tmp_path])
     assert not found.passed
     assert json.loads(to_json([found]))["passed"] is False
     assert {proof.status for proof in found.proofs} <= {"ok", "skipped"}
@@ -326,6 +327,6 @@ def test_only_questions_with_answers_are_measured(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "iqtt-train.h5", "w") as file:
         file["unlabeled/questions"] = plain(7)
         file["labeled/questions"], file["labeled/answers"] = 1 - plain(3) / 2, np.arange(3)
-    found = audit([tmp_path], probed=3)
+    found = audited([tmp_path], probed=3)
     assert [(t.answers, t.probed) for t in found.tables] == [("stored", 3), ("unknown", 0)]
     assert {p.n for p in found.probes} == {3}

@@ -1,6 +1,7 @@
 """Digests: any bit of a question file that changes after it was written is found."""
 
 import shutil
+from contextlib import contextmanager
 
 import h5py
 import numpy as np
@@ -9,7 +10,7 @@ from h5_edits import attribute, gone
 from refusals import refused
 
 from iqtt.audit.proofs.images import content
-from iqtt.audit.table import content_problems, find_tables, read_table
+from iqtt.audit.table import content_problems, open_paths, read_table
 from iqtt.files.reader import AnswersFile
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import column_digest, row_digest, seal
@@ -17,9 +18,16 @@ from scenegen.files.content import column_digest, row_digest, seal
 FILES = ("iqtt-train.h5", "iqtt-val.h5", "iqtt-test.h5", "iqtt-test-answers.h5")
 
 
+@contextmanager
+def tables_of(*paths):
+    with open_paths(paths) as opened:
+        yield [read_table(*named, np.zeros(0, int)) for named in opened.items()]
+
+
 def judged(*paths):
     """The proof of the content of some files, alone."""
-    return content([read_table(source, np.zeros(0, int)) for source in find_tables(paths)])
+    with tables_of(*paths) as tables:
+        return content(tables)
 
 
 def places(path):
@@ -95,17 +103,17 @@ def test_a_forger_who_seals_again_has_another_digest_of_truth(damaged):
         seal(file)
 
     path = damaged(forge)
-    (table,) = (read_table(source, np.zeros(0, int)) for source in find_tables([path]))
-    assert table.truth_changed
-    assert len(content_problems([table])) == 1
+    with tables_of(path) as (table,):
+        assert table.truth_changed
+        assert len(content_problems([table])) == 1
     with AnswersFile(path) as answers:
         assert len(answers.problems()) == 1
 
 
 def test_what_changed_in_a_file_of_two_tables_is_told_once(damaged):
     path = damaged(attribute("note", "mine"), "iqtt-train.h5")
-    tables = [read_table(source, np.zeros(0, int)) for source in find_tables([path])]
-    assert (len(tables), len(content_problems(tables))) == (2, 1)
+    with tables_of(path) as tables:
+        assert (len(tables), len(content_problems(tables))) == (2, 1)
 
 
 def test_released_files_have_no_digests_and_are_not_judged(split_folder, released):

@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import pytest
+from audit_tables import audited
 from refusals import refused
 
 from iqtt.files.layout import NO_CUBE
@@ -13,9 +14,12 @@ from iqtt.files.reader import (
     open_questions,
     parts,
 )
+from iqtt.files.verify import verify_split
 from iqtt.questions.specs import DISTRACTOR_KINDS
 from iqtt.shapes.polycube import canonical, set_ids
+from iqtt.sharing.published import open_split
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.files.sets import shards
 
 TABLES = [  # of the tiny split: file, part, answers told, truth told
     ("iqtt-train.h5", "labeled", True, True),
@@ -175,3 +179,30 @@ def test_what_the_data_set_refuses(split_folder):
     ):
         with refused((SpecError, FileFormatError), where):
             QuestionsDataset(split_folder / name, **arguments)
+
+
+def opened_to_hand_out(folder):
+    with open_split(folder, with_answers=True):
+        pass
+
+
+@pytest.mark.parametrize(
+    "look",
+    [
+        lambda folder: verify_split(folder, items=1),
+        lambda folder: audited([folder], probed=0),
+        opened_to_hand_out,
+    ],
+    ids=["verify", "audit", "card"],
+)
+@pytest.mark.usefixtures("few_explained")
+def test_each_file_is_opened_once(look, split_folder, monkeypatch):
+    opened, really = [], shards.open_unchecked
+
+    def counted(path, kind):
+        opened.append(path.name)
+        return really(path, kind)
+
+    monkeypatch.setattr(shards, "open_unchecked", counted)
+    look(split_folder)
+    assert sorted(opened) == sorted(path.name for path in split_folder.glob("*.h5"))

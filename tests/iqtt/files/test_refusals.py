@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 from h5_edits import attribute, claims, damaged_chunk, gone, grouped, linked
+from root_edits import ROOT
 
 import cli
 from iqtt.files.reader import (
@@ -47,30 +48,10 @@ IMAGES, ONE = np.zeros((6, 4, 32, 32, 3), np.uint8), np.zeros(6, np.uint8)
 NAMES = "truth: distractor_kind: attribute 'names'"
 # Edits of a good validation file, and the place that the error names.
 REFUSED = {
-    "other format": (attribute("format", "other"), ""),
-    "format is an array": (attribute("format", np.arange(3)), "attribute 'format'"),
-    "older": (attribute("format_version", "0.9"), ""),
-    "newer": (attribute("format_version", "2.0"), ""),
-    "a version without a minor one": (attribute("format_version", "1.x"), ""),
-    "no version": (gone("format_version"), "attribute 'format_version'"),
-    "no writer": (gone("writer"), "attribute 'writer'"),
-    "a long writer": (attribute("writer", "w" * 1001), "attribute 'writer'"),
-    "variant of two lines": (attribute("variant", "a\nb"), "attribute 'variant'"),
-    "no release": (gone("drjit_version"), "attribute 'drjit_version'"),
-    "command is an array": (attribute("creation_command", np.arange(3)), "attribute 'creation_co"),
-    "no spec": (gone("spec"), "attribute 'spec'"),
-    "spec is garbage": (attribute("spec", "garbage"), "attribute 'spec'"),
-    "spec is a list": (attribute("spec", "[]"), "attribute 'spec'"),
-    "spec of the future": (attribute("spec", '{"fog": 1}'), "attribute 'spec'"),
+    **ROOT,
     "spec of another size": (attribute("spec", "{}"), "questions"),
-    "a long spec": (attribute("spec", "[" + " " * 4_000_000 + "]"), "attribute 'spec'"),
     "no split": (gone("split"), "attribute 'split'"),
     "unknown split": (attribute("split", "dev"), "attribute 'split'"),
-    "no fingerprint": (gone("fingerprint"), "attribute 'fingerprint'"),
-    "fingerprint is an array": (attribute("fingerprint", np.arange(9)), "attribute 'fingerprint'"),
-    "no content digest": (gone("content_digest"), "attribute 'content_digest'"),
-    "no truth digest": (gone("truth_digest"), "attribute 'truth_digest'"),
-    "no hexadecimal digest": (attribute("truth_digest", "x" * 64), "attribute 'truth_digest'"),
     "questions is a group": (grouped("questions"), "questions"),
     "another scale": (lambda f: f["questions"].attrs.update(scale=1.0), "questions"),
     "three images": (put("questions", IMAGES[:, :3]), "questions"),

@@ -75,7 +75,7 @@ def test_tables_hold_the_questions_that_are_made_one_by_one(folder, split, part,
         questions, truth = file[group]["questions"], known[f"truth/{part}"]
         answers = None if part == "unlabeled" else known[group]["answers"]
         for row in range(len(questions)):
-            one: Rendered = render_question(SPEC, pools, split, first + row)
+            one: Rendered = render_question(pools, split, first + row)
             assert questions[row].tobytes() == one.images.tobytes()
             shapes, count = one.question.shapes.cubes, one.question.shapes.cubes.shape[1]
             stored = {name: truth[name][row] for name in TRUTH}

@@ -21,7 +21,7 @@ SPEC = SplitSpec(seed=11, cubes=(6, 8), max_radius=2.7)
 
 def test_arranging_puts_the_right_answer_at_its_place():
     spec = replace(SPEC, distractors="mirror")
-    [drawn] = draw_shapes(spec, make_pools(spec), "train", [(0, 0)])
+    [drawn] = draw_shapes(make_pools(spec), "train", [(0, 0)])
     seen = set()
     for answer in range(3):
         for seed in range(12):

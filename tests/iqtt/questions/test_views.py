@@ -39,7 +39,7 @@ def pools():
 @pytest.fixture(scope="module")
 def sampled(pools):
     tally = Tally()
-    return sample_questions(SPEC, pools, "val", REQUESTS, tally), tally
+    return sample_questions(pools, "val", REQUESTS, tally), tally
 
 
 def bits(question):
@@ -67,9 +67,9 @@ def spec_distance(radius):
 def test_answers_are_turned_far_enough_by_any_way_of_looking(pools, least):
     """Against SciPy's rotations, tried on each shape; the right answer's angle is the one told."""
     spec = replace(SPEC, min_angle_degrees=least, seed=4)
-    questions = sample_questions(spec, pools, "train", REQUESTS, Tally())
+    questions = sample_questions(replace(pools, spec=spec), "train", REQUESTS, Tally())
     pairs = replace(spec, distractors="mirror-pair")
-    questions += sample_questions(pairs, make_pools(pairs), "train", REQUESTS, Tally())
+    questions += sample_questions(make_pools(pairs), "train", REQUESTS, Tally())
     angles = []
     for question in questions:
         views = [Rotation.from_matrix(turn) for turn in question.world_from_shape]
@@ -89,7 +89,7 @@ def test_answers_are_turned_far_enough_by_any_way_of_looking(pools, least):
 
 def test_answers_of_one_shape_or_its_mirror_image_are_related():
     spec = replace(SPEC, distractors="mirror-pair", cubes=(6, 6))
-    drawn = draw_shapes(spec, make_pools(spec), "val", [(0, 0)])[0]
+    drawn = draw_shapes(make_pools(spec), "val", [(0, 0)])[0]
     mirrored, related = relations([arrange(drawn, 1, RNG(0))])
     assert mirrored[0].tolist() == [[False, True, False], [True, False, True], [False, True, False]]
     assert (related[0] == ~np.eye(3, dtype=bool)).all()
@@ -98,7 +98,7 @@ def test_answers_of_one_shape_or_its_mirror_image_are_related():
 def test_no_outline_is_shown_twice_in_a_question():
     """The three answers of a mirror pair, and the reference, are seen along four axes."""
     spec = replace(SPEC, distractors="mirror-pair", min_sight_angle_degrees=40)
-    for question in sample_questions(spec, make_pools(spec), "train", REQUESTS, Tally()):
+    for question in sample_questions(make_pools(spec), "train", REQUESTS, Tally()):
         cubes, turns = question.shapes.cubes, question.world_from_shape
         for i, j in itertools.combinations(range(4), 2):
             hand = np.array([1, 1, 1])
@@ -133,13 +133,13 @@ def test_neither_company_nor_order_nor_chunks_change_a_question(
     expected = [bits(q) for q in sampled[0]]
     tally = Tally()
     for some in ([7, 6, 5], [0, 1, 2, 3, 4], [4]):
-        again = sample_questions(SPEC, pools, "val", [REQUESTS[i] for i in some], tally)
+        again = sample_questions(pools, "val", [REQUESTS[i] for i in some], tally)
         assert [bits(q) for q in again] == [expected[i] for i in some]
     total = Tally()
     for request in REQUESTS:
-        sample_questions(SPEC, pools, "val", [request], total)
+        sample_questions(pools, "val", [request], total)
     assert total == sampled[1], "proposals are counted one by one, however many are judged at once"
-    assert sample_questions(SPEC, pools, "val", [], tally) == []
+    assert sample_questions(pools, "val", [], tally) == []
 
 
 def test_kinds_with_one_seed_share_no_stream():
@@ -174,7 +174,7 @@ def test_views_are_the_first_good_ones_of_those_drawn(pools, sampled):
     assert tally.proposed == tally.refused + 4 * len(questions)
     assert tally.refused <= refused, "those too near to the reference's view do not count"
     free, every = replace(SPEC, min_angle_degrees=0, min_sight_angle_degrees=0), Tally()
-    for question in sample_questions(free, pools, "val", REQUESTS, every):
+    for question in sample_questions(replace(pools, spec=free), "val", REQUESTS, every):
         every.refused -= int(is_proposed(question).argmax(axis=1).sum())
     assert every.refused == 0
     assert every.proposed > 4 * len(REQUESTS)
@@ -184,13 +184,13 @@ def test_a_shape_that_no_view_shows_whole_makes_way_for_another(pools, monkeypat
     """With few proposals many are given up; then all of the question is drawn anew."""
     monkeypatch.setattr(module, "VIEWS", 4)
     tally = Tally()
-    questions = sample_questions(SPEC, pools, "test", REQUESTS, tally)
+    questions = sample_questions(pools, "test", REQUESTS, tally)
     assert {0, 1} <= {q.attempt for q in questions}
     assert tally.proposed > tally.refused > 0
     for question in questions:
-        [(cubes, _)] = draw_shapes(SPEC, pools, "test", [(question.index, question.attempt)])
+        [(cubes, _)] = draw_shapes(pools, "test", [(question.index, question.attempt)])
         assert turns_between(question.shapes.cubes[0], cubes[0])
-    alone = [sample_questions(SPEC, pools, "test", [request], Tally())[0] for request in REQUESTS]
+    alone = [sample_questions(pools, "test", [request], Tally())[0] for request in REQUESTS]
     assert [bits(q) for q in alone] == [bits(q) for q in questions]
 
 
@@ -200,7 +200,7 @@ def test_whether_crowded_shapes_are_asked_for_does_not_tell_which_is_right(monke
     spec = replace(SPEC, cubes=(12, 12), max_radius=3.5, distractors="near", min_angle_degrees=60)
     pools = make_pools(spec)
     monkeypatch.setattr(module, "VIEWS", 12)
-    drawn = draw_shapes(spec, pools, "val", [(i, 0) for i in range(24)])
+    drawn = draw_shapes(pools, "val", [(i, 0) for i in range(24)])
     requests = [(i, 0, 0) for i in range(24)]
 
     def came_about():
@@ -231,8 +231,8 @@ def test_the_search_for_what_cannot_be_is_bounded(pools, monkeypatch):
     monkeypatch.setattr(module, "MARGIN", 1000)
     tally = Tally()
     with refused(PlacementError, "test question 12"):
-        sample_questions(SPEC, pools, "test", [(9, 0, 0), (12, 2, 1)], tally)
+        sample_questions(pools, "test", [(9, 0, 0), (12, 2, 1)], tally)
     assert tally == Tally(20, 20), "5 views of two references each, before the third attempts"
     monkeypatch.setattr(module, "MARGIN", 0)
     with pytest.raises(PlacementError):
-        sample_questions(SPEC, pools, "test", [(9, 0, 3)], Tally())
+        sample_questions(pools, "test", [(9, 0, 3)], Tally())

@@ -41,9 +41,7 @@ def test_rotations_are_uniform_on_so3():
 
 def test_frames_change_no_cube_in_the_world_and_tell_nothing():
     """Each of the 24 comes as often for each image, independently of the others."""
-    shapes = Shapes(
-        draw_shapes(SPEC, make_pools(SPEC), "val", [(0, 0)])[0][0][[0, 0, 1, 2]], None, 0
-    )
+    shapes = Shapes(draw_shapes(make_pools(SPEC), "val", [(0, 0)])[0][0][[0, 0, 1, 2]], None, 0)
     turns, rng = draw_rotations(RNG(1), (4,)), RNG(2)
     relative = []
     for _ in range(600):
@@ -71,7 +69,7 @@ def test_stored_rotations_tell_nothing_about_the_answer(kind):
     spec = replace(SPEC, distractors=kind, cubes=(6, 8))
     requests = [(i, i % 3, 0) for i in range(400)]
     wins = []
-    for question in sample_questions(spec, make_pools(spec), "val", requests, Tally()):
+    for question in sample_questions(make_pools(spec), "val", requests, Tally()):
         between = question.world_from_shape[0].T @ question.world_from_shape[1:]
         wins.append([np.trace(turn) for turn in between])
     wins = np.argsort(wins, axis=1)

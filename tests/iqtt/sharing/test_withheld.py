@@ -11,8 +11,7 @@ from refusals import refused
 
 from iqtt.files.layout import FORMAT, truth_columns
 from iqtt.questions.specs import SplitSpec
-from iqtt.sharing.published import open_split
-from iqtt.sharing.withheld import check_withheld
+from iqtt.sharing.published import check_withheld, open_split
 from scenegen.common.errors import SpecError
 from scenegen.files.sets.shards import ROW_DIGESTS, OpenFile
 

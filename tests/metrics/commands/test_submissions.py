@@ -8,7 +8,6 @@ import pytest
 from click.testing import CliRunner
 
 import cli
-from metrics.prediction_writer import describe_format
 from metrics.score_file import read_scores
 
 
@@ -98,16 +97,12 @@ def test_pictures_of_another_split_are_left_out(truths, folder):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ("score", ("Missing argument",)),
         ("score nothing.h5", ("nothing.h5", "no such file")),
         ("score . ", (".",)),
         ("validate nothing.h5", ("nothing.h5", "no such file")),
         ("compare a.json", ("a.json",)),
         ("compare broken.json broken.json", ("broken.json",)),
         ("leaderboard broken.json", ("broken.json",)),
-        ("leaderboard", ("SCORES.json",)),
-        ("baseline best --data x.h5", ("best",)),
-        ("baseline oracle", ("--data",)),
         ("baseline oracle --data nothing.h5", ("nothing.h5",)),
         ("baseline chance --data nothing.h5", ("nothing.h5",)),
     ],
@@ -126,17 +121,6 @@ def test_outputs_are_not_replaced_unless_told(truths, folder, check_refusal):
     check_refusal(refused.exit_code, refused.stdout, refused.stderr, ("x.json", "--overwrite"))
     assert (folder / "x.json").read_text() == "mine"
     assert bench("score", "oracle.h5", "--json", "x.json", "--overwrite").exit_code == 0
-
-
-def test_the_format_is_described(folder):
-    assert bench("describe-format").stdout == f"{describe_format()}\n"
-
-
-def test_outputs_of_one_name_are_refused_before_anything_is_written(truths, folder, check_refusal):
-    bench("baseline", "empty-room", "--data", truths.rooms, "--out", "p.h5")
-    result = bench("score", "p.h5", "--json", "same", "--csv", "./same")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("outputs", "same and ./same"))
-    assert not (folder / "same").exists()
 
 
 @pytest.mark.parametrize("option", ["--json", "--csv", "--html"])

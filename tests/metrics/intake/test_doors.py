@@ -12,6 +12,7 @@ from metrics.intake.model_file import ModelError, opened_model
 from metrics.intake.running import Call, run_model
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
+from scenegen.common.errors import SpecError
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import RoomsFile
 
@@ -96,7 +97,7 @@ def test_a_run_is_the_import_of_the_same_arrays_and_says_what_it_was(folders, tr
         assert found.method == Path(folder).name
         for row in (0, 7):
             expected = here.infer(srgb_bytes(rooms[row].radiance))["depth_metric"]
-            np.testing.assert_allclose(found.depth(row), expected, rtol=1e-4)
+            np.testing.assert_allclose(found.depth(row), expected, rtol=1e-3, atol=1e-3)
         for text in told["weights_sha256"], "DepthAnythingForDepthEstimation", "input: 70x70":
             assert text in found.notes
     with torch.no_grad():
@@ -107,13 +108,36 @@ def test_a_run_is_the_import_of_the_same_arrays_and_says_what_it_was(folders, tr
     assert changed["weights_sha256"] != told["weights_sha256"]
 
 
+@pytest.mark.slow
+def test_rows_of_other_weights_under_one_name_are_not_taken(tmp_path, truths):
+    folder, out = save("dpt", tmp_path / "network"), tmp_path / "p.h5"
+
+    def stop(done):
+        raise KeyboardInterrupt
+
+    def run(**more):
+        with opened_model(f"hf:{folder}") as model:
+            return run_model(model, truths.rooms, out, call=Call(batch=3), method="m", **more)
+
+    with pytest.raises(KeyboardInterrupt):
+        run(progress=stop)
+    here = load(f"hf:{folder}").network
+    with torch.no_grad():
+        next(here.parameters()).add_(1.0)
+    here.save_pretrained(folder)
+    with pytest.raises(SpecError):
+        run()
+    assert run(keep="resume").startswith("disparity_affine_invariant of 8 rows")
+
+
 def refused(name, **more):
     with pytest.raises(ModelError) as caught, opened_model(name, **more):
         pass
     return caught.value
 
 
-def test_one_line_says_what_is_wrong(tmp_path, folders, monkeypatch):
+@pytest.mark.slow
+def test_one_line_says_what_is_wrong(tmp_path, folders, truths, monkeypatch):
     from transformers import BertConfig
 
     (tmp_path / "bert").mkdir()
@@ -140,6 +164,9 @@ def test_one_line_says_what_is_wrong(tmp_path, folders, monkeypatch):
         error = refused(name, settings=settings)
         assert error.where.startswith(name)
         assert "\n" not in f"{error}"
+    assert refused(f"hf:{broken}", python=tmp_path).where == "--python"
+    with opened_model(f"hf:{folders('dpt')}") as model, pytest.raises(ModelError):
+        run_model(model, truths.iqtt, tmp_path / "q.h5", call=Call(), method="m")
     hint = refused("moge:a/b").hint if importlib.util.find_spec("moge") is None else "dlr-moge"
     assert "dlr-moge" in hint
 

@@ -7,6 +7,7 @@ import sys
 import time
 from contextlib import nullcontext
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -29,10 +30,15 @@ INFER = f"import numpy as np\ndef infer(image, intrinsics=None):\n    return {WA
 class Here:
     """A model without a process of its own, for what is made of its values."""
 
-    path, sha256, takes_batches, takes_intrinsics = "my_model.py", "", False, False
+    name = path = "my_model.py"
+    sha256, takes_batches, takes_intrinsics, named, metres = "", False, False, False, False
+    provenance: ClassVar[dict[str, str]] = {}
 
     def __init__(self, text):
         exec(text, vars(self))
+
+    def ask_provenance(self):
+        pass
 
     def begin(self, function, where, *arguments):
         value = _with_types(plain(vars(self)[function](*arguments)))
@@ -165,6 +171,7 @@ def failing(folder, error="ValueError"):
     return f"""
 import numpy as np
 from pathlib import Path
+from typing import ClassVar
 def infer(image):
     count = Path({str(folder / "calls")!r})
     count.write_text((count.read_text() if count.exists() else "") + ".")

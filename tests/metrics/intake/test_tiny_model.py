@@ -47,6 +47,7 @@ def letter(model: Any, png: bytes, text: str) -> str:
     return max("ABC", key=lambda name: float(scores[ord(name)]))
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")  # of transformers
 def test_a_model_of_random_weights_is_at_chance(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

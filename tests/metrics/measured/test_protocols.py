@@ -3,8 +3,14 @@
 import numpy as np
 import pytest
 
-from metrics.measured.protocols import BY_NAME, PROTOCOLS, ProtocolError, crop_mask, scored_pixels
-from metrics.measured.protocols import depth_under
+from metrics.measured.protocols import (
+    BY_NAME,
+    PROTOCOLS,
+    ProtocolError,
+    crop_mask,
+    depth_under,
+    scored_pixels,
+)
 from metrics.measures.depth import depth_scores
 
 SIZES = {"nyu": (480, 640), "kitti": (375, 1242)}
@@ -52,7 +58,9 @@ def kept(name: str, true: np.ndarray) -> np.ndarray:
             crop[top : top + 352, left : left + 1216] = inner
     else:
         crop[:] = True
-    low, high = {"nyu": (1e-3, 10.0), "kitti": (1e-3, 80.0)}.get(name.split("-")[0], (0.0, np.inf))
+    low, high = {"nyu": (1e-3, 10.0), "kitti": (1e-3, 80.0)}.get(
+        name.split("-", maxsplit=1)[0], (0.0, np.inf)
+    )
     low, high = (1e-3, 10.0) if name == "affine-depth-nyu" else (low, high)
     low, high = (1e-5, 80.0) if name == "affine-depth-kitti" else (low, high)
     high = {"affine-disparity-10m": 10.0, "affine-disparity-80m": 80.0}.get(name, high)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from metrics.measures.answers import answers_from_scores
-from metrics.measures.chamfer_hausdorff import NearestDistances, f_score, nearest_distances
 from metrics.measures.checks import (
     LARGEST_MAGNITUDE,
     EmptyError,
@@ -17,14 +16,15 @@ from metrics.measures.checks import (
     require_mask,
 )
 from metrics.measures.depth import compare_depth, depth_scores
-from metrics.measures.image_search import nearest_distances_on_image
-from metrics.measures.normals import angular_errors_degrees, normals_from_depth
 from metrics.measures.statistics import (
     bootstrap_interval,
     cluster_means,
     normal_quantile,
     wilson_interval,
 )
+from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, f_score, nearest_distances
+from metrics.measures.surfaces.image_search import nearest_distances_on_image
+from metrics.measures.surfaces.normals import angular_errors_degrees, normals_from_depth
 
 NAN, INF = np.nan, np.inf
 ONES, CLOUD = np.ones((4, 5)), np.zeros((2, 3))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from scenegen.camera import Camera
 from scenegen.rooms.reader import RoomsFile
 

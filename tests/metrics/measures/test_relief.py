@@ -1,4 +1,4 @@
-"""Relief scores against NumPy's correlation, and guesses that must not win."""
+"""Guesses that must not win relief; `test_definitions` has the formulas."""
 
 import numpy as np
 import pytest
@@ -21,15 +21,6 @@ def test_the_truth_is_perfect_and_the_empty_room_has_nothing(true):
         "relief_iou": 1.0,
     }
     assert set(relief_scores(np.zeros_like(true), true).values()) == {0.0}
-
-
-def test_correlation_is_that_of_numpy_and_iou_counts_pixels():
-    predicted = 0.4 * TRUE + RNG.normal(0.0, 0.05, 4000)
-    found = relief_scores(predicted, TRUE)
-    expected = float(np.corrcoef(predicted, TRUE)[0, 1])
-    assert found["relief_correlation"] == pytest.approx(expected, abs=1e-12)
-    a, b = ({i for i, v in enumerate(x) if v > 0.05} for x in (predicted, TRUE))
-    assert found["relief_iou"] == pytest.approx(len(a & b) / len(a | b), abs=1e-15)
 
 
 @given(st.floats(-2.0, 2.0), st.floats(1e-12, 1e-6), st.booleans())

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from metrics.measures.behind import behind_scores, hidden_from
+from metrics.measures.behind import behind_scores
 from metrics.measures.shape import (
     flat_error,
     inside_objects,
     one_normal_degrees,
     shape_scores,
 )
-from scenegen.camera import back_project, look_at, pixel_directions
+from scenegen.camera import back_project, pixel_directions
 
 SIZE, FOV = 48, 40.0
 
@@ -82,31 +82,6 @@ def test_flat_truth_has_no_correlation_and_no_object_has_no_score():
     assert np.isnan(found["shape_correlation"])
     assert np.isnan(list(shape_scores(none[:0], true[:0], true[:0], INSIDE[at][:0]).values())).all()
     assert np.isnan([flat_error(TRUE[:0], IDS[:0]), one_normal_degrees(true[:0], IDS[:0])]).all()
-
-
-def test_the_best_single_normal():
-    two = np.array([[0.0, 0.6, 0.8], [0.0, -0.6, 0.8], [1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
-    tilt = np.degrees(np.arcsin(0.6))
-    found = one_normal_degrees(two, np.array([1, 1, 2, 2]))
-    assert found == pytest.approx(tilt / 2)
-
-
-def test_hidden_is_what_a_ray_from_the_first_camera_does_not_reach():
-    """A unit ball, seen from the front: its back half, what it covers, and what lies outside."""
-    first = look_at(np.array([0.0, 0.0, 3.0]), np.zeros(3))
-    depth, hit = ball([0.0, 0.0, -3.0], 1.0)
-    depth = np.where(hit, depth, np.nan)
-    rng = np.random.default_rng(1)
-    normals = rng.normal(size=(400, 3))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    near = np.abs(normals[:, 2] - 1.0 / 3.0) > 0.1  # away from the rim
-    normals = normals[near]
-    found = hidden_from(normals, normals, depth, first, FOV)
-    inside = np.abs(normals[:, :2] / (3.0 - normals[:, 2:])).max(axis=1) < np.tan(np.radians(20))
-    assert np.array_equal(found, (normals[:, 2] < 1.0 / 3.0) | ~inside)
-    up = np.tile([0.0, 0.0, 1.0], (4, 1))
-    behind = np.array([[0.0, 0.0, -2.0], [0.0, 0.0, 1.5], [0.0, 0.0, 4.0], [3.0, 0.0, 0.0]])
-    assert hidden_from(behind, up, depth, first, FOV).tolist() == [True, False, True, True]
 
 
 def test_scores_of_what_is_hidden():

@@ -23,7 +23,10 @@ def make(preset, path, **settings):
     return path, definitions.read_truth(path)
 
 
-@pytest.fixture(scope="session", params=PRESETS)
+@pytest.fixture(
+    scope="session",
+    params=["shapes", *(pytest.param(p, marks=pytest.mark.slow) for p in [*PRESETS][1:])],
+)
 def truth(request, tmp_path_factory):
     return make(request.param, tmp_path_factory.mktemp("definitions") / "rooms.h5")
 

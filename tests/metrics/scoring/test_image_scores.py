@@ -7,11 +7,7 @@ from h5_edits import replaced
 from made_scores import rooms_scores
 
 from baselines.trivial import write_room_baseline
-from metrics.measures.chamfer_hausdorff import nearest_distances
-from metrics.measures.empty_room import empty_room
-from metrics.measures.normals import normals_from_depth
-from metrics.measures.objects import LEAST_PIXELS
-from metrics.measures.surface import surface_distances, surface_of
+from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
@@ -22,7 +18,6 @@ from metrics.scoring.runs import Settings
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.truths import TrueView
 from metrics.views.score_tables import partner_sentences
-from scenegen.camera import back_project, pixel_size
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
@@ -123,58 +118,6 @@ def test_true_outlines_without_any_shape_win_relief_but_find_no_object(make_room
     assert found.metrics["derived_object_normal_mean_degrees"].value > 40.0
 
 
-def reverse_distances(depth, room, mask):
-    """From the true points to predicted patches, (H, W)."""
-    points, true = (back_project(d, room.fov_y_degrees)[mask] for d in (depth, room.depth))
-    normals, _ = normals_from_depth(depth, room.fov_y_degrees, mask)
-    pitch, image = pixel_size(len(mask), room.fov_y_degrees), np.full(mask.shape, np.nan)
-    said, truth = (
-        surface_of(p, n[mask], pitch, mask)
-        for p, n in ((points, normals), (true, room.normal.astype(float)))
-    )
-    image[mask] = surface_distances(said, truth, nearest_distances(points, true), False).reverse
-    return image
-
-
-def test_scores_of_objects_and_relief_are_those_of_scipy_and_numpy(folder):
-    found = score([folder / "noisy-0.h5"], folder / "rooms.h5")
-    with RoomsFile(folder / "rooms.h5") as rooms, h5py.File(folder / "noisy-0.h5") as file:
-        place = {int(row): i for i, row in enumerate(file["row"])}
-        for row, room in enumerate(rooms):
-            depth, mask = file["depth"][place[row]].astype(float), np.isfinite(room.depth)
-            _, true = (back_project(d, room.fov_y_degrees) for d in (depth, room.depth))
-            near_true, each = reverse_distances(depth, room, mask), {}
-            for one in np.unique(room.object_id[room.object_id > 0]).tolist():
-                pixels = room.object_id == one
-                if pixels.sum() >= LEAST_PIXELS:
-                    error = np.abs(depth - room.depth)[pixels]
-                    each[one] = near_true[pixels], error, error.size
-            entries = np.flatnonzero(found.objects["row"] == row)
-            assert found.objects["object"][entries].tolist() == list(each)
-            assert found.objects["pixels"][entries].tolist() == [n for *_, n in each.values()]
-            names = [s.shape for s in room.scene.objects]
-            assert [names[k - 1] for k in each] == found.objects["shape"][entries].tolist()
-            near, errors, _ = (
-                np.array([v[i].mean() if i < 2 else v[i] for v in each.values()]) for i in range(3)
-            )
-            assert found.objects["object_completeness"][entries] == pytest.approx(near)
-            assert found.objects["object_depth_error"][entries] == pytest.approx(errors)
-            pooled = np.concatenate([v[0] for v in each.values()]).mean()
-            assert found.items["object_completeness"][row] == pytest.approx(pooled)
-            assert found.items["object_recall_0.05"][row] == np.mean(near < 0.05)
-            corner = room.world_from_camera
-            world = true[mask] @ corner[:3, :3].T
-            rays = world / room.depth[mask][:, None]
-            wall = np.min(-corner[:3, 3] / np.where(rays < 0, rays, -1e-9), axis=-1)
-            said, relief = wall - depth[mask], wall - room.depth[mask]
-            expected = np.corrcoef(said, relief)[0, 1]
-            assert found.items["relief_correlation"][row] == pytest.approx(expected, abs=1e-6)
-            both, any_ = ((said > 0.05) & (relief > 0.05)), ((said > 0.05) | (relief > 0.05))
-            assert found.items["relief_iou"][row] == pytest.approx(
-                both.sum() / any_.sum(), abs=2e-3
-            )
-
-
 def scored(baseline, truth, folder):
     """Return the scores of a baseline as they are read back from their file."""
     write_room_baseline(baseline, truth, folder / "p.h5")
@@ -185,7 +128,7 @@ def scored(baseline, truth, folder):
 def test_rooms_without_objects_have_no_such_scores(make_rooms, tmp_path):
     truth = make_rooms(tmp_path / "bare.h5", 3, objects=(0, 0))
     found = scored("empty-room", truth, tmp_path)
-    assert {metric(name).lacking for name in found.metrics} <= {"", "boundary"}
+    assert {metric(name).lacking for name in found.metrics} <= {"", "boundary", "planes"}
     assert found.metrics["chamfer"].value < 1e-5
     assert (dict(found.skills), dict(found.by_object_shape)) == ({}, {})
     assert len(found.objects["row"]) == 0
@@ -222,32 +165,6 @@ def test_an_image_with_a_value_that_is_not_finite_has_the_worst_scores(folder, t
     ) == {4.0}
     assert found.skills["object_depth_error"].value < 0.0
     assert not found.comparable
-
-
-@pytest.mark.parametrize(
-    ("alignment", "told"),
-    [
-        ("scale", lambda depth: 2.0 * depth),
-        ("scale_shift", lambda depth: (depth - np.nanmin(depth)) / np.ptp(depth)),
-        ("scale_shift", lambda depth: 7.0 + 0.01 * depth),
-    ],
-)
-def test_headlines_of_relative_depth_are_those_after_its_alignment(
-    folder, tmp_path, alignment, told
-):
-    """Depth that is exact up to what the method says it cannot know is perfect."""
-    truth, path = folder / "rooms.h5", tmp_path / "relative.h5"
-    with (
-        RoomsFile(truth) as rooms,
-        RoomPredictionWriter(path, truth, method="m", alignment=alignment) as out,
-    ):
-        for row, room in enumerate(rooms):
-            out.add(row, told(room.depth))
-    scores = score([path], truth)
-    for name, skill in scores.skills.items():
-        assert skill.value == pytest.approx(1.0, abs=2e-3), name
-    assert scores.metrics["chamfer"].value < 1e-4
-    assert scores.metrics["mse_depth"].value < 1e-9
 
 
 def test_every_row_serves_once_as_that_of_another_scene():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.scoring.evaluate import open_runs, score
 from metrics.views.examples import chosen_questions, chosen_scenes, examples_of

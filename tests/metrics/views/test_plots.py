@@ -57,7 +57,7 @@ def test_the_same_numbers_give_the_same_bytes(monkeypatch):
     assert curves([MINE, FLOOR], "t", "u") == first
 
 
-@pytest.mark.parametrize("backend", ["Qt4Agg", "module://matplotlib_inline.backend_inline", "no"])
+@pytest.mark.parametrize("backend", ["module://matplotlib_inline.backend_inline"])
 def test_a_backend_that_an_ide_left_behind_does_not_count(backend):
     code = "from metrics.views import plots; print(plots.strip(plots.Point(0, 1.0), [])[0][:9])"
     result = subprocess.run(

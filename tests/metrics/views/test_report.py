@@ -11,7 +11,7 @@ from pages import Page, cells_of
 from refusals import refused
 
 from iqtt.floors import Floor
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import Skill
 from metrics.scoring.evaluate import open_runs, score

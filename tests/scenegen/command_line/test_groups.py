@@ -8,7 +8,6 @@ import click
 import pytest
 from click.testing import CliRunner
 
-import cli
 from scenegen.command_line.groups import PackageCommands, creation_command
 
 
@@ -77,23 +76,3 @@ def test_a_recorded_command_can_be_pasted(monkeypatch):
     shell = ["sh", "-c", f"printf '%s\\n' {creation_command('scenegen')}"]
     done = subprocess.run(shell, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines() == ["scenegen", *words]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "alike"),
-    [
-        (["scroe"], "score"),
-        (["baseline", "nearst", "--data", "x.h5", "--out", "y.h5"], "nearest?"),
-        (["import", "--kind", "dept", "--data", "x.h5", "--out", "y.h5"], "depth?"),
-        (["score", "--ture", "x.h5"], "--truth"),
-        (["run", "m.py", "--data", "x.h5", "--out", "y.png"], ".h5"),
-    ],
-)
-def test_an_unknown_name_is_answered_with_one_that_is_like_it(arguments, alike):
-    result = CliRunner().invoke(cli.bench, arguments)
-    assert result.exit_code == 2
-    assert alike in result.stderr.splitlines()[-1]
-
-
-def test_the_help_of_a_group_is_in_whole_sentences():
-    assert "..." not in CliRunner().invoke(cli.bench, ["--help"]).stdout.partition("Commands:")[2]

@@ -75,7 +75,7 @@ def compare(ours, theirs):
     assert (abs(ours.image - theirs.image).max(axis=-1) < 1e-3).mean() > 0.998
 
 
-KINDS = {"box", "sphere", "cone", "torus", "capsule", "teapot"}  # others are polyhedra, or alike
+KINDS = {"box", "sphere", "torus", "teapot"}  # others are polyhedra, or alike
 
 
 @pytest.mark.parametrize(

@@ -102,7 +102,14 @@ def test_a_missed_pixel_is_shaded_without_a_warning():
     np.testing.assert_allclose(found, 0.1)
 
 
-@pytest.mark.parametrize("change", [{}, {"shadows": True}, {"spp": 3, "shadows": True}], ids=str)
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"spp": 3, "shadows": True},
+        *(pytest.param(change, marks=pytest.mark.slow) for change in ({}, {"shadows": True})),
+    ],
+    ids=str,
+)
 def test_highlights_agree_with_another_engine(change, scenes_of, embree_cast):
     batch = pack(replace(GLOSSY, **change), scenes_of(GLOSSY, 4))
     ours, theirs = render(batch), render_in_numpy(batch, embree_cast)

@@ -178,13 +178,13 @@ def test_a_view_is_the_same_alone_and_among_the_others(views_path):
 @pytest.mark.parametrize("batch", [1, 5, 14])
 def test_no_wavefront_has_more_images_than_the_batch_or_one_scene(batch, monkeypatch):
     sizes = []
-    launch = dataset.launch
+    launch = dataset.launch_fields
 
-    def counted(images, device):
+    def counted(images, names, device):
         sizes.append(len(images))
-        return launch(images, device)
+        return launch(images, names, device)
 
-    monkeypatch.setattr(dataset, "launch", counted)
+    monkeypatch.setattr(dataset, "launch_fields", counted)
     spec = DatasetSpec(**{**TINY, "height": 16, "width": 16, "min_visible_pixels": 0})
     found = [room.index for some in render_items(spec, range(7), batch) for room in some]
     assert found == [*range(7)]

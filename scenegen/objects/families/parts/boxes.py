@@ -65,4 +65,4 @@ def boxes(corners: Sequence[Sequence[Corner]]) -> Part:
     face /= np.sqrt((face * face).sum(axis=1, keepdims=True))
     hull = points.reshape(-1, 3)
     mesh = quads.reshape(-1, 3), faces.reshape(-1, 3), np.repeat(face, 4, axis=0)
-    return Part(*mesh, hull, np.zeros(len(hull)))
+    return Part(*mesh, hull, np.zeros(len(hull)), len(corners))

@@ -14,7 +14,7 @@ def moved(part: Part, offset: tuple[float, float, float], turn: Array | None = N
     shift = np.array(offset)
     if turn is None:
         hull = part.hull_points + shift
-        return Part(part.vertices + shift, part.faces, part.normals, hull, part.hull_discs)
+        return replace(part, vertices=part.vertices + shift, hull_points=hull)
     # Discs must be horizontal: one that tips over is replaced by a polygon that contains it.
     flat = part.hull_discs > 0.0
     discs = part.hull_discs[flat]
@@ -24,12 +24,12 @@ def moved(part: Part, offset: tuple[float, float, float], turn: Array | None = N
     spokes = np.stack([np.cos(angle), 0 * angle, np.sin(angle)], axis=1) / np.cos(np.pi / sides)
     rims = (part.hull_points[flat][:, None] + discs[:, None, None] * spokes).reshape(-1, 3)
     points = np.concatenate([part.hull_points[~flat], rims])
-    return Part(
-        _turned(part.vertices, turn) + shift,
-        part.faces,
-        _turned(part.normals, turn),
-        _turned(points, turn) + shift,
-        np.zeros(len(points)),
+    return replace(
+        part,
+        vertices=_turned(part.vertices, turn) + shift,
+        normals=_turned(part.normals, turn),
+        hull_points=_turned(points, turn) + shift,
+        hull_discs=np.zeros(len(points)),
     )
 
 

@@ -5,7 +5,7 @@ Every part comes with a convex body that contains it, as the hull of horizontal 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,6 +25,11 @@ class Part:
         normals: unit normals of the smooth surface at the vertices, (V, 3).
         hull_points, hull_discs: centres (V, 3) and radii (V,) of horizontal discs whose convex
             hull contains the part.
+        pieces: into how many blocks of equal length, each a closed surface, vertices and faces
+            divide.
+        sheet: where the vertices lie on a cloth that is wound about the part: how far around, how
+            far along, and the whole way around, (V, 3); None, or 0 all around, where it is flat.
+        material: what the part is made of, or its role, from which that follows (`furnishing`).
     """
 
     vertices: Array
@@ -32,6 +37,14 @@ class Part:
     normals: Array
     hull_points: Array
     hull_discs: Array
+    pieces: int = 1
+    sheet: Array | None = None
+    material: str = ""
+
+
+def made_of(material: str, *parts: Part) -> list[Part]:
+    """Return parts that are made of this material; those that have one keep it."""
+    return [part if part.material else replace(part, material=material) for part in parts]
 
 
 def loft(
@@ -87,7 +100,10 @@ def loft(
     normals[..., ::2] = outward * rise[:, None]
     normals[..., 1] = -(section(growth, outward, quadrant) * outward).sum(axis=-1)
     normals[..., 1] -= (leans[:, None] * outward).sum(axis=-1)[:, None] * rise
-    return Part(*strips(grid, normals), hull.reshape(-1, 3), radii.reshape(-1))
+    vertices, faces, units, sheet = strips(grid, normals)
+    sheet[np.abs(units[:, 1]) > 0.7, 2] = 0.0  # a lid or a flat top is not wound about the axis
+    hull_points, hull_discs = hull.reshape(-1, 3), radii.reshape(-1)
+    return Part(vertices, faces, units, hull_points, hull_discs, len(centers), sheet)
 
 
 def _with_lids(rows: Array) -> Array:
@@ -129,8 +145,10 @@ def section(sizes: Array, outward: Array, quadrant: Array) -> Array:
     return np.asarray(quadrant * (sizes[:, None, :2] - radius) + outward * radius)
 
 
-def strips(grid: Array, normals: Array) -> tuple[Array, Array, Array]:
-    """Return vertices, triangles and unit normals between neighbouring rows of closed outlines.
+def strips(grid: Array, normals: Array) -> tuple[Array, Array, Array, Array]:
+    """Return vertices, triangles, unit normals and the sheet (see `Part`) of closed outlines.
+
+    Triangles lie between neighbouring rows.
 
     Strips without width (a crease repeats a row) and triangles without area (rows on an axis, arcs
     of radius 0) are left out.
@@ -162,7 +180,24 @@ def strips(grid: Array, normals: Array) -> tuple[Array, Array, Array]:
     x, y, z = (normals[..., i] for i in range(3))
     length = np.sqrt(x * x + y * y + z * z)
     unit = normals / np.maximum(length, 1e-300)[..., None]
-    return vertices.reshape(-1, 3), faces.reshape(-1, 3), unit.reshape(-1, 3)
+    sheet = np.tile(_sheet(first)[used], (copies, 1))
+    return vertices.reshape(-1, 3), faces.reshape(-1, 3), unit.reshape(-1, 3), sheet
+
+
+def _sheet(grid: Array) -> Array:
+    """Return how far around and along the points, (rows, around, 3), lie; (rows * around, 3).
+
+    Distances around are those of the row whose perimeter is the median one.
+    """
+    steps = np.linalg.norm(np.roll(grid, -1, axis=1) - grid, axis=2)
+    perimeter = steps.sum(axis=1)
+    row = int(np.argsort(perimeter)[(len(perimeter) + (perimeter < 1e-9).sum()) // 2])
+    along = np.linalg.norm(np.diff(grid, axis=0), axis=2).mean(axis=1)
+    sheet = np.empty(grid.shape)
+    sheet[..., 0] = np.cumsum(steps[row]) - steps[row]
+    sheet[..., 1] = np.cumsum([0.0, *along])[:, None]
+    sheet[..., 2] = perimeter[row]
+    return sheet.reshape(-1, 3)
 
 
 def joined(

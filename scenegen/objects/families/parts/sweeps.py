@@ -62,4 +62,5 @@ def tube(
         way = np.array(origin) + flat[:, :1] * u + flat[:, 1:] * v
         hull += [way + sideways * side, way - sideways * side]
     rows = np.concatenate(hull)
-    return Part(*strips(grid[None], normals[None]), rows, np.zeros(len(rows)))
+    vertices, faces, normals, sheet = strips(grid[None], normals[None])
+    return Part(vertices, faces, normals, rows, np.zeros(len(rows)), 1, sheet)

@@ -4,7 +4,7 @@ import numpy as np
 import torch
 
 from baselines.pix2shape.network.empty_rooms import NEAREST, empty_rooms
-from metrics.measures.empty_room import empty_room
+from metrics.measures.relief import empty_room
 from scenegen.rooms.reader import RoomsFile
 
 

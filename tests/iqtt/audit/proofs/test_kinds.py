@@ -50,7 +50,9 @@ def test_labels_of_mirror_images_and_near_shapes():
         # Where the near shape is right, the mirror image is the other wrong answer's.
         ([NEAR, NEAR, ARM, IMAGE], [-1, 1, 4], "ok"),
         ([NEAR, NEAR, ARM, IMAGE], [-1, 1, 2], "FAIL"),
-        ([NEAR, NEAR, ARM, IMAGE], [-1, 0, 4], "FAIL"),  # near-mirror of no near shape
+        ([IMAGE, IMAGE, ARM, NEAR], [-1, 2, 4], "ok"),
+        ([IMAGE, IMAGE, ARM, NEAR], MIRROR, "FAIL"),  # near to the mirror image alone
+        ([ARM, ARM, IMAGE, NEAR], [-1, 2, 4], "FAIL"),
         ([NEAR, NEAR, ARM, near_image], [-1, 1, 4], "FAIL"),
         ([ARM, ARM, NEAR @ ROTATIONS[9].T + 3, FAR], [-1, 1, 0], "ok"),
         ([ARM, ARM, FAR, NEAR], [-1, 1, 1], "FAIL"),  # more than one cube moved

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from metrics.submissions.hints.questions import answer_hints
+from metrics.submissions.hints.tasks import answer_hints
 from metrics.submissions.inspection import Inspection
 from metrics.submissions.reader import QuestionPredictions
 

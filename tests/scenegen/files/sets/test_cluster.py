@@ -11,10 +11,10 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+from audit_tables import audited
 from click.testing import CliRunner
 
 import cli
-from iqtt.audit.audit import audit
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.scoring.runs import scorer_versions
@@ -59,7 +59,7 @@ def test_whole_files_and_audits_are_those_of_one_process(cluster, tmp_path):
     make_split(tmp_path / "one", SPLIT)
     make_split(tmp_path / "many", SPLIT, cluster=cluster)
     assert contents(tmp_path / "many") == contents(tmp_path / "one")
-    records = [audit([tmp_path / "one"], cluster=how).record() for how in (cluster, None)]
+    records = [audited([tmp_path / "one"], cluster=how).record() for how in (cluster, None)]
     assert json.dumps(records[0]) == json.dumps(records[1])
 
 

@@ -196,7 +196,13 @@ print(list(in_processes(abs, [-1, 2, -3], 2)))
 """
 
 
-@pytest.mark.parametrize("how", ["script", "stdin", "module", "inside", "thread"])
+@pytest.mark.parametrize(
+    "how",
+    [
+        *("stdin", "thread"),
+        *(pytest.param(how, marks=pytest.mark.slow) for how in ("script", "module", "inside")),
+    ],
+)
 def test_a_script_without_a_guard_runs_once(how, tmp_path):
     """Nothing of the main module is needed, whatever that is."""
     text = SCRIPT

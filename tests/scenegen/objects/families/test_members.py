@@ -128,7 +128,7 @@ def test_a_member_is_named_and_built_once():
 
 @pytest.mark.parametrize(
     ("family", "member", "where", "found"),
-    [("cup", 0, "family", "'cup'"), ("mug", MEMBERS, "mug", "1000"), ("mug", -1, "mug", "-1")],
+    [("tray", 0, "family", "'tray'"), ("mug", MEMBERS, "mug", "1000"), ("mug", -1, "mug", "-1")],
 )
 def test_unknown_members_are_refused(family, member, where, found):
     with pytest.raises(SpecError) as error:

@@ -57,7 +57,7 @@ def test_without_a_folder_only_the_last_meshes_are_kept(made, monkeypatch):
     assert made.call_count == 3
 
 
-@pytest.mark.parametrize("member", [("cup", 1), ("mug", -1), ("mug", 1000), ("../mug", 1)])
+@pytest.mark.parametrize("member", [("spoon", 1), ("mug", -1), ("mug", 1000), ("../mug", 1)])
 def test_unknown_members_are_refused(member, tmp_path):
     for ask in (MemberStore(tmp_path).outline, MemberStore(tmp_path).mesh):
         with pytest.raises(SpecError):

@@ -25,7 +25,11 @@ from scenegen.rendering.renderer import render
 
 Array = NDArray[Any]
 ROOMS = 40
-FAMILY_PRESETS = [name for name, it in PRESETS.items() if it.settings.get("source") == "families"]
+FAMILY_PRESETS = [
+    name
+    for name, it in PRESETS.items()
+    if it.settings.get("source") == "families" and not it.settings.get("interior")
+]
 
 
 def cast(batch: SceneBatch, row: int) -> tuple[Array, Array, Array]:

@@ -33,6 +33,7 @@ def test_an_image_is_the_same_alone_and_in_any_company(source, model_folder):
     assert all_bits(spec, some[::-1], objects) == alone[::-1]
 
 
+@pytest.mark.slow
 def test_hundreds_of_other_models_change_no_bit():
     """At the far end of a lattice of 7 x 7 x 7, and at its beginning."""
     spec = replace(FAMILIES, objects=(0, 100))
@@ -90,7 +91,7 @@ def test_path_tracing_is_refused_where_only_the_slow_path_is(scenes_of, monkeypa
     batch = pack(spec, scenes_of(spec, 1))
     monkeypatch.setattr(renderer, "select_variant", lambda device: "scalar_rgb")
     with pytest.raises(BackendError) as refused:
-        renderer.launch(batch)
+        renderer.trace(batch, ["image"])
     assert refused.value.where == "shading path"
 
 

@@ -1,0 +1,101 @@
+"""Furniture as models of a data set: `furnishing`s in the place of unit shapes.
+
+A furnishing is centred at the middle of its box, and its bounding radius is 1, as that of all unit
+shapes. So an object of a closed room is placed by the same similarity as all other objects.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.recent import Recent
+from scenegen.objects.coarse_hulls import POINT_STEP, rounded
+from scenegen.objects.furnishing import Furnishing, furnishing, supports
+from scenegen.objects.room_shell import box_hull
+from scenegen.objects.solids import Mesh, UnitShape
+
+Array = NDArray[Any]
+SIZE_STEP = 2.0**-12  # metres, to which sizes are rounded
+UPRIGHT = np.array([[0.0, -1.0, 0.0]])
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """What placing needs of a piece of furniture, in its own frame: centred, on y = 0, front +z.
+
+    Attributes:
+        name: family/number.
+        half: half its width along x and half its depth along z, metres.
+        height: metres.
+        radius: of the sphere about the middle of its box.
+        surfaces: horizontal rectangles (y, x0, x1, z0, z1) on which things stand.
+        boxes: least and greatest corner of each triangle, (2, F, 3); none without surfaces.
+    """
+
+    name: str
+    half: tuple[float, float]
+    height: float
+    radius: float
+    surfaces: tuple[tuple[float, ...], ...]
+    boxes: Array
+
+    @property
+    def family(self) -> str:
+        """The family's name."""
+        return self.name.partition("/")[0]
+
+
+def family_of(name: str) -> tuple[str, int]:
+    """Return family and number of a name."""
+    family, _, number = name.partition("/")
+    return family, int(number)
+
+
+_KEPT: Recent[tuple[Furnishing, Array, float]] = Recent(1_000_000)  # faces, of some 200 bytes
+
+
+def furnished(name: str) -> tuple[Furnishing, Array, float]:
+    """Return a furnishing, its vertices in units of its radius about its middle, and the radius.
+
+    Rounded, as cosines and sums differ in their last bits between processors.
+    """
+    known = _KEPT.get(name)
+    if known is None:
+        thing = furnishing(*family_of(name))
+        low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
+        moved = thing.vertices - (low + high) / 2
+        radius = float(np.sqrt((moved * moved).sum(axis=1).max()))
+        radius = float(np.ceil(radius / SIZE_STEP) * SIZE_STEP)
+        known = thing, rounded(moved / radius, POINT_STEP), radius
+        _KEPT.put(name, known, len(thing.faces))
+    return known
+
+
+@lru_cache(maxsize=2000)
+def piece(name: str) -> Piece:
+    """Return a piece of furniture as it is placed."""
+    thing, vertices, radius = furnished(name)
+    high = vertices.max(axis=0)
+    half = np.ceil(high * radius / SIZE_STEP) * SIZE_STEP
+    corners = (vertices * radius + [0.0, half[1], 0.0])[thing.faces]
+    surfaces = tuple(
+        tuple(float(np.ceil(v / SIZE_STEP) * SIZE_STEP) for v in rectangle)
+        for rectangle in supports(thing)
+    )
+    boxes = (
+        np.stack([corners.min(axis=1), corners.max(axis=1)]) if surfaces else np.zeros((2, 0, 3))
+    )
+    across, up, along = half.tolist()
+    return Piece(name, (across, along), 2 * up, radius, surfaces, boxes)
+
+
+def furniture_shape(name: str) -> UnitShape:
+    """Return a piece of furniture as a unit shape."""
+    thing, vertices, _ = furnished(name)
+    normals = rounded(thing.corner_normals, POINT_STEP).reshape(-1, 3)
+    faces = np.arange(3 * len(thing.faces)).reshape(-1, 3)
+    mesh = Mesh(vertices[thing.faces].reshape(-1, 3), faces, normals)
+    return UnitShape(name, lambda: mesh, *box_hull(vertices), 0.0, UPRIGHT)

@@ -1,0 +1,119 @@
+"""What others made, for pictures: a folder of materials, and a picture of the surroundings.
+
+A data set names them by digests of their bytes. Their places are told to each process (`ASSETS`).
+"""
+
+import hashlib
+from collections.abc import Mapping
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.records import check
+from scenegen.description.specs import DatasetSpec
+from scenegen.rendering.backend import point_to_llvm
+from scenegen.rendering.materials.folders import MapFiles, from_folder
+from scenegen.rendering.pictures.places import ASSETS
+
+Array = NDArray[Any]
+MEAN = 0.09  # radiance that the upper half of the surroundings is scaled to, that of a clear sky
+MOST_COLUMNS = 4096
+
+
+def materials_of(spec: DatasetSpec) -> Mapping[str, tuple[MapFiles, ...]] | None:
+    """Return the folder of materials that a data set names; None if it has none.
+
+    Raises SpecError where its place is not told, or it is another one.
+    """
+    if not spec.materials:
+        return None
+    return _folder(_checked("materials", spec.materials, ASSETS.materials))
+
+
+def environment_of(spec: DatasetSpec) -> Array | None:
+    """Return radiance by direction, (H, W, 3), of the surroundings that a data set names.
+
+    None if it has none. Raises as `materials_of`, and FileFormatError.
+    """
+    if not spec.environment:
+        return None
+    return read_environment(_checked("environment", spec.environment, ASSETS.environment))
+
+
+def _checked(name: str, digest: str, place: Path | None) -> Path:
+    if place is None:
+        raise SpecError(name, "no place", f"--{name}, which the file was made with")
+    found = digest_of(place)
+    check(found == digest, f"{name} {place}", f"other files ({found})", f"those of {digest}")
+    return place
+
+
+@lru_cache(maxsize=4)
+def _folder(place: Path) -> Mapping[str, tuple[MapFiles, ...]]:
+    return from_folder(place)
+
+
+@lru_cache(maxsize=8)
+def digest_of(place: Path) -> str:
+    """Return 16 hex digits of the SHA-256 of a file, or of a folder's names and bytes.
+
+    Raises OSError where it cannot be read.
+    """
+    files = sorted(p for p in place.rglob("*") if p.is_file()) if place.is_dir() else [place]
+    digest = hashlib.sha256()
+    for path in files:
+        name = path.relative_to(place).as_posix()
+        digest.update(hashlib.sha256(name.encode()).digest())
+        digest.update(hashlib.sha256(path.read_bytes()).digest())
+    return digest.hexdigest()[:16]
+
+
+@lru_cache(maxsize=2)
+def read_environment(place: Path) -> Array:
+    """Return an equirectangular picture, HDR or EXR, as radiance, (H, W, 3) float32.
+
+    Raises FileFormatError where it is broken, has a low dynamic range, or is not twice as wide as
+    high.
+    """
+    point_to_llvm()  # before Dr.Jit is imported, with Mitsuba
+    import mitsuba
+
+    mi: Any = mitsuba
+    if mi.variant() is None:  # bitmaps need one
+        mi.set_variant("scalar_rgb")
+    expected = "an equirectangular picture in HDR or EXR"
+    try:
+        bitmap = mi.Bitmap(str(place))
+    except Exception as error:  # Mitsuba raises RuntimeError for whatever it meets
+        raise FileFormatError(place, "no picture that can be read", expected) from error
+    if bitmap.component_format() not in (mi.Struct.Type.Float16, mi.Struct.Type.Float32):
+        raise FileFormatError(place, "a low dynamic range", expected)
+    values = np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+    rows, columns = values.shape[:2]
+    if columns != 2 * rows:
+        raise FileFormatError(place, f"{columns} x {rows} pixels", f"{expected}, twice as wide")
+    if not np.isfinite(values).all() or (values < 0).any() or not values.any():
+        raise FileFormatError(place, "radiance that is no finite, positive number", expected)
+    step = -(-columns // MOST_COLUMNS)
+    values = values[::step, ::step]
+    return np.asarray(values * (MEAN / max(float(values[: len(values) // 2].mean()), 1e-9)))
+
+
+def use_assets(materials: str | None, environment: str | None) -> dict[str, str]:
+    """Let this process use these places, and return the settings that name them.
+
+    Raises as `materials_of` and `environment_of`, and OSError.
+    """
+    ASSETS.use(materials, environment)
+    settings = {}
+    if ASSETS.materials is not None:
+        _folder(ASSETS.materials)
+        settings["materials"] = digest_of(ASSETS.materials)
+    if ASSETS.environment is not None:
+        read_environment(ASSETS.environment)
+        settings["environment"] = digest_of(ASSETS.environment)
+    return settings

@@ -1,0 +1,61 @@
+"""From radiance to a picture, as cameras do: exposure, white balance, a tone curve, sRGB.
+
+The tone curve is y = x (1 + x / w^2) / (1 + x), extended Reinhard (2002), of each channel, where w
+is the exposed radiance that becomes white. After sRGB's curve, c y^2 (3 - 2 y) + (1 - c) y adds
+contrast.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.rendering.ground_truth import encode_image
+
+Array = NDArray[Any]
+# What `develop` finds out: factor of radiance, further factors of red, green and blue, and w.
+EXPOSURE = ("exposure", "red", "green", "blue", "white")
+KEY = 0.42  # exposed radiance of the middle of a picture
+BALANCE = 0.65  # how far white balance goes towards grey light
+BRIGHT = 99.5  # percentile of the radiance that becomes white
+LEAST_WHITE = 3.0
+CONTRAST = 0.35  # share of a smooth step in the tone curve
+
+
+def develop(radiance: Array, albedo: Array, inside: Array, dtype: str, noise: Array | None) -> Any:
+    """Return a picture as it is stored, (H, W, 3), and its EXPOSURE, (5,).
+
+    8-bit pictures are developed; floating-point ones hold the radiance as it is.
+
+    Args:
+        radiance: linear RGB, (H, W, 3).
+        albedo: of the surfaces, (H, W, 3), by which the colour of the light is told.
+        inside: pixels that show the room, not what is outside the windows, (H, W).
+        noise: added to the developed picture, (H, W, 3), 1 being white; None for none.
+    """
+    shown = inside if inside.any() else np.ones_like(inside)
+    luminance = radiance @ np.array([0.2126, 0.7152, 0.0722])
+    middle = np.exp(np.log(luminance[shown] + 1e-9).mean())
+    light = radiance[shown] / np.maximum(albedo[shown], 0.05)
+    mean = np.maximum(np.median(light, axis=0), 1e-9)
+    gains = (mean.mean() / mean) ** BALANCE
+    gains /= gains @ np.array([0.2126, 0.7152, 0.0722])
+    exposure = KEY / max(float(middle), 1e-9)
+    exposed = radiance * (gains * exposure)
+    white = max(float(np.percentile(exposed.max(axis=-1), BRIGHT)), LEAST_WHITE)
+    found = np.array([exposure, *gains, white])
+    if dtype != "uint8":
+        return encode_image(radiance, dtype), found
+    return encode_image(tone(exposed, white, noise), dtype), found
+
+
+def tone(exposed: Array, white: float, noise: Array | None = None) -> Array:
+    """Return exposed radiance as sRGB, 0 to 1 where it is not brighter than white."""
+    curve = exposed * (1 + exposed / white**2) / (1 + exposed)
+    curve = np.maximum(curve, 0.0)
+    encoded = np.where(
+        curve <= 0.0031308, 12.92 * curve, 1.055 * np.maximum(curve, 1e-9) ** (1 / 2.4) - 0.055
+    )
+    encoded = np.clip(encoded, 0.0, 1.0)
+    encoded += CONTRAST * (encoded * encoded * (3 - 2 * encoded) - encoded)
+    return np.asarray(np.clip(encoded if noise is None else encoded + noise, 0.0, 1.0))

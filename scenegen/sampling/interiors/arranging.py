@@ -1,0 +1,612 @@
+"""Where furniture stands: along walls, about tables, on surfaces, on the floor.
+
+A room is filled in steps. First comes what the room is for, such as a table with its chairs; then
+what stands along walls and hangs on them; then small things on all surfaces, until the room holds
+as many objects as it should. A thing for which there is no place is left out, and another one is
+tried.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from scenegen.description.interiors import WALLS, Opening, wall_length
+from scenegen.objects.furniture import Piece
+from scenegen.sampling.interiors.draws import Draws
+from scenegen.sampling.interiors.rooms import Room
+from scenegen.sampling.interiors.spaces import (
+    GAP,
+    ON,
+    Box,
+    Space,
+    apart,
+    box_at,
+    facing,
+    stepped_turn,
+)
+
+TRIES = 12  # places that are tried for one thing
+TURNS = {"west": 0.25, "east": 0.75, "north": 0.0, "south": 0.5}  # of fronts that face inwards
+BEHIND = 0.03  # metres between a wall and what stands along it
+DOOR_CLEAR, FRONT_CLEAR = 0.85, 0.55  # metres that stay free before doors and before furniture
+SILL_DEPTH = 0.14  # of a window's sill, inside the wall's plane
+TOP = 1.0  # least height of a wall's free part for a picture's lower edge
+FILL_TRIES = 400
+# What stands on what, by family and with weights; "sill" and "floor" are the room's.
+ON_TOP: dict[str, dict[str, float]] = {
+    "table": {"plate": 2, "cup": 3, "mug": 3, "bowl": 3, "bottle": 2, "can": 1, "vase": 2,
+              "book": 2, "plant": 1, "cap": 0.3, "basket": 0.3},
+    "coffee_table": {"book": 4, "cup": 2, "mug": 2, "vase": 2, "bowl": 2, "plant": 1, "can": 0.5},
+    "desk": {"book": 4, "books": 3, "screen": 3, "lamp": 3, "mug": 3, "cup": 1, "can": 1,
+             "plant": 1, "box": 0.5, "cap": 0.3, "bottle": 0.5},
+    "shelf": {"books": 10, "book": 4, "vase": 2, "box": 1.5, "plant": 1.5, "bowl": 1, "cup": 1,
+              "bottle": 0.5, "can": 0.5, "plate": 0.3, "basket": 1, "cap": 0.2, "mug": 0.7},
+    "cabinet": {"lamp": 3, "vase": 3, "plant": 3, "books": 2, "book": 2, "bowl": 2, "screen": 1,
+                "box": 0.5, "bottle": 0.5, "basket": 0.5},
+    "nightstand": {"lamp": 4, "book": 3, "mug": 1, "cup": 1, "plant": 1, "bottle": 0.3},
+    "sofa": {"cushion": 5, "book": 0.3, "bag": 0.2},
+    "armchair": {"cushion": 2, "book": 0.2},
+    "bed": {"cushion": 3, "book": 0.3, "bag": 0.2},
+    "chair": {"bag": 0.5, "cap": 0.3, "book": 0.4},
+    "stool": {"plant": 2, "book": 2, "mug": 1, "vase": 1},
+    "sill": {"plant": 5, "vase": 2, "book": 0.5, "cup": 0.5, "bowl": 0.5},
+    "floor": {"bag": 2, "box": 2, "basket": 2, "stool": 0.5},
+}  # fmt: skip
+SEATS = ("chair", "sofa", "armchair", "bed", "stool")
+INSIDE = ("shelf",)  # families on all of whose surfaces things stand; others have a top
+HIGHEST = 1.5  # metres of a top on which small things stand
+MOST_ON_FLOOR = 5  # small things on the floor
+UPRIGHT_FRONT = ("books", "screen", "cushion", "lamp")  # look to the front
+
+
+@dataclass
+class Arranger:
+    """A room while it is furnished.
+
+    Attributes:
+        room, space, draws: what it is, what is taken, and random numbers.
+        member: returns a member of a family, or None if the data set has none of it.
+        kinds: members that this room has, by family: a set of chairs is of one kind.
+    """
+
+    room: Room
+    space: Space
+    draws: Draws
+    member: Callable[[str], Piece | None]
+    kinds: dict[str, list[Piece]] = field(default_factory=dict)
+
+    # Choosing
+
+    def piece(self, family: str, most_kinds: int = 3) -> Piece | None:
+        """Return a member of a family: one that the room has, or another one."""
+        known = self.kinds.setdefault(family, [])
+        if len(known) < most_kinds and (not known or self.draws.chance(0.6)):
+            new = self.member(family)
+            if new is not None:
+                known.append(new)
+            return new
+        return self.draws.pick(known) if known else None
+
+    def holes(self, wall: str) -> list[Opening]:
+        """Return the openings of a wall."""
+        return [hole for hole in self.room.openings if hole.wall == wall]
+
+    # Along walls
+
+    def wall_place(self, wall: str, along: float, away: float) -> tuple[float, float]:
+        """Return the point, (x, z), at a distance from a wall."""
+        width, _, depth = self.space.size
+        return {
+            "west": (away, along),
+            "east": (width - away, along),
+            "north": (along, away),
+            "south": (along, depth - away),
+        }[wall]
+
+    def wall_box(self, piece: Piece, wall: str, along: float, bottom: float, behind: float) -> Box:
+        """Return the box of a piece with its back to a wall."""
+        x, z = self.wall_place(wall, along, piece.half[1] + behind)
+        return box_at(piece, x, z, bottom, TURNS[wall])
+
+    def fits_wall(self, wall: str, along: float, half: float, bottom: float, top: float) -> bool:
+        """Return whether a part of a wall has no opening behind it."""
+        margin = 0.09
+        return all(
+            along + half + margin <= hole.left
+            or along - half - margin >= hole.right
+            or top <= hole.bottom - 0.03
+            or bottom >= hole.top + margin
+            for hole in self.holes(wall)
+        )
+
+    def against_wall(
+        self,
+        family: str,
+        walls: Sequence[str] = WALLS,
+        front: float = FRONT_CLEAR,
+        middle: bool = False,
+        kinds: int = 2,
+    ) -> int:
+        """Put furniture along a wall, with a free strip before it; return its number, or 0."""
+        piece = self.piece(family, kinds)
+        if piece is None or self.space.full:
+            return 0
+        for _ in range(TRIES):
+            wall = self.draws.pick(walls)
+            length = wall_length(self.space.size, wall)
+            least = piece.half[0] + 0.04
+            if 2 * least > length:
+                continue
+            along = self.draws.pick(
+                (self.draws.span(least, length - least), least, length - least), (3, 1, 1)
+            )
+            along = length / 2 if middle and self.draws.chance(0.5) else along
+            if not self.fits_wall(wall, along, piece.half[0], 0.0, piece.height):
+                continue
+            box = self.wall_box(piece, wall, along, 0.0, BEHIND)
+            if number := self.stand(piece, box):
+                x, z = self.wall_place(wall, along, 2 * piece.half[1] + BEHIND + front / 2)
+                strip = Box(x, z, (piece.half[0], front / 2), 0.0, 2.0, TURNS[wall])
+                self.space.kept.append(strip)
+                return number
+        return 0
+
+    def on_wall(self, family: str, low: float, high: float, kinds: int = 4) -> int:
+        """Hang something on a wall with its middle between two heights; return its number or 0."""
+        piece = self.piece(family, kinds)
+        if piece is None or self.space.full:
+            return 0
+        for _ in range(TRIES):
+            wall = self.draws.pick(WALLS)
+            length = wall_length(self.space.size, wall)
+            least = piece.half[0] + 0.1
+            if 2 * least > length:
+                continue
+            along = self.draws.span(least, length - least)
+            bottom = self.draws.span(low, high) - piece.height / 2
+            top = bottom + piece.height
+            if top > self.space.size[1] - 0.15 or bottom < TOP:
+                continue
+            if not self.fits_wall(wall, along, piece.half[0] + 0.12, bottom, top):
+                continue
+            box = self.wall_box(piece, wall, along, bottom, 0.002)
+            near = Box(box.x, box.z, (piece.half[0] + 0.08, piece.half[1] + 0.05),
+                       bottom - 0.05, top + 0.05, box.turns)  # fmt: skip
+            if self.space.free(near):
+                return self.space.put(piece, box, 0)
+        return 0
+
+    def curtains(self) -> None:
+        """Hang a pair of curtains at some windows."""
+        for hole in self.room.openings:
+            if hole.kind != "window" or not self.draws.chance(0.6):
+                continue
+            piece = self.piece("curtain", 1)
+            if piece is None:
+                return
+            top = min(hole.top + 0.16, self.space.size[1] - 0.05)
+            if top - piece.height < 0.01:
+                continue
+            length = wall_length(self.space.size, hole.wall)
+            for side in (-1, 1):
+                edge = hole.left if side < 0 else hole.right
+                along = edge + side * (piece.half[0] - 0.08)
+                if not piece.half[0] < along < length - piece.half[0] or self.space.full:
+                    continue
+                box = self.wall_box(piece, hole.wall, along, top - piece.height, 0.17)
+                if self.space.within(box, 0.0) and self.space.free(box):
+                    self.space.put(piece, box, 0)
+
+    # On the floor
+
+    def stand(self, piece: Piece, box: Box, keep: bool = True) -> int:
+        """Let something stand on the floor, or on a rug if it is wholly there; return its number.
+
+        It is 0 where there is no room.
+        """
+        base, number = 0.0, 0
+        for i, other in enumerate(self.space.placed, start=1):
+            if other.piece.family != "rug" or _beside(box, other.box):
+                continue
+            if not _above(box, other.box):
+                return 0
+            base, number = other.box.top + ON, i
+        box = box_at(piece, box.x, box.z, base, box.turns)
+        if not self.space.within(box) or not self.space.free(box, number, floor=keep):
+            return 0
+        return self.space.put(piece, box, number)
+
+    def on_floor(self, family: str, corner: bool = False, kinds: int = 2) -> int:
+        """Put something anywhere on the floor, near walls and corners; return its number or 0."""
+        piece = self.piece(family, kinds)
+        if piece is None or self.space.full:
+            return 0
+        for _ in range(TRIES):
+            turns = stepped_turn(self.draws.unit())
+            reach = Box(0, 0, piece.half, 0, 1, turns).reach()
+            x = self._toward_wall(self.space.size[0], reach[0] + 0.04, corner)
+            z = self._toward_wall(self.space.size[2], reach[1] + 0.04, corner or None)
+            if number := self.stand(piece, box_at(piece, x, z, 0.0, turns)):
+                return number
+        return 0
+
+    def _toward_wall(self, length: float, margin: float, near: bool | None) -> float:
+        share = self.draws.unit()
+        if near or (near is None and self.draws.chance(0.6)):
+            share = 0.15 * share if self.draws.chance(0.5) else 1 - 0.15 * share
+        return margin + share * max(length - 2 * margin, 0.0)
+
+    def rug(self, x: float, z: float, turns: float) -> int:
+        """Lay a rug about a point, as far as it is free."""
+        piece = self.piece("rug", 1)
+        if piece is None or self.space.full:
+            return 0
+        for _ in range(TRIES):
+            dx, dz = self.draws.span(-0.15, 0.15), self.draws.span(-0.15, 0.15)
+            box = box_at(piece, x + dx, z + dz, 0.0, turns)
+            if self.space.within(box) and self.space.free(box):
+                return self.space.put(piece, box, 0)
+        return 0
+
+    def table_with_chairs(self) -> int:
+        """Put a table into the room, perhaps on a rug, with chairs that face it."""
+        table = self.piece("table", 1)
+        if table is None or self.space.full:
+            return 0
+        width, _, depth = self.space.size
+        for _ in range(TRIES):
+            x = width / 2 + self.draws.span(-0.25, 0.25) * width
+            z = depth / 2 + self.draws.span(-0.25, 0.25) * depth
+            turns = self.draws.pick((0.0, 0.25)) + (
+                stepped_turn(self.draws.span(-0.02, 0.02)) if self.draws.chance(0.3) else 0.0
+            )
+            around = Box(x, z, (table.half[0] + 0.5, table.half[1] + 0.5), 0.0, 0.8, turns)
+            if not self.space.within(around, -0.2) or not self.space.free(around, floor=True):
+                continue
+            if self.draws.chance(0.35):
+                self.rug(x, z, turns)
+            number = self.stand(table, box_at(table, x, z, 0.0, turns))
+            if number:
+                self._chairs(number)
+                return number
+        return 0
+
+    def _chairs(self, table: int) -> None:
+        place, chair = self.space.placed[table - 1].box, self.piece("chair", 1)
+        if chair is None:
+            return
+        a, b = place.half
+        seats: list[tuple[float, float, float, float]] = []
+        for side in (-1.0, 1.0):
+            count = max(1, min(int(2 * a / (2 * chair.half[0] + 0.12)), 3))
+            seats += [((2 * i + 1 - count) * a / count, side * b, 0.0, side) for i in range(count)]
+            if 2 * b > 2 * chair.half[0] + 0.1 and 2 * a > 1.1:
+                seats.append((side * a, 0.0, side, 0.0))
+        wanted = self.draws.count(2, max(2, len(seats)))
+        for x, z, out_x, out_z in self.draws.shuffled(seats)[:wanted]:
+            if self.space.full:
+                return
+            away = chair.half[1] + self.draws.span(0.02, 0.14)
+            at = place.point(x + out_x * away, z + out_z * away)
+            c, s = place.axes
+            toward = facing(-(c * out_x + s * out_z), s * out_x - c * out_z)
+            toward += stepped_turn(self.draws.span(-0.035, 0.035))
+            self.stand(chair, box_at(chair, *at, 0.0, toward), keep=False)
+            if self.draws.chance(0.6):
+                self._setting(table, x, z)
+
+    def _setting(self, table: int, x: float, z: float) -> None:
+        """Lay a plate, and a cup or a mug beside it, before a chair."""
+        plate = self.piece("plate", 1)
+        place = self.space.placed[table - 1]
+        if plate is None:
+            return
+        inside = 1 - (plate.half[1] + 0.05) / max(place.box.half)
+        across = place.box.point(x * inside if x else x, z * (1 - 0.2 / place.box.half[1]))
+        self.on_surface(plate, table, across)
+        cup = self.piece(self.draws.pick(("cup", "mug")), 1)
+        if cup is not None:
+            beside = (
+                across[0] + self.draws.span(-0.2, 0.2),
+                across[1] + self.draws.span(-0.2, 0.2),
+            )
+            self.on_surface(cup, table, beside)
+
+    def seat_at(self, desk: int) -> None:
+        """Put a chair before a desk, facing it."""
+        place, chair = self.space.placed[desk - 1].box, self.piece("chair", 2)
+        if chair is None or self.space.full:
+            return
+        away = place.half[1] + chair.half[1] + self.draws.span(0.02, 0.12)
+        at = place.point(self.draws.span(-0.15, 0.15), away)
+        turns = place.turns + 0.5 + stepped_turn(self.draws.span(-0.05, 0.05))
+        self.stand(chair, box_at(chair, *at, 0.0, turns), keep=False)
+
+    def beside(self, number: int, family: str, side: int) -> int:
+        """Put something beside furniture that stands along a wall; `side` is -1 or 1."""
+        place, piece = self.space.placed[number - 1].box, self.piece(family, 1)
+        if piece is None or self.space.full:
+            return 0
+        away = place.half[0] + piece.half[0] + self.draws.span(0.03, 0.1)
+        x, z = place.point(side * away, -place.half[1] + piece.half[1])
+        box = box_at(piece, x, z, 0.0, place.turns)
+        for wall in WALLS:  # nothing tall before a window or a door
+            if TURNS[wall] == place.turns and wall_length(self.space.size, wall) > 0:
+                along = z if wall in ("west", "east") else x
+                if not self.fits_wall(wall, along, piece.half[0], 0.0, piece.height):
+                    return 0
+        return self.stand(piece, box, keep=False)
+
+    def in_corner(self, family: str) -> int:
+        """Put something into a corner, turned towards the middle of the room."""
+        piece = self.piece(family, 2)
+        if piece is None or self.space.full:
+            return 0
+        width, _, depth = self.space.size
+        for sx, sz in self.draws.shuffled(((-1, -1), (-1, 1), (1, -1), (1, 1))):
+            away = max(piece.half) * 1.35 + self.draws.span(0.05, 0.3)
+            x, z = (away if sx < 0 else width - away), (away if sz < 0 else depth - away)
+            turns = facing(-sx, -sz) + stepped_turn(self.draws.span(-0.04, 0.04))
+            if number := self.stand(piece, box_at(piece, x, z, 0.0, turns)):
+                return number
+        return 0
+
+    def hang(self, family: str, x: float, z: float) -> int:
+        """Hang something from the ceiling; return its number, or 0."""
+        piece = self.piece(family, 1)
+        if piece is None or self.space.full:
+            return 0
+        bottom = self.space.size[1] - piece.height - 0.002
+        box = box_at(piece, x, z, bottom, 0.0)
+        return self.space.put(piece, box, 0) if self.space.free(box) and bottom > 1.45 else 0
+
+    def screen_on(self, number: int) -> int:
+        """Put a screen on furniture, looking to its front."""
+        screen, place = self.piece("screen", 1), self.space.placed[number - 1]
+        if screen is None or place.piece.height > 1.1:
+            return 0
+        at = place.box.point(self.draws.span(-0.15, 0.15), -0.3 * place.box.half[1])
+        return self.on_surface(screen, number, at, place.box.turns)
+
+    # On surfaces
+
+    def on_surface(
+        self, piece: Piece, parent: int, at: tuple[float, float], turns: float | None = None
+    ) -> int:
+        """Put something on the highest surface of an object about a point of the world, (x, z)."""
+        if self.space.full:
+            return 0
+        below = self.space.placed[parent - 1]
+        turns = stepped_turn(self.draws.unit()) if turns is None else turns
+        for y, *sides in reversed(below.piece.surfaces):
+            box = box_at(piece, *at, below.box.bottom + y + ON, turns)
+            if self._on(box, below.box, sides) and self.space.free(box, parent):
+                return self.space.put(piece, box, parent)
+        return 0
+
+    @staticmethod
+    def _on(box: Box, place: Box, sides: Sequence[float]) -> bool:
+        """Return whether a box stands wholly on a rectangle (x0, x1, z0, z1) of an object."""
+        x0, x1, z0, z1 = sides
+        x, z = place.local(box.x, box.z)
+        reach = Box(x, z, box.half, 0.0, 1.0, box.turns - place.turns).reach()
+        return (
+            x0 <= x - reach[0] and x + reach[0] <= x1 and z0 <= z - reach[1] and z + reach[1] <= z1
+        )
+
+    def fill(self) -> None:
+        """Put small things on surfaces until the room holds what it should."""
+        for _ in range(FILL_TRIES):
+            if self.space.full:
+                return
+            surfaces = self._surfaces()
+            kind, parent, y, sides = self.draws.pick(
+                [surface for surface, _ in surfaces], [weight for _, weight in surfaces]
+            )
+            family = self.draws.pick(tuple(ON_TOP[kind]), tuple(ON_TOP[kind].values()))
+            if kind == "floor":
+                self.on_floor(family)
+            elif kind == "sill":
+                self._on_sill(family, sides)
+            else:
+                self._small(family, parent, y, sides)
+
+    def _surfaces(self) -> list[tuple[tuple[str, int, float, Sequence[float]], float]]:
+        """Return surfaces as (family, number, height, sides), with weights."""
+        found: list[tuple[tuple[str, int, float, Sequence[float]], float]] = []
+        carried = [thing.stands_on for thing in self.space.placed]
+        for number, thing in enumerate(self.space.placed, start=1):
+            family = thing.piece.family
+            if family not in ON_TOP:
+                continue
+            top = max((surface[0] for surface in thing.piece.surfaces), default=0.0)
+            for y, *sides in thing.piece.surfaces:
+                if family not in INSIDE and (
+                    (y < top - 0.01 and family not in SEATS) or y > HIGHEST
+                ):
+                    continue
+                area = (sides[1] - sides[0]) * (sides[3] - sides[2])
+                weight = min(area, 0.8) * (0.3 if family in SEATS else 1.0)
+                found.append(
+                    ((family, number, y, sides), weight / (1 + 0.1 * carried.count(number)))
+                )
+        for hole in self.room.openings:
+            if hole.kind == "window":
+                sill = (hole.left, hole.right, hole.bottom, float(WALLS.index(hole.wall)))
+                found.append((("sill", 0, hole.bottom, sill), 0.08))
+        astray = sum(
+            t.piece.family in ON_TOP["floor"] and not t.stands_on for t in self.space.placed
+        )
+        if astray < MOST_ON_FLOOR:
+            found.append((("floor", 0, 0.0, ()), 0.06))
+        return found
+
+    def _small(self, family: str, parent: int, y: float, sides: Sequence[float]) -> int:
+        piece = self.piece(family)
+        if piece is None or self._many(family, parent):
+            return 0
+        place = self.space.placed[parent - 1].box
+        x0, x1, z0, z1 = sides
+        for _ in range(4):
+            turns = place.turns + stepped_turn(
+                self.draws.span(-0.06, 0.06) if family in UPRIGHT_FRONT else self.draws.unit()
+            )
+            reach = Box(0, 0, piece.half, 0, 1, turns - place.turns).reach()
+            if 2 * reach[0] > x1 - x0 or 2 * reach[1] > z1 - z0:
+                continue
+            x = self.draws.span(x0 + reach[0], x1 - reach[0])
+            z = self.draws.span(z0 + reach[1], z1 - reach[1])
+            if family == "cushion":
+                z = z0 + reach[1]
+            elif family == "books":
+                z = min(z, z0 + reach[1] + 0.03)
+            at = place.point(x, z)
+            box = box_at(piece, *at, place.bottom + y + ON, turns)
+            if self._on(box, place, sides) and self.space.free(box, parent):
+                return self.space.put(piece, box, parent)
+        return 0
+
+    def _many(self, family: str, parent: int) -> bool:
+        """Return whether an object carries enough of a family."""
+        most = {"screen": 1, "lamp": 2, "bag": 1, "cap": 1, "box": 3, "cushion": 4, "vase": 3,
+                "basket": 2, "books": 12}  # fmt: skip
+        same = sum(
+            thing.stands_on == parent and thing.piece.family == family
+            for thing in self.space.placed
+        )
+        return same >= most.get(family, 6)
+
+    def _on_sill(self, family: str, sides: Sequence[float]) -> int:
+        left, right, height, wall = sides
+        piece = self.piece(family)
+        name = WALLS[int(wall)]
+        if piece is None or max(piece.half) > SILL_DEPTH or piece.height > 0.5:
+            return 0
+        turns = TURNS[name]
+        along = self.draws.span(left + piece.half[0], right - piece.half[0])
+        x, z = self.wall_place(name, along, SILL_DEPTH - max(piece.half) * 0.98)
+        box = box_at(piece, x, z, height + 0.015625 + ON, turns)
+        # It may reach into the window's opening, which is as deep as the wall.
+        return self.space.put(piece, box, 0) if self.space.free(box) else 0
+
+
+def _beside(box: Box, other: Box) -> bool:
+    """Return whether two boxes are apart, seen from above."""
+    flat = [Box(b.x, b.z, b.half, 0.0, 1.0, b.turns) for b in (box, other)]
+    return apart(flat[0], flat[1], GAP)
+
+
+def _above(box: Box, other: Box) -> bool:
+    """Return whether a box is within another one, seen from above."""
+    (a, b) = other.half
+    local = (other.local(*corner) for corner in box.corners())
+    return all(abs(x) <= a - 0.02 and abs(z) <= b - 0.02 for x, z in local)
+
+
+def furnish(arranger: Arranger) -> None:
+    """Fill a room with what it is for, and then with small things."""
+    room, space, draws = arranger.room, arranger.space, arranger.draws
+    for hole in room.openings:
+        if hole.kind == "door":
+            middle, half = (hole.left + hole.right) / 2, (hole.right - hole.left) / 2
+            x, z = arranger.wall_place(hole.wall, middle, DOOR_CLEAR / 2)
+            space.kept.append(Box(x, z, (half, DOOR_CLEAR / 2), 0.0, 2.0, TURNS[hole.wall]))
+    small = max(3, space.most // 3)  # places for small things
+    whole, space.most = space.most, space.most - small
+    {"living": _living, "dining": _dining, "bedroom": _bedroom, "study": _study}[room.kind](
+        arranger
+    )
+    arranger.curtains()
+    for step in draws.shuffled(
+        ("shelf", "cabinet", "picture", "tall_plant", "clock", "floor", "shelf", "picture",
+         "floor_lamp", "armchair", "picture", "rug", "picture")
+    ):  # fmt: skip
+        if step == "picture":
+            arranger.on_wall(step, 1.45, 1.75)
+        elif step == "clock" and draws.chance(0.5):
+            arranger.on_wall(step, 1.7, 2.0)
+        elif step in ("shelf", "cabinet"):
+            arranger.against_wall(step)
+        elif step == "floor":
+            arranger.on_floor(draws.pick(("box", "bag", "basket", "stool")))
+        elif step in ("tall_plant", "floor_lamp"):
+            arranger.on_floor(step, corner=True)
+        elif step == "armchair" and draws.chance(0.3):
+            arranger.in_corner(step)
+        elif step == "rug" and draws.chance(0.5):
+            width, _, depth = space.size
+            x, z = draws.span(0.3, 0.7) * width, draws.span(0.3, 0.7) * depth
+            arranger.rug(x, z, draws.pick((0.0, 0.25)))
+    space.most = whole
+    arranger.fill()
+
+
+def _living(arranger: Arranger) -> None:
+    """Put a sofa along a wall, a table before it on a rug, and a screen opposite."""
+    draws, space = arranger.draws, arranger.space
+    sofa = arranger.against_wall("sofa", front=0.9, middle=True)
+    if not sofa:
+        arranger.table_with_chairs()
+        return
+    box = space.placed[sofa - 1].box
+    space.kept.pop()
+    if draws.chance(0.7):
+        arranger.rug(*box.point(0.0, box.half[1] + 0.8), box.turns)
+    table = arranger.piece("coffee_table", 1)
+    if table is not None and draws.chance(0.85):
+        for away in (0.38, 0.5, 0.3, 0.65, 0.8):
+            x, z = box.point(draws.span(-0.1, 0.1), box.half[1] + away + table.half[1])
+            if arranger.stand(table, box_at(table, x, z, 0.0, box.turns)):
+                break
+    for side in draws.shuffled((-1, 1)):
+        if draws.chance(0.45):
+            arranger.beside(sofa, draws.pick(("floor_lamp", "tall_plant", "nightstand")), side)
+    opposite = [w for w in WALLS if math.isclose(abs(TURNS[w] - box.turns), 0.5)]
+    cabinet = arranger.against_wall("cabinet", opposite, middle=True)
+    if cabinet and draws.chance(0.7):
+        arranger.screen_on(cabinet)
+    if draws.chance(0.4):
+        arranger.in_corner("armchair")
+    if draws.chance(0.4):
+        arranger.table_with_chairs()
+
+
+def _dining(arranger: Arranger) -> None:
+    """Put a table with chairs below a lamp, and a cabinet along a wall."""
+    table = arranger.table_with_chairs()
+    if table and arranger.draws.chance(0.6):
+        box = arranger.space.placed[table - 1].box
+        arranger.hang("pendant", box.x, box.z)
+    arranger.against_wall("cabinet", middle=True)
+
+
+def _bedroom(arranger: Arranger) -> None:
+    """Put a bed with its head to a wall, with night stands, and a cabinet."""
+    bed = arranger.against_wall("bed", front=0.5, middle=True)
+    if bed:
+        for side in (-1, 1):
+            if arranger.draws.chance(0.8):
+                arranger.beside(bed, "nightstand", side)
+        if arranger.draws.chance(0.4):
+            box = arranger.space.placed[bed - 1].box
+            arranger.rug(*box.point(0.0, box.half[1] + 0.7), box.turns)
+    arranger.against_wall("cabinet")
+    if arranger.draws.chance(0.5):
+        _desk(arranger)
+
+
+def _study(arranger: Arranger) -> None:
+    """Put a desk with a chair along a wall, a shelf, and perhaps a sofa."""
+    _desk(arranger)
+    arranger.against_wall("shelf")
+    if arranger.draws.chance(0.4):
+        arranger.against_wall("sofa", front=0.6)
+
+
+def _desk(arranger: Arranger) -> None:
+    """Put a desk along a wall with a screen on it, and a chair before it."""
+    desk = arranger.against_wall("desk", front=0.9)
+    if desk:
+        arranger.seat_at(desk)
+        if arranger.draws.chance(0.75):
+            arranger.screen_on(desk)

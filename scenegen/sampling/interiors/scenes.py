@@ -1,0 +1,124 @@
+"""Propose closed rooms: `DatasetSpec`, indices and attempts -> `SceneArrays`.
+
+The room, its light, the number of objects and the field of view are drawn once for an item.
+Another attempt draws the furniture and the cameras again.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.camera import Camera
+from scenegen.common.random.seeding import Purpose
+from scenegen.common.records import to_json
+from scenegen.description.interiors import Interior
+from scenegen.description.scene_arrays import SceneArrays
+from scenegen.description.specs import DatasetSpec
+from scenegen.objects.catalogue import Objects
+from scenegen.objects.furniture import Piece, piece
+from scenegen.sampling.interiors.arranging import Arranger, furnish
+from scenegen.sampling.interiors.draws import Draws
+from scenegen.sampling.interiors.rooms import Room, draw_room
+from scenegen.sampling.interiors.spaces import Placed, Space, turn
+from scenegen.sampling.interiors.viewpoints import draw_cameras
+
+Array = NDArray[Any]
+_Drawn = tuple[Room, list[Placed], list[tuple[float, float, float]], tuple[float, float, float]]
+
+
+def item_room(spec: DatasetSpec, index: int) -> tuple[Room, int, float]:
+    """Return the room of an item, its number of objects, and its field of view in degrees."""
+    draws = Draws(spec.seed, index, Purpose.ROOM)
+    room = draw_room(draws, spec.hours)
+    count = draws.count(*spec.objects)
+    return room, count, spec.fov_degrees + spec.fov_spread_degrees * draws.unit()
+
+
+def draw_interior(spec: DatasetSpec, index: int, attempt: int, objects: Objects) -> _Drawn | None:
+    """Return room, objects, camera positions and target of a proposal; None if it found no room."""
+    room, count, fov = item_room(spec, index)
+    draws = Draws(spec.seed, index, Purpose.ARRANGEMENT, attempt)
+
+    def member(family: str) -> Piece | None:
+        models = objects.models.get(family)
+        return piece(draws.pick(models)) if models else None
+
+    space = Space(room.size, count)
+    if count:
+        furnish(Arranger(room, space, draws, member))
+    if len(space.placed) < count:
+        return None
+    found = draw_cameras(spec, space, Draws(spec.seed, index, Purpose.VIEWPOINT, attempt), fov)
+    return None if found is None else (room, space.placed, *found)
+
+
+def sample_interiors(
+    spec: DatasetSpec, index: Array, attempt: Array, objects: Objects
+) -> tuple[Array, SceneArrays]:
+    """Propose closed rooms, as `sampling.scenes.sample_scenes`."""
+    pairs = list(zip(index.tolist(), attempt.tolist(), strict=True))
+    drawn = [draw_interior(spec, i, tried, objects) for i, tried in pairs]
+    placed = np.array([found is not None for found in drawn], bool)
+    names = tuple(model for family in spec.shapes for model in objects.models[family])
+    found = [scene for scene in drawn if scene is not None]
+    return placed, _arrays(spec, index[placed], found, names)
+
+
+def _arrays(
+    spec: DatasetSpec, index: Array, drawn: Sequence[_Drawn], names: tuple[str, ...]
+) -> SceneArrays:
+    count, slots, views = len(drawn), spec.object_slots, len(spec.views)
+    number = {name: i for i, name in enumerate(names)}
+    shape = np.full((count, slots), -1, np.int32)
+    position, scale = np.zeros((count, slots, 3)), np.zeros((count, slots))
+    rotation = np.zeros((count, slots, 4))
+    camera, target = np.zeros((count, views, 3)), np.zeros((count, views, 3))
+    fov, interior = np.zeros((count, views)), np.full(count, "", object)
+    for row, (room, things, places, at) in enumerate(drawn):
+        for k, thing in enumerate(things):
+            shape[row, k] = number[thing.piece.name]
+            box = thing.box
+            position[row, k] = box.x, (box.bottom + box.top) / 2, box.z
+            scale[row, k] = thing.piece.radius
+            cosine, sine = turn(box.turns / 2)
+            rotation[row, k] = cosine, 0.0, sine, 0.0
+        camera[row], target[row] = places, at
+        degrees = item_room(spec, int(index[row]))[2]
+        fov[row] = Camera.fov_y_from_square(degrees, spec.height, spec.width)
+        told = Interior(
+            room.size, room.openings, tuple(thing.stands_on for thing in things),
+            room.hour, room.facing_degrees, room.lit,
+        )  # fmt: skip
+        interior[row] = to_json(told)
+    used = shape >= 0
+
+    def same(values: Any, *size: int) -> Array:
+        return np.broadcast_to(np.array(values, float), (count, *size))
+
+    rho = np.broadcast_to(np.array(spec.reflectance), (count, slots, 3))
+    gloss = np.broadcast_to(np.array((0.0, 1.0)), (count, slots, 2))
+    return SceneArrays(
+        names=names,
+        index=index,
+        camera_position=camera,
+        camera_target=target,
+        fov_y_degrees=fov,
+        object_count=used.sum(axis=1).astype(np.int32),
+        shape=shape,
+        mesh=np.full((count, slots), "", object),
+        position=position,
+        rotation=rotation,
+        scale=scale,
+        reflectance=np.where(used[..., None], rho, 0.0),
+        gloss=gloss,
+        light_count=np.zeros(count, np.int32),
+        light_position=np.zeros((count, spec.light_slots, 3)),
+        light_color=np.zeros((count, spec.light_slots, 3)),
+        ambient=same((0.0, 0.0, 0.0), 3),
+        attenuation=same(spec.attenuation, 2),
+        room_reflectance=same(spec.room_reflectance, 3),
+        background=same((0.0, 0.0, 0.0), 3),
+        interior=interior,
+    )

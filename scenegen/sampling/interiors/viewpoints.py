@@ -1,0 +1,110 @@
+"""Cameras in a furnished room: free, nearly level, and with a free view of what stands there."""
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.camera import Camera, half_angle
+from scenegen.common.rotations import cos_sin
+from scenegen.description.specs import DatasetSpec
+from scenegen.sampling.interiors.draws import Draws
+from scenegen.sampling.interiors.spaces import Box, Space
+
+Array = NDArray[Any]
+TRIES = 60
+HEIGHT = (0.8, 1.8)  # metres above the floor
+CLEAR = 0.3  # metres from everything
+STEEPEST = 0.25  # tangent of the steepest view up or down, below that of 15 degrees
+NEAREST = 0.7  # metres to what the camera may look at anywhere in the picture
+SHARE_NEAR = 0.12  # of the picture that may be nearer than NEAR
+NEAR = 1.1
+COLUMNS, ROWS = 9, 7  # of the rays that look for what stands in the way
+Place = tuple[float, float, float]
+
+
+def draw_cameras(
+    spec: DatasetSpec, space: Space, draws: Draws, fov_degrees: float
+) -> tuple[list[Place], Place] | None:
+    """Draw the positions of the cameras of all views, and the point they look at; None for none.
+
+    The input view is turned about the vertical axis through that point for the other views.
+    """
+    width, _, depth = space.size
+    boxes = _table([thing.box for thing in space.placed])
+    floor = [t.box for t in space.placed if t.piece.surfaces] or [t.box for t in space.placed]
+    fov_y = Camera.fov_y_from_square(fov_degrees, spec.height, spec.width)
+    cosine, sine = cos_sin(np.array(spec.views) / 360)
+    for _ in range(TRIES):
+        focus = draws.pick(floor)
+        x, z = draws.span(CLEAR, width - CLEAR), draws.span(CLEAR, depth - CLEAR)
+        y = draws.span(*HEIGHT)
+        # Look between what was chosen and the middle of the room.
+        share = draws.span(0.0, 0.5)
+        tx = focus.x + share * (width / 2 - focus.x)
+        tz = focus.z + share * (depth / 2 - focus.z)
+        ty = draws.span(0.5, 1.1)
+        dx, dz = x - tx, z - tz
+        away = math.sqrt(dx * dx + dz * dz)
+        if away < min(2.0, 0.45 * max(width, depth)):
+            continue
+        ty = min(max(ty, y - STEEPEST * away), y + STEEPEST * away)
+        target = (tx, ty, tz)
+        places = [
+            (tx + c * dx + s * dz, y, tz - s * dx + c * dz)
+            for c, s in zip(cosine.tolist(), sine.tolist(), strict=True)
+        ]
+        if all(_free(place, target, space, boxes, fov_y, spec) for place in places):
+            return places, target
+    return None
+
+
+def _table(boxes: list[Box]) -> Array:
+    """Return middle, half sides, heights, cosine and sine of each box, (N, 8)."""
+    return np.array(
+        [(b.x, b.z, *b.half, b.bottom, b.top, *b.axes) for b in boxes] or np.zeros((0, 8))
+    )
+
+
+def _free(
+    place: Place, target: Place, space: Space, boxes: Array, fov_y: float, spec: DatasetSpec
+) -> bool:
+    """Return whether a camera is free, and nothing large stands right before it."""
+    x, y, z = place
+    if not (CLEAR <= x <= space.size[0] - CLEAR and CLEAR <= z <= space.size[2] - CLEAR):
+        return False
+    c, s = boxes[:, 6], boxes[:, 7]
+    dx, dz = x - boxes[:, 0], z - boxes[:, 1]
+    start = np.stack([c * dx - s * dz, y - (boxes[:, 4] + boxes[:, 5]) / 2, s * dx + c * dz])
+    half = np.stack([boxes[:, 2], (boxes[:, 5] - boxes[:, 4]) / 2, boxes[:, 3]])
+    outside = np.maximum(np.abs(start) - half, 0.0)
+    if (np.sqrt((outside * outside).sum(axis=0)) < CLEAR).any():
+        return False
+    near = _nearest(place, target, start, half, c, s, fov_y, spec.width / spec.height)
+    return bool((near > NEAREST).all() and (near < NEAR).mean() <= SHARE_NEAR)
+
+
+def _nearest(
+    place: Place, target: Place, start: Array, half: Array, c: Array, s: Array, fov_y: float,
+    aspect: float,
+) -> Array:  # fmt: skip
+    """Return the distance along some rays of the picture to the nearest box, (R,), inf for none."""
+    back = np.array(place) - target
+    back /= np.sqrt((back * back).sum())
+    right = np.array([back[2], 0.0, -back[0]])
+    right /= np.sqrt((right * right).sum())
+    up = np.array([back[1] * right[2], back[2] * right[0] - back[0] * right[2],
+                   -back[1] * right[0]])  # fmt: skip
+    cosine, sine = half_angle(fov_y)
+    edge = sine / cosine
+    u, v = np.meshgrid(np.linspace(-aspect * edge, aspect * edge, COLUMNS),
+                       np.linspace(-edge, edge, ROWS))  # fmt: skip
+    rays = u.reshape(-1, 1) * right + v.reshape(-1, 1) * up - back
+    dx, dy, dz = (rays[:, i, None] for i in range(3))
+    along = np.stack([c * dx - s * dz, dy + 0 * c, s * dx + c * dz])  # (3, R, N)
+    along = np.where(np.abs(along) < 1e-9, 1e-9, along)
+    ends = (np.stack([-half, half])[:, :, None] - start[:, None]) / along
+    enter, leave = ends.min(axis=0).max(axis=0), ends.max(axis=0).min(axis=0)
+    hit = np.where((enter <= leave) & (enter > 0), enter, np.inf)
+    return np.asarray(hit.min(axis=1, initial=np.inf))

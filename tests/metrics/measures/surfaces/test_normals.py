@@ -1,0 +1,132 @@
+"""Angles between normals, and normals from depth on surfaces whose normals are known."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from metrics.measures.surfaces.normals import (
+    angular_errors_degrees,
+    normal_scores,
+    normals_from_depth,
+)
+from scenegen.camera import back_project, pixel_directions
+
+FOV = 20.0
+
+
+def plane_depth(normal, distance, shape=(24, 32), fov=FOV):
+    """Planar depth of the plane normal . point = -distance."""
+    return -distance / (pixel_directions(*shape, fov) @ np.asarray(normal))
+
+
+def unit(vector):
+    return np.asarray(vector, dtype=float) / np.linalg.norm(vector)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 1e-9, 1e-5, 10.0, 90.0, 179.999999, 180.0])
+def test_a_tilt_scores_its_angle(degrees):
+    rng = np.random.default_rng(0)
+    true = rng.standard_normal((50, 3))
+    axis = np.cross(true, rng.standard_normal((50, 3)))
+    axis *= np.radians(degrees) / np.linalg.norm(axis, axis=1, keepdims=True)
+    tilted = Rotation.from_rotvec(axis).apply(true)
+    angles = angular_errors_degrees(tilted, true)
+    assert angles == pytest.approx(np.full(50, degrees), rel=1e-6, abs=5e-14)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_angles_ignore_length_order_and_rotation(seed):
+    rng = np.random.default_rng(seed)
+    a, b = rng.standard_normal((2, 4, 5, 3))
+    turn = Rotation.random(rng=rng).as_matrix()
+    angles = angular_errors_degrees(a, b)
+    assert angular_errors_degrees(b * 1e-200, a * 1e90) == pytest.approx(angles, abs=1e-10)
+    assert angular_errors_degrees(a @ turn, b @ turn) == pytest.approx(angles, abs=1e-10)
+    assert angular_errors_degrees(-a, b) == pytest.approx(180.0 - angles, abs=1e-10)
+    assert angular_errors_degrees(a, a) == pytest.approx(np.zeros(20), abs=1e-13)
+
+
+def test_only_pixels_with_a_finite_true_direction_are_scored():
+    good = np.ones((3, 3))
+    true = np.array([[1.0, 1.0, np.nan], [0.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    assert len(angular_errors_degrees(good, true)) == 1
+
+
+def test_scores_by_hand():
+    scores = normal_scores(np.array([0.0, 11.25, 20.0, 30.0]))
+    assert scores == {
+        "normal_mean_degrees": 15.3125,
+        "normal_median_degrees": 15.625,
+        "normal_rmse_degrees": pytest.approx(np.sqrt((11.25**2 + 400.0 + 900.0) / 4.0)),
+        **dict.fromkeys(("normal_within_5", "normal_within_7.5", "normal_within_11.25"), 0.25),
+        "normal_within_22.5": 0.75,
+        "normal_within_30": 0.75,
+    }
+
+
+@given(st.floats(0.0, 70.0), st.floats(0.0, 360.0), st.floats(0.1, 100.0))
+def test_a_plane_has_its_normal_everywhere(tilt, turn, distance):
+    normal = Rotation.from_euler("xz", [tilt, turn], degrees=True).apply([0.0, 0.0, 1.0])
+    normals, on_surface = normals_from_depth(plane_depth(normal, distance), FOV)
+    # Beyond the threshold of grazing at the image's edge the second rule takes over.
+    angles = angular_errors_degrees(normals, np.broadcast_to(normal, normals.shape))
+    assert angles.max() < 1e-8
+    assert on_surface.all() or tilt > 60.0
+
+
+def test_rooms_face_the_viewer_and_edges_do_not_smear(room_depth):
+    depth = room_depth(1, 64)
+    normals, on_surface = normals_from_depth(depth, FOV)
+    assert ((normals * back_project(depth, FOV)).sum(axis=-1) < 0.0).all()
+    assert np.linalg.norm(normals, axis=-1) == pytest.approx(np.ones(depth.shape))
+    assert on_surface.mean() > 0.99
+
+
+def test_a_step_in_depth_leaves_both_sides_flat():
+    depth = np.full((10, 10), 2.0)
+    depth[:, 5:] = 3.0
+    normals, on_surface = normals_from_depth(depth, FOV)
+    assert on_surface.all()
+    assert normals == pytest.approx(np.broadcast_to([0.0, 0.0, 1.0], normals.shape))
+
+
+def test_every_pixel_of_the_mask_has_a_normal():
+    lone = np.zeros((5, 5), dtype=bool)
+    lone[2, 2] = True
+    line = np.zeros((5, 5), dtype=bool)
+    line[2] = True
+    for mask in (lone, line):
+        normals, on_surface = normals_from_depth(np.full((5, 5), 2.0), 90.0, mask)
+        assert not on_surface.any()
+        assert (normals[~mask] == 0.0).all()
+        towards = -back_project(np.ones((5, 5)), 90.0)[mask]
+        assert angular_errors_degrees(normals[mask], towards) == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("value", [0.0, -2.0, 1e-300, 1e100])
+def test_odd_depth_has_normals_too(value):
+    depth = np.full((4, 4), 2.0)
+    depth[1:3, 1:3] = value
+    for odd in (depth, np.full((4, 4), value), value * np.random.default_rng(0).random((4, 4))):
+        normals, _ = normals_from_depth(odd, FOV)
+        assert np.linalg.norm(normals, axis=-1) == pytest.approx(np.ones((4, 4)))
+
+
+def test_the_unit_of_depth_does_not_matter():
+    rng = np.random.default_rng(0)
+    depth, mask = plane_depth(unit([0.3, 0.2, 1.0]), 2.0), rng.random((24, 32)) < 0.7
+    expected, on_surface = normals_from_depth(depth, FOV, mask)
+    for scale in (1e-200, 1e-3, 1e90):
+        normals, supported = normals_from_depth(scale * depth, FOV, mask)
+        assert normals == pytest.approx(expected, abs=1e-9)
+        assert np.array_equal(supported, on_surface)
+
+
+def test_equal_eigenvalues_leave_no_empty_normal():
+    # Noise as thick as it is wide: some patches have no least axis, all must have a normal.
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        normals, _ = normals_from_depth(rng.uniform(0.1, 3.0, (16, 16)), FOV)
+        assert np.linalg.norm(normals, axis=-1) == pytest.approx(np.ones((16, 16)))

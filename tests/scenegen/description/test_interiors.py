@@ -1,0 +1,87 @@
+"""Settings of closed rooms, and the description of one."""
+
+import pytest
+
+from scenegen.common.errors import SpecError
+from scenegen.description.interiors import Interior, Opening
+from scenegen.description.presets import PRESETS, preset_spec
+from scenegen.description.scenes import SceneSpec
+from scenegen.description.specs import PAPER_ONLY, DatasetSpec
+from scenegen.layout import columns
+
+OTHER = {
+    "object_radius": (0.1, 0.2), "pose": "any", "lights": (1, 1), "shadows": True,
+    "allow_cropped": True, "camera_radius": 2.0, "camera_target": (0.2, 0.2, 0.2),
+    "light_radius": 3.0, "light_level": 0.5, "ambient": (0.2,) * 3, "attenuation": (1.0, 0.5),
+    "light_saturation": 0.1, "reflectance": (0.5,) * 3, "room_reflectance": (0.5,) * 3,
+    "random_reflectance": True, "specular": (0.1, 0.2), "shininess": (2.0, 3.0),
+    "own_reflectance": True,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", PAPER_ONLY)
+def test_settings_of_the_papers_room_are_refused(name):
+    assert OTHER.keys() == {*PAPER_ONLY}
+    with pytest.raises(SpecError):
+        preset_spec("interiors", **{name: OTHER[name]})
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"hours": (9, 10)}, {"denoise": True}, {"sensor_noise": 0.1}, {"materials": "0" * 16}],
+)
+def test_settings_of_closed_rooms_are_refused_elsewhere(settings):
+    with pytest.raises(SpecError):
+        preset_spec("shapes", **settings)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"objects": (500, 500)}, {"objects": (12, 100)}, {"hours": (20, 25)}, {"shading": "paper"},
+     {"source": "shapes", "shapes": ("box",)}, {"shapes": ("unicorn",)}],
+)  # fmt: skip
+def test_what_closed_rooms_cannot_have_is_refused(settings):
+    with pytest.raises(SpecError):
+        preset_spec("interiors", **settings)
+
+
+def test_a_request_without_interiors_has_the_json_that_it_had():
+    for name in PRESETS.keys() - {"interiors"}:
+        assert "interior" not in preset_spec(name).to_json()
+    spec = preset_spec("interiors", hours=(8, 9))
+    assert DatasetSpec.from_json(spec.to_json()) == spec
+
+
+def test_units_are_metres():
+    units = {column.name: column.unit for column in columns(preset_spec("interiors"))}
+    assert units["depth"] == units["room/size"] == "metre"
+
+
+def interior(**changes):
+    told = {
+        "size": (4.0, 2.5, 3.0), "openings": (), "stands_on": (0, 1), "hour": 12.0,
+        "facing_degrees": 0.0, "lit": False,
+    }  # fmt: skip
+    return Interior(**{**told, **changes})
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"size": (0.0, 2.5, 3.0)}, {"stands_on": (1, 0)}, {"stands_on": (0, 3)}, {"hour": 25.0}],
+)
+def test_impossible_rooms_are_refused(changes):
+    interior()
+    with pytest.raises(SpecError):
+        interior(**changes)
+
+
+def test_an_opening_is_a_rectangle_in_a_wall():
+    Opening("door", "west", 0.5, 1.4, 0.0, 2.0)
+    for wrong in (("hole", "west", 0.5, 1.4), ("door", "up", 0.5, 1.4), ("door", "west", 1.4, 0.5)):
+        with pytest.raises(SpecError):
+            Opening(*wrong, 0.0, 2.0)
+
+
+def test_a_scene_says_of_each_object_what_it_stands_on():
+    with pytest.raises(SpecError):
+        SceneSpec(0, (object(),), (), (), (0, 0, 0), (0, 0), (0.8,) * 3, interior=interior())

@@ -1,0 +1,114 @@
+"""Rooms are furnished by rules: nothing floats, nothing cuts, cameras are free."""
+
+import numpy as np
+import pytest
+
+from scenegen.common.errors import PlacementError
+from scenegen.common.rotations import rotation_matrix
+from scenegen.description.presets import preset_spec
+from scenegen.objects.catalogue import objects_of
+from scenegen.sampling.proposals import ProposalQueue
+from scenegen.sampling.scenes import sample_scenes
+
+SPEC = preset_spec("interiors", seed=3, height=64, width=64, objects=(12, 40))
+COUNT = 6
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    """Return one scene of each item, from its first attempt that found room."""
+    queue = ProposalQueue(SPEC, range(COUNT), objects_of(SPEC))
+    drawn = queue.take(COUNT, COUNT)
+    return [drawn.scene(k) for k in range(len(drawn))]
+
+
+def corners(item):
+    """Return the triangles of a placed object, world, (F, 3, 3)."""
+    shape = objects_of(SPEC).shape(item.shape)
+    turned = shape.triangles @ rotation_matrix(item.rotation).T
+    return item.scale * turned + item.position
+
+
+def kept_apart(a, b):
+    """Return whether a plane keeps two sets of points apart, of those tried."""
+    turns = np.arange(96) / 96 * 2 * np.pi
+    flat = np.stack([np.cos(turns), 0 * turns, np.sin(turns)], axis=1)
+    normals = np.concatenate([flat, [[0, 1, 0], [0, -1, 0]]])
+    return bool(((a @ normals.T).max(axis=0) < (b @ normals.T).min(axis=0)).any())
+
+
+def overlap(a, b):
+    """Return whether boxes of triangles (F, 3, 3) and (G, 3, 3) overlap anywhere."""
+    low, high = b.min(axis=(0, 1)), b.max(axis=(0, 1))
+    return bool(((a.min(axis=1) < high) & (a.max(axis=1) > low)).all(axis=1).any())
+
+
+def test_as_many_objects_as_asked_for_stand_in_the_room(scenes):
+    assert len(scenes) == COUNT
+    for scene in scenes:
+        assert 12 <= len(scene.objects) <= 40
+        room = scene.interior
+        for item in scene.objects:
+            points = corners(item).reshape(-1, 3)
+            assert (points > -0.2).all()
+            assert (points < np.array(room.size) + 0.2).all()
+
+
+def test_nothing_cuts_into_anything_else(scenes):
+    for scene in scenes:
+        meshes = [corners(item) for item in scene.objects]
+        for i, a in enumerate(meshes):
+            for j, b in enumerate(meshes[:i]):
+                if kept_apart(a.reshape(-1, 3), b.reshape(-1, 3)):
+                    continue
+                on = scene.interior.stands_on
+                child, parent = (a, b) if on[i] == j + 1 else (b, a)
+                assert on[i] == j + 1 or on[j] == i + 1
+                turn = rotation_matrix(scene.objects[j if child is a else i].rotation)
+                assert not overlap(parent @ turn, child @ turn) or kept_apart(
+                    *(x.reshape(-1, 3) for x in (parent, child))
+                )
+
+
+def test_nothing_floats(scenes):
+    for scene in scenes:
+        for k, (item, on) in enumerate(zip(scene.objects, scene.interior.stands_on, strict=True)):
+            low = corners(item)[..., 1].min()
+            if on:
+                tops = corners(scene.objects[on - 1])
+                level = np.ptp(tops[..., 1], axis=1) < 1e-3
+                heights = tops[level][..., 1].ravel()
+                assert np.abs(heights - low).min() < 2e-3, (k, item.shape)
+            elif item.name not in ("picture", "clock", "curtain", "pendant"):
+                sills = [hole.bottom for hole in scene.interior.openings]
+                assert min(abs(low - y) for y in (0.0, *sills)) < 0.02, (k, item.shape)
+
+
+def test_cameras_are_free_and_nearly_level(scenes):
+    for scene in scenes:
+        (camera,) = scene.cameras
+        position = np.array(camera.position)
+        assert 0.8 <= position[1] <= 1.8
+        assert 45 <= camera.fov_y_degrees <= 75
+        assert (position[[0, 2]] >= 0.3).all()
+        assert (position[[0, 2]] <= np.array(scene.interior.size)[[0, 2]] - 0.3).all()
+        down = camera.world_from_camera[:3, 2] @ (0, 1, 0)
+        assert abs(np.degrees(np.arcsin(down))) <= 15
+        for item in scene.objects:
+            away = np.linalg.norm(corners(item).reshape(-1, 3) - position, axis=1).min()
+            assert away >= 0.3
+
+
+def test_a_scene_is_the_same_alone_and_among_others():
+    objects = objects_of(SPEC)
+    together, scenes = sample_scenes(SPEC, [0, 1, 2], [1, 1, 1], objects)
+    for row, index in enumerate(np.flatnonzero(together).tolist()):
+        _, alone = sample_scenes(SPEC, [index], [1], objects)
+        assert alone.to_json(0) == scenes.to_json(row) == alone.scene(0).to_json()
+
+
+def test_rooms_that_cannot_hold_their_objects_are_refused(monkeypatch):
+    monkeypatch.setattr("scenegen.sampling.proposals.MAX_ATTEMPTS", 2)
+    spec = preset_spec("interiors", shapes=("bed",), objects=(30, 30))
+    with pytest.raises(PlacementError):
+        ProposalQueue(spec, range(1), objects_of(spec)).take(1, 1)
