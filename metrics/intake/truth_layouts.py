@@ -23,7 +23,14 @@ from metrics.intake.truth_files import picture_of, size_of
 from metrics.measured.reader import rays_of_matrix
 from metrics.measured.writer import Measured, Source, TruthError
 from scenegen.common.errors import FileFormatError
-from scenegen.files.input_file import HDF5_ERRORS, checking, open_file
+from scenegen.files import trial
+from scenegen.files.input_file import (
+    HDF5_ERRORS,
+    StoredArray,
+    checking,
+    open_file,
+    open_unchecked,
+)
 
 Array = NDArray[Any]
 STEPS = 65533  # of MoGe's depth, between near and far
@@ -42,6 +49,13 @@ class Layout(NamedTuple):
 
 def _pinhole(fx: float, fy: float, cx: float, cy: float) -> Array:
     return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+
+# Of camera_params.m, for 640x480 pixels. MATLAB's first pixel has its centre at 1, ours at 0.5.
+NYU_CAMERA = _pinhole(
+    518.85790117450188, 519.46961112127485, 325.58244941119034 - 0.5, 253.73616633400465 - 0.5
+)
+DIODE_CAMERA = _pinhole(886.81, 927.06, 512.0, 384.0)  # of intrinsics.txt; 1024x768 pixels
 
 
 def _found(folder: Path, pattern: str) -> list[Path]:
@@ -65,8 +79,8 @@ def moge(folder: Path, _split: Path | None) -> list[Source]:
     Groups are the folders above. Depth is planar, and coded by its logarithm between near and far.
     """
     index = folder / ".index.txt"
-    names = index.read_text(encoding="utf-8").split() if index.is_file() else []
-    folders = [folder / name for name in names] or [
+    lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
+    folders = [folder / line for line in lines if line.strip()] or [
         path.parent for path in _found(folder, "**/meta.json")
     ]
     rows = []
@@ -89,13 +103,13 @@ def _of_moge(picture: Path, place: Path) -> Measured:
     try:
         with Image.open(path) as image:
             near, far = (float(image.info[name]) for name in ("near", "far"))
+            unit = float(image.info.get("unit", 1.0))  # of older files, metres
         matrix = np.array(about["intrinsics"], np.float64) * [[width], [height], [1.0]]
     except (KeyError, TypeError, ValueError) as error:
         raise TruthError(place, f"{error!s:.80}", "near, far and a matrix, as MoGe has") from error
-    depth = near * (far / near) ** ((codes - 1.0) / STEPS)
-    return Measured(
-        picture_of(picture), np.where((codes > 0) & (codes < INFINITE), depth, 0), matrix
-    )
+    depth = unit * near * (far / near) ** ((codes - 1.0) / STEPS)
+    known = (codes > 0) & (codes < INFINITE)
+    return Measured(picture_of(picture), np.where(known, depth, 0.0), matrix)
 
 
 def _json(path: Path) -> Any:
@@ -108,10 +122,10 @@ def _json(path: Path) -> Any:
 def nyu(path: Path, split: Path | None, depths: str = "depths") -> list[Source]:
     """Return the rows of nyu_depth_v2_labeled.mat, all or those of `testNdxs` of splits.mat.
 
-    MATLAB's axes are reversed. Groups are scenes. The camera is that of the toolbox's
-    camera_params.m, whose pixels are counted from 1.
+    MATLAB's axes are reversed. Groups are scenes.
     """
     try:
+        trial.try_file(path)
         with open_file(path, "labelled .mat of NYU Depth V2") as file, checking(file):
             count, _, width, height = file["images"].shape
             if file[depths].shape != (count, width, height):
@@ -132,14 +146,13 @@ def nyu(path: Path, split: Path | None, depths: str = "depths") -> list[Source]:
 
 def _of_nyu(path: Path, depths: str, i: int) -> Measured:
     try:
-        with open_file(path, "labelled .mat of NYU Depth V2") as file:
-            image, depth = file["images"][i], file[depths][i]
+        # `nyu` has looked at its thousands of objects.
+        with open_unchecked(path, "labelled .mat of NYU Depth V2") as file:
+            image, depth = (StoredArray(file[name])[i] for name in ("images", depths))
     except HDF5_ERRORS as error:
         raise TruthError(f"{path}: picture {i + 1}", f"{error!s:.80}", "one to read") from error
-    matrix = _pinhole(
-        518.85790117450188, 519.46961112127485, 325.08244941119034, 253.23616633400465
-    )
-    return Measured(np.ascontiguousarray(image.transpose(2, 1, 0)), depth.T, matrix)
+    picture = np.ascontiguousarray(image.transpose(2, 1, 0))
+    return Measured(picture, depth.T, NYU_CAMERA if depth.T.shape == (480, 640) else None)
 
 
 def _matlab_text(file: h5py.File, reference: Any) -> str:
@@ -168,7 +181,7 @@ def kitti(folder: Path, split: Path | None) -> list[Source]:
     depths, pictures = dict[tuple[str, str], Path](), dict[tuple[str, str], Path]()
     for path in _found(folder, "**/image_02/**/*.png"):
         match = FRAME.search(path.as_posix())
-        if match is not None:
+        if match is not None and "velodyne_raw" not in path.parts:
             places = depths if "groundtruth" in path.parts else pictures
             places[match[1], match[2]] = path
     keys = sorted(depths)
@@ -226,7 +239,7 @@ def _of_diode(picture: Path, path: Path) -> Measured:
     mask = image_of(read_array(place), "mask")
     if mask.shape != depth.shape:
         raise TruthError(place, f"shape {mask.shape}", f"{depth.shape}, as the depth")
-    matrix = _pinhole(886.81, 927.06, 512.0, 384.0) if depth.shape == (768, 1024) else None
+    matrix = DIODE_CAMERA if depth.shape == (768, 1024) else None
     return Measured(picture_of(picture), np.where(mask > 0.0, depth, 0.0), matrix)
 
 

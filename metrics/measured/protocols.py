@@ -69,7 +69,8 @@ TO_10, TO_80 = (1e-3, 10.0), (1e-3, 80.0)
 _BTS = "evaluation code of Lee et al. 2019 (BTS)"
 _MONODEPTH2 = "evaluation code of Godard et al. 2019 (Monodepth2)"
 _MARIGOLD = "Ke et al. 2024 (Marigold), section 4.2 and its evaluation code"
-_MIDAS = "Ranftl et al. 2020 (MiDaS), section 5, and the evaluation code of DPT"
+_MIDAS = "Ranftl et al. 2020 (MiDaS), section 5"
+_DPT = "the sample code that DPT's EVALUATION.md names for"
 _MOGE = "Wang et al. 2025 (MoGe), its evaluation code; here all pixels are fitted, not 64x64"
 DECLARED = Protocol("declared", "this benchmark: all that was measured, aligned as the submission"
                     " declares", alignment=None)  # fmt: skip
@@ -81,16 +82,19 @@ PROTOCOLS = (
     Protocol("kitti-eigen", _BTS, (EIGEN,), *TO_80, clip=TO_80),
     Protocol("kitti-eigen-garg", _BTS, (GARG,), *TO_80, clip=TO_80),
     Protocol("kitti-eigen-garg-median", _MONODEPTH2, (GARG,), *TO_80, "median_scale", TO_80),
-    Protocol("kitti-kb", f"{_BTS}: the crop of the KITTI depth benchmark", (KB,), *TO_80,
-             clip=TO_80),
-    Protocol("affine-depth", _MARIGOLD, alignment="scale_shift", clip=(1e-6, np.inf)),
+    Protocol("kitti-kb", "the size of the KITTI depth benchmark's pictures, Uhrig et al. 2017, cut"
+             " as BTS and Marigold do; no other crop", (KB,), *TO_80, clip=TO_80),
+    Protocol("affine-depth", f"{_MARIGOLD}, as for ETH3D", (), 1e-5, np.inf, "scale_shift",
+             (1e-5, np.inf)),
     Protocol("affine-depth-nyu", _MARIGOLD, (NYU,), *TO_10, "scale_shift", TO_10),
     Protocol("affine-depth-kitti", _MARIGOLD, (KB, EIGEN), 1e-5, 80.0, "scale_shift",
              (1e-5, 80.0)),
     Protocol("affine-disparity", f"{_MIDAS}; depth is capped at the largest true one, as MoGe does",
              alignment="disparity_scale_shift"),
-    Protocol("affine-disparity-10m", _MIDAS, (), 0.0, 10.0, "disparity_scale_shift"),
-    Protocol("affine-disparity-80m", _MIDAS, (), 0.0, 80.0, "disparity_scale_shift"),
+    Protocol("affine-disparity-10m", f"{_MIDAS}; {_DPT} NYUv2", (), 0.0, 10.0,
+             "disparity_scale_shift", (0.0, 10.0)),
+    Protocol("affine-disparity-80m", f"{_MIDAS}; {_DPT} KITTI, which scores farther depths, too",
+             alignment="disparity_scale_shift", clip=(0.0, 80.0)),
     Protocol("moge", _MOGE, alignment="scale_shift_l1"),
     Protocol("moge-scale", _MOGE, alignment="scale_l1"),
 )  # fmt: skip
@@ -143,7 +147,7 @@ def depth_under(
         declared: the alignment of the submission.
     """
     alignment = protocol.alignment or declared
-    cap = protocol.largest if np.isfinite(protocol.largest) else None
+    cap = protocol.clip[1] if protocol.clip and np.isfinite(protocol.clip[1]) else None
     if kind == "disparity":
         fitted = depth_of_disparity(predicted, true, cap)
     else:

@@ -63,7 +63,8 @@ def kept(name: str, true: np.ndarray) -> np.ndarray:
     )
     low, high = (1e-3, 10.0) if name == "affine-depth-nyu" else (low, high)
     low, high = (1e-5, 80.0) if name == "affine-depth-kitti" else (low, high)
-    high = {"affine-disparity-10m": 10.0, "affine-disparity-80m": 80.0}.get(name, high)
+    low = 1e-5 if name == "affine-depth" else low
+    high = {"affine-disparity-10m": 10.0}.get(name, high)
     filled = np.nan_to_num(true)
     return mask & crop & (filled > low) & (filled < high)
 
@@ -75,7 +76,7 @@ def aligned(name: str, p: np.ndarray, t: np.ndarray) -> np.ndarray:
     if name.startswith("affine-depth"):
         (scale, shift), *_ = np.linalg.lstsq(np.stack([p, np.ones_like(p)], 1), t, rcond=None)
         ends = {"affine-depth-nyu": (1e-3, 10.0), "affine-depth-kitti": (1e-5, 80.0)}
-        return np.clip(scale * p + shift, *ends.get(name, (1e-6, np.inf)))
+        return np.clip(scale * p + shift, *ends.get(name, (1e-5, np.inf)))
     if name.startswith("affine-disparity"):
         (scale, shift), *_ = np.linalg.lstsq(np.stack([p, np.ones_like(p)], 1), 1 / t, rcond=None)
         cap = {"affine-disparity-10m": 10.0, "affine-disparity-80m": 80.0}.get(name, t.max())
