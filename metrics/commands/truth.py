@@ -100,7 +100,8 @@ def truth(
         write_measured(out, rows, source=source, licence=licence, overwrite=overwrite,
                        progress=bar.update)
     print_line(f"{out}: {len(rows)} images in {len({row.group for row in rows})} groups")
-    print_line(f"now: {shlex.join(['bench', 'run', 'MODEL', '--data', out, '--out', 'mine.h5'])}")
+    command = ["bench", "run", "MODEL", "--data", out, "--out", "predictions.h5"]
+    print_line(f"now: {shlex.join(command)}")
 
 
 @click.command(epilog=f"{EXAMPLE}bench info mine.h5")

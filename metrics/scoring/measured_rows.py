@@ -97,6 +97,19 @@ def scores_of_view(
     return found
 
 
+def depth_as_declared(predicted: PredictedView, truth: MeasuredView) -> Array:
+    """Return planar depth (H, W) under "declared", for pictures; NaN where one of both is none."""
+    height, width = truth.depth.shape
+    values = predicted.geometry[:height, :width]
+    values = -values[..., 2] if predicted.kind == "points" else values
+    known = truth.mask & np.isfinite(values)
+    true, depth = truth.depth[known].astype(np.float64), np.full(known.shape, np.nan)
+    if known.any():
+        pair = depth_under(DECLARED, predicted.kind, predicted.alignment, values[known], true)
+        depth[known] = pair.predicted
+    return depth
+
+
 def _usable(
     predicted: PredictedView, truth: MeasuredView, penalise: bool
 ) -> tuple[Array, Array | None, bool]:

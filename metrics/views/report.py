@@ -60,8 +60,9 @@ def html_report(
         remark = "One answer shows the shape of the reference, turned. The questions are spread"
         remark, title = f"{remark} evenly over the file.", "Questions"
     else:
-        remark, title = ROOMS_REMARK, "Scenes"
-        remark += " Of each scene it is the view whose score is nearest to the scene's mean."
+        remark, title = ROOMS_REMARK, "Scenes" if scores.task == "rooms" else "Images"
+        if scores.grouped:
+            remark += f" Of several in {scores.unit} the one nearest to their mean is shown."
     examples = [] if runs is None else examples_of(scores, runs.truth, runs.files[0])
     if examples:
         sections.append(Section(title, remarks=[remark], examples=examples))
