@@ -5,19 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from measured_scenes import scene
 
 from metrics.measured.writer import Measured, Source, write_measured
 from metrics.submissions.writer import RoomPredictionWriter
 
 K = np.array([[60.0, 0.0, 31.0], [0.0, 61.0, 23.0], [0.0, 0.0, 1.0]])
 COUNT = 12
-
-
-def scene(i: int, height: int, width: int) -> np.ndarray:
-    """Depth of a floor, a wall and a box, metres."""
-    y, x = np.mgrid[:height, :width]
-    depth = np.minimum(6.0, 60.0 / (y + 8.0)) + 0.3 * np.sin(x / 6 + i)
-    return np.where((x // 12 + y // 10 + i) % 3 == 0, 0.7 * depth, depth)
 
 
 @pytest.fixture(scope="session")

@@ -32,9 +32,9 @@ def bench(*arguments):
 
 
 @pytest.fixture(scope="module")
-def scenes(truths):
+def scenes(rooms_path):
     """Picture, depth with a hole, and pinhole matrix of the rooms of a file."""
-    with RoomsFile(truths.rooms) as rooms:
+    with RoomsFile(rooms_path) as rooms:
         found = []
         for room in rooms:
             picture = srgb_bytes(room.radiance)
@@ -169,7 +169,7 @@ def predict(truth, path, scenes):
 
 
 @pytest.mark.parametrize("name", LAYOUTS)
-def test_rooms_in_a_layout_have_the_scores_of_rooms(name, scenes, truths, tmp_path):
+def test_rooms_in_a_layout_have_the_scores_of_rooms(name, scenes, rooms_path, tmp_path):
     """Depth, holes, pictures, cameras and groups come back; so do the scores, within its steps."""
     write, step = LAYOUTS[name]
     (tmp_path / "set").mkdir()
@@ -188,8 +188,8 @@ def test_rooms_in_a_layout_have_the_scores_of_rooms(name, scenes, truths, tmp_pa
             if name in CAMERAS:
                 np.testing.assert_allclose(truth.matrix(row), k, rtol=1e-9)
     predict(out, found, scenes)
-    predict(truths.rooms, expected, scenes)
-    ours, rooms = score([found], out).columns, score([expected], truths.rooms).columns
+    predict(rooms_path, expected, scenes)
+    ours, rooms = score([found], out).columns, score([expected], rooms_path).columns
     for metric in ("abs_rel", "rmse", "silog", "abs_rel_after_scale_shift", "sq_rel", "log10"):
         whole = ours[metric][0][:-1], rooms[metric][0][:-1]
         np.testing.assert_allclose(*whole, rtol=20 * step)
