@@ -16,6 +16,7 @@ Array = NDArray[Any]
 ROWS = 24
 FEWEST_PIXELS = 20  # of measured depth in an image
 SIDE = 32  # pixels per side that hints look at, at most twice as many
+SPARSE_SIDE = 256  # the same, where depth is known at few pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,20 +115,18 @@ def _sample(predictions: RoomPredictions, i: int, truth: Images) -> Sample | Non
 
 
 def _measured_sample(depth: Array, truth: MeasuredFile, row: int) -> Sample | None:
-    """Return a sample of an image whose truth may be sparse: all its pixels are taken then."""
+    """Return a sample of an image whose truth may be sparse, so that more pixels are looked at."""
     height, width = truth.size(row)
-    depth, true_depth = depth[:height, :width], truth.read("depth", row)[:height, :width]
-    if truth.dense:
-        grid = np.ix_(mirrored_grid(height, SIDE), mirrored_grid(width, SIDE))
-    else:
-        grid = np.ix_(np.arange(height), np.arange(width))
-    usable = (np.isfinite(true_depth) & (np.abs(depth) <= LARGEST))[grid]
+    side = SIDE if truth.dense else SPARSE_SIDE
+    grid = np.ix_(mirrored_grid(height, side), mirrored_grid(width, side))
+    depth, true = depth[:height, :width][grid], truth.read("depth", row)[:height, :width][grid]
+    usable = np.isfinite(true) & (np.abs(depth) <= LARGEST)
     if np.count_nonzero(usable) < FEWEST_PIXELS:
         return None
-    rays = truth.rays(row, height, width)
+    rays, no = truth.rays(row, height, width), np.broadcast_to(np.nan, (*usable.shape, 3))
     # Without a camera, rays are those of no field of view: a distance along them is the depth.
-    rays = np.full((height, width, 3), (0.0, 0.0, -1.0)) if rays is None else rays
-    true, no = true_depth[grid].astype(np.float64), np.full((*usable.shape, 3), np.nan)
+    rays = np.broadcast_to((0.0, 0.0, -1.0), no.shape) if rays is None else rays[grid]
     return Sample(
-        depth[grid], true, usable, rays[grid], 0.0, None, None, no, np.eye(3), np.zeros(3), np.nan
-    )
+        depth, true.astype(np.float64), usable, rays, 0.0, None, None, no, np.eye(3), np.zeros(3),
+        np.nan,
+    )  # fmt: skip

@@ -18,12 +18,19 @@ COUNT = 12
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
     """Write truth of 12 images in groups of two, of which a share of the pixels was measured."""
 
-    def made(share: float = 0.9, count: int = COUNT, normals: bool = False) -> Path:
+    def made(
+        share: float = 0.9,
+        count: int = COUNT,
+        normals: bool = False,
+        noise: float = 0.0,
+        groups: bool = True,
+    ) -> Path:
         path = tmp_path_factory.mktemp("measured") / "truth.h5"
         rng = np.random.default_rng(1)
 
         def one(i: int, height: int, width: int) -> Measured:
             depth = scene(i, height, width)
+            depth = depth * (1.0 + noise * rng.standard_normal(depth.shape))
             depth[rng.random(depth.shape) > share] = np.nan
             image = rng.integers(0, 256, (height, width, 3), np.uint8)
             normal = np.broadcast_to((0.0, 0.6, 0.8), image.shape) if normals else None
@@ -31,7 +38,9 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
 
         sizes = [(48 - 2 * (i % 3), 64 - i % 2) for i in range(count)]
         rows = [
-            Source(f"{i}.png", f"scene {i // 2}", size, lambda i=i, s=size: one(i, *s))
+            Source(
+                f"{i}.png", f"scene {i // 2 if groups else i}", size, lambda i=i, s=size: one(i, *s)
+            )
             for i, size in enumerate(sizes)
         ]
         write_measured(path, rows, source="tests", licence="CC0")
