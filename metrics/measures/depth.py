@@ -106,7 +106,9 @@ def silog(pair: DepthPair) -> float:
     predicted, true = (np.maximum(d, SMALLEST_LOG_DEPTH) for d in (pair.predicted, pair.true))
     difference = np.log(predicted) - np.log(true)
     seen = pair.predicted > SMALLEST_LOG_DEPTH
-    if seen.any():
+    if seen.all():
+        difference -= difference.mean()
+    elif seen.any():
         difference = np.where(seen, difference - difference[seen].mean(), difference)
     return float(100.0 * np.sqrt(np.square(difference).mean()))
 
@@ -118,7 +120,7 @@ def delta(pair: DepthPair, power: int) -> float:
     "Threshold", with powers 1, 2 and 3.
     """
     p, t, limit = pair.predicted, pair.true, DELTA_BASE**power
-    return float(np.mean((p < limit * t) & (t < limit * p)))
+    return float(np.count_nonzero((p < limit * t) & (t < limit * p)) / len(p))
 
 
 def depth_scores(
