@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from metrics.measured.protocols import BY_NAME, PROTOCOLS, Crop, Protocol
+from metrics.measured.protocols import BY_NAME, PROTOCOLS, Crop
 from metrics.scoring.metric_names import HEADLINE
 from metrics.scoring.records import ScoreFile
 from metrics.views.figures import COLUMN, draw_scores
@@ -38,7 +38,15 @@ def protocols_table(scores: Sequence[ScoreFile]) -> Table:
         protocol = BY_NAME[file.protocol]
         share = f"{file.columns['pixels'].sum() / scores[0].columns['pixels'].sum():.0%}"
         cells = [score_cell(file.metrics[name]) for name in names]
-        rows.append([protocol.name, file.alignment, range_text(protocol), share, *cells])
+        rows.append(
+            [
+                protocol.name,
+                file.alignment,
+                range_text(protocol.least, protocol.largest),
+                share,
+                *cells,
+            ]
+        )
     return make_table("", ("protocol", "alignment", "metres", "pixels", *names), rows)
 
 
@@ -48,11 +56,11 @@ def draw_protocols(path: str | Path, scores: Sequence[ScoreFile], overwrite: boo
     draw_scores(path, scores, "abs_rel", COLUMN, overwrite, labels)
 
 
-def range_text(protocol: Protocol) -> str:
-    """Return which depths a protocol scores, in words."""
-    if np.isfinite(protocol.largest):
-        return f"{protocol.least:g} to {protocol.largest:g}"
-    return f"above {protocol.least:g}" if protocol.least else "all"
+def range_text(low: float, high: float) -> str:
+    """Return a range of depths in words."""
+    if np.isfinite(high):
+        return f"{low:g} to {high:g}"
+    return f"from {low:g}" if low else "all"
 
 
 def markdown_table() -> str:
@@ -62,9 +70,9 @@ def markdown_table() -> str:
         (
             f"`{p.name}`",
             ", then ".join(_crop_text(crop) for crop in p.crops) or "all",
-            range_text(p),
+            range_text(p.least, p.largest),
             p.alignment or "as declared",
-            "-" if p.clip is None else f"{p.clip[0]:g} to {p.clip[1]:g}",
+            "-" if p.clip is None else range_text(*p.clip),
             p.mean,
             p.source,
         )

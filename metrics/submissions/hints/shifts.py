@@ -14,6 +14,7 @@ from metrics.submissions.reader import RoomPredictions
 from metrics.submissions.rules import LARGEST
 
 Array = NDArray[np.float64]
+Places = NDArray[np.int64]  # rows and columns, (N, 2)
 MOST_PIXELS = 20_000  # of an image
 REACH = 2  # pixels over which edges are looked for, and by which a shift is told
 EDGE = 0.1  # of a depth, by which it differs REACH pixels to both sides
@@ -54,7 +55,7 @@ def shift_hints(predictions: RoomPredictions, truth: MeasuredFile) -> list[Probl
     return [Problem(predictions.kind, HINT, expected, found)] if found else []
 
 
-def _edges(values: Array, at: Array, t: Array) -> Array:
+def _edges(values: Array, at: Places, t: Array) -> Array:
     """Return by how many pixels edges of both axes and signs lie off, and the weights, (2, 2, 2).
 
     Where a prediction p shows what lies d further, and has slope g, p is t + d g, as in optical
@@ -110,7 +111,7 @@ def _shift(edges: Sequence[Array]) -> str:
     return f"looks shifted by about {' and '.join(sides)}" if sides else ""
 
 
-def _is_crop(values: Array, at: Array, t: Array) -> bool:
+def _is_crop(values: Array, at: Places, t: Array) -> bool:
     """Return whether a prediction fits far better as an enlarged crop of NYU."""
     inside = np.argwhere(crop_mask((NYU,), *values.shape))
     low, tall = inside[0], np.ptp(inside, axis=0) + 1

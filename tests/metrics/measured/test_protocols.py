@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from page_blocks import ROOT
 
 from metrics.measured.protocols import (
     BY_NAME,
@@ -12,6 +13,7 @@ from metrics.measured.protocols import (
     scored_pixels,
 )
 from metrics.measures.depth import depth_scores
+from metrics.views.protocols import markdown_table
 
 SIZES = {"nyu": (480, 640), "kitti": (375, 1242)}
 SMALL = 1e-9
@@ -135,3 +137,8 @@ def test_a_crop_of_another_size_is_refused() -> None:
             crop_mask(BY_NAME[name].crops, *size)
     with pytest.raises(ProtocolError):
         scored_pixels(BY_NAME["nyu-eigen"], np.full((480, 640), 11.0))
+
+
+def test_the_page_has_the_table() -> None:
+    """docs/real-data.md shows every protocol as it is."""
+    assert markdown_table() in (ROOT / "docs" / "real-data.md").read_text()
