@@ -6,7 +6,7 @@ positive. `compare_depth` selects and checks the pixels once, and every score ta
 the formulas, p is a predicted depth, t the true one, and means are over the scored pixels.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,10 +24,21 @@ DELTA_BASE = 1.25
 
 @dataclass(frozen=True)
 class DepthPair:
-    """Predicted and true depth (N,) of the scored pixels, checked."""
+    """Predicted and true depth (N,) of the scored pixels, checked.
+
+    `known` is what was computed of the truth; a pair that is aligned shares it.
+    """
 
     predicted: Array
     true: Array
+    known: dict[str, Array] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def true_log(self) -> Array:
+        """ln t, of at least SMALLEST_LOG_DEPTH, (N,)."""
+        if "log" not in self.known:
+            self.known["log"] = np.log(np.maximum(self.true, SMALLEST_LOG_DEPTH))
+        return self.known["log"]
 
 
 def compare_depth(
@@ -103,8 +114,7 @@ def silog(pair: DepthPair) -> float:
     camera. Source: the KITTI depth benchmark (Uhrig et al. 2017): the root of the scale-invariant
     error of Eigen et al. 2014, section 3.2, times 100.
     """
-    predicted, true = (np.maximum(d, SMALLEST_LOG_DEPTH) for d in (pair.predicted, pair.true))
-    difference = np.log(predicted) - np.log(true)
+    difference = np.log(np.maximum(pair.predicted, SMALLEST_LOG_DEPTH)) - pair.true_log
     seen = pair.predicted > SMALLEST_LOG_DEPTH
     if seen.all():
         difference -= difference.mean()
