@@ -44,6 +44,9 @@ def require_rooms(predictions: Predictions) -> RoomPredictions:
     if not isinstance(predictions, RoomPredictions):
         found, hint = f"answers to {predictions.task}", "only rooms are shown in 3D"
         raise ScoringError(predictions.path, found, "predictions of rooms", hint)
+    if predictions.task == "measured":
+        found, hint = "predictions on measured truth", "bench figure --truth draws them"
+        raise ScoringError(predictions.path, found, "predictions of rooms", hint)
     return predictions
 
 

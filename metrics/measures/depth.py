@@ -35,7 +35,7 @@ class DepthPair:
 
     @property
     def true_log(self) -> Array:
-        """ln t, of at least SMALLEST_LOG_DEPTH, (N,)."""
+        """The true ln t, t at least SMALLEST_LOG_DEPTH, (N,)."""
         if "log" not in self.known:
             self.known["log"] = np.log(np.maximum(self.true, SMALLEST_LOG_DEPTH))
         return self.known["log"]

@@ -291,6 +291,8 @@ def measured_sentences(scores: ScoreFile) -> Iterator[str]:
         yield "images count as independent, as no groups are known; frames of a drive are alike"
     if scores.protocol == DECLARED.name and "boundary_f1" not in scores.items:
         yield "boundaries: none, as depth is known at too few pixels"
+    if scores.protocol == DECLARED.name and "normal_mean_degrees" not in scores.items:
+        yield "normals: none, unless both the truth and the predictions have them"
 
 
 def unread_notes(files: Sequence[ScoreFile]) -> list[str]:

@@ -126,11 +126,15 @@ def test_what_a_method_cannot_know_is_not_scored(measured, predicted, kind, good
         score([path], truth, Settings(protocol="no-such"))
 
 
-def test_sparse_truth_has_no_boundaries(measured, predicted):
-    truth = measured(share=0.02)
+def test_truth_of_twenty_points_has_depth_alone(measured, predicted):
+    """No boundaries and no normals, which the report says once each."""
+    truth = measured(share=20 / (48 * 64))
     scores = score([predicted(truth, noisy)], truth)
-    assert "boundary_f1" not in scores.metrics
     assert scores.metrics["delta_1"].value > 0.9
+    names = [name for name in scores.metrics if "boundary" in name or "normal" in name]
+    assert not names
+    lines = " ".join(text_report(scores).split())
+    assert (lines.count("boundaries: none"), lines.count("normals: none")) == (1, 1)
 
 
 def test_points_are_scored_on_the_rays_of_the_matrix(measured, predicted):
