@@ -18,7 +18,7 @@ from metrics.submissions.validation import validate
 from metrics.submissions.writer import RoomPredictionWriter
 from metrics.views.compare.compare import compare
 from metrics.views.leaderboard.ranking import rankings
-from metrics.views.protocols import draw_protocols, protocols_report
+from metrics.views.protocols import protocols_report
 from metrics.views.report import html_report
 from metrics.views.score_tables import text_report
 from scenegen.rooms.reader import RoomsFile
@@ -48,7 +48,6 @@ def test_scores_are_means_over_images_at_the_measured_pixels(measured, predicted
     again = read_scores(tmp_path / "s.json")
     assert again.metrics == scores.metrics
     assert again.protocol == "declared"
-    assert "AbsRel" in html_report(again)
     assert "groups" in text_report(again)
     assert not validate(path, truth)
 
@@ -91,7 +90,7 @@ def test_two_protocols_never_share_a_table(measured, predicted, tmp_path):
         html_report(first, beside=[other])
 
 
-def test_all_protocols_that_suit_stand_in_one_table(measured, predicted, tmp_path):
+def test_all_protocols_that_suit_stand_in_one_table(measured, predicted):
     truth = measured()
     path = predicted(truth, noisy)
     with open_runs([path], truth) as runs:
@@ -103,8 +102,6 @@ def test_all_protocols_that_suit_stand_in_one_table(measured, predicted, tmp_pat
         alone = score([path], truth, Settings(protocol=file.protocol))
         assert alone.metrics["abs_rel"] == file.metrics["abs_rel"]
     assert all(name in protocols_report(scores) for name in names)
-    draw_protocols(tmp_path / "f.svg", scores)
-    assert (tmp_path / "f.svg").stat().st_size > 1000
 
 
 @pytest.mark.parametrize(
