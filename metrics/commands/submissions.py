@@ -215,11 +215,18 @@ def view(
     tells both depths. The page asks for nothing outside this machine. Ctrl-C ends it.
     """
     needs("bench view", ("viser",), "view")
+    from metrics.measured.reader import MeasuredFile, open_images
     from metrics.submissions.reader import open_predictions
     from metrics.submissions.truths import find_truth
-    from metrics.viewing import MOST_SCORED, predicted_rooms, require_rooms, shown_scores
+    from metrics.viewing import (
+        MOST_SCORED,
+        MeasuredRooms,
+        no_shape,
+        predicted_rooms,
+        require_rooms,
+        shown_scores,
+    )
     from scenegen.common.web_hosts import hosts_of
-    from scenegen.rooms.reader import RoomsFile
     from scenegen.viewing.geometry import shapes_of
     from scenegen.viewing.page import RoomsPage
     from scenegen.viewing.server import serve, started
@@ -227,8 +234,12 @@ def view(
     hosts = hosts_of(host, public, names)
     with open_predictions(submission) as opened:
         predictions = require_rooms(opened)
-        with RoomsFile(find_truth(predictions, truth).path) as rooms:
-            shape_of = shapes_of(rooms.spec, **meshes)
+        rooms = open_images(find_truth(predictions, truth).path)
+        with rooms:
+            if isinstance(rooms, MeasuredFile):
+                drawn: Any = MeasuredRooms(rooms), no_shape
+            else:
+                drawn = rooms, shapes_of(rooms.spec, **meshes)
             if not items and not scores_path and len(predictions) > MOST_SCORED:
                 note = f"note: the first {MOST_SCORED} of {len(predictions)} rows are shown"
                 print_line(f"{note}; --items or --scores shows others", err=True)
@@ -237,7 +248,7 @@ def view(
                 scores = shown_scores(predictions, rooms, items, scores_path, bar.update)
             shown = predicted_rooms(predictions, rooms, scores)
             with started(f"{predictions.method}: {submission}", hosts, port) as server:
-                RoomsPage(server, rooms, shape_of, *shown)
+                RoomsPage(server, drawn[0], drawn[1], *shown)
                 serve(server, hosts, print_line, open_browser)
 
 

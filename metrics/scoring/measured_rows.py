@@ -99,15 +99,24 @@ def scores_of_view(
 
 def depth_as_declared(predicted: PredictedView, truth: MeasuredView) -> Array:
     """Return planar depth (H, W) under "declared", for pictures; NaN where one of both is none."""
-    height, width = truth.depth.shape
-    values = predicted.geometry[:height, :width]
-    values = -values[..., 2] if predicted.kind == "points" else values
-    known = truth.mask & np.isfinite(values)
-    true, depth = truth.depth[known].astype(np.float64), np.full(known.shape, np.nan)
+    rays = np.full((*truth.depth.shape, 3), -1.0) if truth.rays is None else truth.rays
+    return np.asarray(-points_as_declared(predicted, truth.depth, rays)[..., 2])
+
+
+def points_as_declared(predicted: PredictedView, true_depth: Array, rays: Array) -> Array:
+    """Return points (H, W, 3) under "declared", for pictures; NaN where one of both is none."""
+    height, width = true_depth.shape
+    values, points = predicted.geometry[:height, :width], np.full(rays.shape, np.nan)
+    known = np.isfinite(true_depth) & np.isfinite(values.reshape(height, width, -1)).all(axis=-1)
     if known.any():
-        pair = depth_under(DECLARED, predicted.kind, predicted.alignment, values[known], true)
-        depth[known] = pair.predicted
-    return depth
+        true = true_depth[known].astype(np.float64)
+        if predicted.kind == "points":
+            there, where = values[known].astype(np.float64), rays[known] * true[:, None]
+            points[known] = align_points(there, where, predicted.alignment)
+        else:
+            pair = depth_under(DECLARED, predicted.kind, predicted.alignment, values[known], true)
+            points[known] = rays[known] * pair.predicted[:, None]
+    return points
 
 
 def _usable(
