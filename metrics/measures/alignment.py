@@ -209,7 +209,22 @@ def _l1_of_many(p: Array, t: Array, weights: Array) -> tuple[float, float] | Non
 
 
 def _weighted_median(values: Array, weights: Array) -> float:
-    """Return the smallest value up to which half of all weight lies."""
+    """Return the smallest value up to which half of all weight lies.
+
+    Of many values, those far below and far above that of some are each taken as one value.
+    """
+    if len(values) > MANY:
+        some = slice(None, None, len(values) // SOME)
+        order = np.argsort(values[some])
+        reached = np.cumsum(weights[some][order])
+        ends = np.searchsorted(reached, [0.45 * reached[-1], 0.55 * reached[-1]])
+        low, high = values[some][order[ends]]
+        below, above = values < low, values > high
+        before, after, half = weights @ below, weights @ above, 0.5 * float(weights.sum())
+        if before < half and after < half:
+            near = ~(below | above)
+            values = np.concatenate([[-np.inf], values[near], [np.inf]])
+            weights = np.concatenate([[before], weights[near], [after]])
     order = np.argsort(values)
     reached = np.cumsum(weights[order])
     return float(values[order[np.searchsorted(reached, 0.5 * reached[-1])]])

@@ -143,7 +143,9 @@ def depth_scores(
     its name. `aligned` says that the alignment was made already.
     """
     fitted = pair if aligned else align(pair, alignment)
-    named = {score.__name__: score(fitted) for score in (mse_depth, rmse, abs_rel, silog)}
+    squared = mse_depth(fitted)
+    named = {"mse_depth": squared, "rmse": float(np.sqrt(squared))}
+    named |= {score.__name__: score(fitted) for score in (abs_rel, silog)}
     named |= {f"delta_{power}": delta(fitted, power) for power in (1, 2, 3)}
     if alignment == "none":
         return named | {score.__name__: score(pair) for score in (sq_rel, rmse_log, log10, irmse)}
