@@ -70,8 +70,9 @@ def _edges(values: Array, at: Places, t: Array) -> Array:
     columns = [np.ones_like(p), p]
     for axis in (0, 1):
         step = np.eye(2, dtype=np.int64)[axis] * REACH
-        on, off = (values[tuple((at + sign * step).T)] for sign in (1, -1))
-        apart = np.where(np.abs(on) + np.abs(off) <= LARGEST, on - off, 0.0)
+        ends = (values[tuple((at + sign * step).T)] for sign in (1, -1))
+        on, off = (np.where(np.abs(end) <= LARGEST, end, np.nan) for end in ends)
+        apart = np.nan_to_num(on - off)
         steep = np.abs(apart) > EDGE * np.abs(p)
         columns += [np.where(steep & (apart * sign > 0), apart, 0.0) for sign in (1, -1)]
     known = np.sum(np.array(columns[2:]) != 0.0, axis=1) >= FEWEST_PIXELS

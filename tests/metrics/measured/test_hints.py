@@ -1,5 +1,6 @@
 """Hints on noisy and sparse truth: each mistake is named, and nothing is said of what is right."""
 
+import h5py
 import numpy as np
 import pytest
 from measured_scenes import scene
@@ -105,6 +106,17 @@ RIGHT = {
 def test_nothing_is_said_of_what_is_no_mistake(name, noise, told):
     """Of good, blurred, biased and poor predictions."""
     assert not told(RIGHT[name], noise)
+
+
+def test_values_that_are_not_finite_are_no_shift(truth, predicted):
+    """Nor do they end the hints."""
+    path = predicted(truth, lambda depth, rng: depth)
+    with h5py.File(path, "r+") as file:
+        depth = file["depth"][()]
+        depth[:, ::3, ::5], depth[:, ::4, ::7], depth[:, ::5, ::3] = np.nan, np.inf, -np.inf
+        file["depth"][...] = depth
+    with open_predictions(path) as file, MeasuredFile(truth) as opened:
+        assert not hints(file, opened)
 
 
 @pytest.mark.slow
