@@ -79,26 +79,35 @@ def _by_stem(given: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def paired(pictures: Sequence[Path], paths: Sequence[Path], by: str) -> list[Path]:
-    """Return for each picture the file of its name, of its number, or in their order by "name"."""
-    if by == "number":
-        ours, theirs = ([p.stem for p in some] for some in (pictures, paths))
-        keys: list[Sequence[Any]] = [ours, theirs]
-        if set(ours) != set(theirs):
-            keys = [list(numbered(some)) for some in (pictures, paths)]
-            pictures, paths = (list(numbered(some).values()) for some in (pictures, paths))
-        first, second = (
-            dict(zip(k, p, strict=True)) for k, p in zip(keys, (pictures, paths), strict=True)
-        )
-        for some, other, what in ((first, second, "truth"), (second, first, "picture")):
-            alone = [some[key].name for key in some if key not in other]
-            if alone:
-                found = f"no {what} for {', '.join(alone[:SHOWN])}" + ", ..." * (len(alone) > SHOWN)
-                raise MatchError(next(iter(some.values())).parent, found, "one of each")
-        return [second[key] for key in first]
-    if len(pictures) != len(paths):
-        found = f"{len(pictures)} pictures and {len(paths)} files"
-        raise MatchError(paths[0].parent, found, "as many of each")
-    return list(paths)
+    """Return for each picture the file of its name, of its number, or in their order by "name".
+
+    Raises MatchError where one has none, or two.
+    """
+    if by != "number":
+        if len(pictures) != len(paths):
+            found = f"{len(pictures)} pictures and {len(paths)} files"
+            raise MatchError(paths[0].parent, found, "as many of each")
+        return list(paths)
+    first, second = (_by_stem_alone(some) for some in (pictures, paths))
+    if first.keys() != second.keys():
+        first, second = (dict(numbered(some)) for some in (pictures, paths))
+    for some, other, what in ((first, second, "truth"), (second, first, "picture")):
+        alone = [some[key].name for key in some if key not in other]
+        if alone:
+            found = f"no {what} for {', '.join(alone[:SHOWN])}" + ", ..." * (len(alone) > SHOWN)
+            raise MatchError(next(iter(some.values())).parent, found, "one of each")
+    return [second[key] for key in first]
+
+
+def _by_stem_alone(paths: Sequence[Path]) -> dict[Any, Path]:
+    """Return files by their names without ending. Raises MatchError where two share one."""
+    named: dict[Any, Path] = {}
+    for path in paths:
+        if path.stem in named:
+            found = f"{named[path.stem].name} and {path.name}"
+            raise MatchError(path.parent, found, "one file of a name")
+        named[path.stem] = path
+    return named
 
 
 def size_of(path: Path) -> tuple[int, int]:

@@ -139,6 +139,12 @@ BAD = {
     "a picture without truth": (lambda: os.remove("gt/depth_3.png"), MM),
     "truth without a picture": (lambda: os.remove("rgb/frame_3.png"), MM),
     "two truths for one": (saved("gt/depth_03.png", np.ones((48, 64), "u2")), MM),
+    "two pictures of one name": (
+        saved("rgb/frame_3.bmp", np.ones((48, 64, 3), "u1")), [*MM, "--images", "rgb"],
+    ),
+    "two truths of one name": (
+        saved("gt/depth_3.tiff", np.ones((48, 64), "u2")), [*MM, "--depth", "gt"],
+    ),
     "another size": (saved("gt/depth_3.png", np.ones((24, 32), np.uint16)), MM),
     "no valid pixel": (saved("gt/depth_3.png", np.zeros((48, 64), np.uint16)), MM),
     "colours for depth": (saved("gt/depth_3.png", np.full((48, 64, 3), (1, 2, 3), np.uint8)), MM),
