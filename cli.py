@@ -15,7 +15,7 @@ QUESTIONS = (
 SCORES = (
     *(
         f"metrics.commands.{name}"
-        for name in ("submissions", "intake", "asking", "standings", "figures", "sets")
+        for name in ("submissions", "intake", "truth", "asking", "standings", "figures", "sets")
     ),
     "baselines.commands",
 )

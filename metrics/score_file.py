@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ConfigDict, FailFast, Field, TypeAdapter
 
+from metrics.measured.protocols import BY_NAME
 from metrics.measures.alignment import Alignment
 from metrics.measures.checks import LARGEST_MAGNITUDE
 from metrics.measures.objects import LEAST_PIXELS
@@ -113,6 +114,7 @@ class _Stored:
     objects: dict[str, Any] = field(default_factory=dict)
     answer_groups: AnswerGroups = field(default_factory=dict)
     shown: Shown = "scored_view"
+    protocol: str = ""
     summary: Any = None
 
 
@@ -164,6 +166,7 @@ def _document(scores: ScoreFile) -> dict[str, Any]:
         "method": scores.method,
         "alignment": scores.alignment,
         **({"shown": scores.shown} if scores.task == "rooms" else {}),
+        **({"protocol": scores.protocol} if scores.protocol else {}),
         "summary": {
             "comparable": scores.comparable,
             "warnings": scores.warnings,
@@ -226,6 +229,11 @@ def _checked(document: Any) -> ScoreFile:
         for name, empty in (("objects", {}), ("alignment", "none"), ("shown", "scored_view")):
             if getattr(stored, name) != empty:
                 raise refusal(name, shown(getattr(stored, name)), f"{empty!r} for questions")
+    named = [*BY_NAME] if task == "measured" else [""]
+    if stored.protocol not in named or (task == "measured" and stored.objects):
+        what = "objects" if stored.protocol in named else "protocol"
+        expected = "none" if what == "objects" else f"one of {', '.join(map(repr, named))}"
+        raise refusal(what, shown(getattr(stored, what)), expected)
     if stored.format_version == "1.0":
         _mend_angles(stored.items)
     columns = _item_columns(stored.items, task, runs)
@@ -239,6 +247,7 @@ def _checked(document: Any) -> ScoreFile:
         objects,
         stored.answer_groups,
         shown=stored.shown,
+        protocol=stored.protocol,
         older=stored.format_version != FORMAT_VERSION,
     )
     _check_meta(scores)
@@ -368,7 +377,7 @@ def _known_metric(place: str, name: str, task: str) -> Metric:
         score = metric(name)
     except UnknownMetricError:
         score = None
-    if score is None or score.task != task:
+    if score is None or not score.suits(task):
         raise refusal(place, f"no score of task {task!r}", "a name listed in docs/scores.md")
     return score
 

@@ -3,21 +3,27 @@
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measured.protocols import DECLARED
+from metrics.measured.reader import Images, MeasuredFile, matrix_of, rays_of
 from metrics.score_file import read_scores
 from metrics.scoring.geometry import points_as_scored
+from metrics.scoring.measured_rows import PIXELS, points_as_declared
 from metrics.scoring.metric_names import HEADLINE, OF_TRUTH, OTHER_SCENE, in_order, metric
 from metrics.scoring.records import ID_COLUMNS, OPTIONAL_COLUMNS, ScoreFile
-from metrics.scoring.rows import score_rows
+from metrics.scoring.rows import score_measured_rows, score_rows
 from metrics.scoring.runs import Progress, ScoringError, Settings, matched_rows
 from metrics.scoring.truth_digests import require_truth, stated_truth
 from metrics.submissions.reader import Predictions, RoomPredictions
 from scenegen.common.errors import SpecError
-from scenegen.rooms.reader import Room, RoomsFile
+from scenegen.description.scenes import PlacedObject, SceneSpec
+from scenegen.rendering.ground_truth import undeveloped
+from scenegen.rooms.reader import Room
 from scenegen.viewing.page import Predicted, Scenes, scene_rows
 
 Array = NDArray[Any]
@@ -49,7 +55,7 @@ def require_rooms(predictions: Predictions) -> RoomPredictions:
 
 def shown_scores(
     predictions: RoomPredictions,
-    truth: RoomsFile,
+    truth: Images,
     items: Sequence[int] | None = None,
     scores_path: str | Path | None = None,
     progress: Progress = lambda done: None,
@@ -79,17 +85,21 @@ def shown_scores(
         found = f"row {unknown[0]}" if unknown.size else "no row"
         raise SpecError("items", found, f"some of the {len(there)} rows of {path}")
     if stored is not None:
-        here, ids = (
-            np.searchsorted(stored.ids, rows),
-            (*ID_COLUMNS["rooms"], *OPTIONAL_COLUMNS["rooms"]),
-        )
+        here = np.searchsorted(stored.ids, rows)
+        ids = (*ID_COLUMNS[stored.task], *OPTIONAL_COLUMNS[stored.task])
         return RowScores(rows, {n: c[here] for n, c in stored.items.items() if n not in ids})
     settings = Settings(allow_partial=True, non_finite="penalise")
-    scored = score_rows([predictions], truth, rows, settings, progress)
-    return RowScores(rows, {name: runs[0] for name, runs in scored.scores.items()})
+    if isinstance(truth, MeasuredFile):
+        names = (DECLARED.name,)
+        scored = score_measured_rows([predictions], truth, rows, names, settings, progress)
+    else:
+        scored = score_rows([predictions], truth, rows, settings, progress)
+    values = {n.removeprefix(f"{DECLARED.name} "): runs[0] for n, runs in scored.scores.items()}
+    values.pop(PIXELS, None)
+    return RowScores(rows, values)
 
 
-def _scores_of(path: str | Path, predictions: RoomPredictions, truth: RoomsFile) -> ScoreFile:
+def _scores_of(path: str | Path, predictions: RoomPredictions, truth: Images) -> ScoreFile:
     """Read a score file of a submission. Raises ScoringError for scores of others."""
     scores = read_scores(path)
     require_truth(scores, stated_truth(truth), truth.path)
@@ -101,7 +111,7 @@ def _scores_of(path: str | Path, predictions: RoomPredictions, truth: RoomsFile)
 
 
 def predicted_rooms(
-    predictions: RoomPredictions, truth: RoomsFile, scores: RowScores
+    predictions: RoomPredictions, truth: Images, scores: RowScores
 ) -> tuple[Scenes, Predicted]:
     """Return the scenes of the rows of `scores`, and what a page shows of their predictions.
 
@@ -109,15 +119,20 @@ def predicted_rooms(
     """
     rows, entry_of = scores.rows.tolist(), {int(row): i for i, row in enumerate(predictions.rows)}
     place_of = {row: i for i, row in enumerate(rows)}
-    scenes, names = scene_rows(truth, rows), _sortable(scores)
+    names = _sortable(scores, predictions.task)
+    alone = [(row,) for row in rows]
+    scenes = alone if isinstance(truth, MeasuredFile) else scene_rows(truth, rows)
     orders = {title: worst_first(scores, name, scenes) for title, name in names.items()}
 
     def points(room: Room) -> Array:
         view = predictions.view(entry_of[room.index])
+        if isinstance(room, MeasuredRoom):
+            return points_as_declared(view, room.depth, room.rays)
         return points_as_scored(view, room.depth, room.fov_y_degrees)
 
     def normal(room: Room) -> Array:
-        return predictions.normal(entry_of[room.index])
+        height, width = room.depth.shape
+        return predictions.normal(entry_of[room.index])[:height, :width]
 
     def texts(row: int, title: str) -> dict[str, str]:
         values = {name: float(column[place_of[row]]) for name, column in scores.values.items()}
@@ -127,11 +142,55 @@ def predicted_rooms(
     return scenes, Predicted(orders, points, normal if predictions.has_normals else None, texts)
 
 
-def _sortable(scores: RowScores) -> dict[str, str]:
+@dataclass(frozen=True, eq=False)
+class MeasuredRoom(Room):
+    """An image of measured truth, as the page takes views of rooms; `rays` are those of its pixels.
+
+    It is a scene of its own, without objects. 1 m is a scene unit.
+    """
+
+    rays: Array
+
+    @property
+    def radiance(self) -> Array:
+        """Linear RGB of the picture, (H, W, 3)."""
+        return undeveloped(self.image)
+
+    @property
+    def points(self) -> Array:
+        """Measured points in the camera frame, (H, W, 3), metres; NaN for none."""
+        return np.asarray(self.rays * self.depth[..., None])
+
+
+class MeasuredRooms:
+    """The images of a file of measured truth by their rows. Raises as `reader.matrix_of`."""
+
+    def __init__(self, truth: MeasuredFile) -> None:
+        self._truth = truth
+
+    def __getitem__(self, row: int) -> MeasuredRoom:
+        """Return an image as a view."""
+        view, size = self._truth.view(row), self._truth.size(row)
+        fov = 2.0 * np.degrees(np.arctan(0.5 * size[0] / matrix_of(self._truth, row)[1, 1]))
+        none = np.full(size, -1), np.zeros((*size, 3), np.float32)
+        scene = cast("SceneSpec", SimpleNamespace(index=row, cameras=(fov,), objects=()))
+        normal = none[1] if view.normal is None else view.normal
+        return MeasuredRoom(
+            row, 0, 0.0, self._truth.picture(row), view.depth, normal, none[0], np.eye(4),
+            float(fov), scene, {}, rays_of(self._truth, row, *size),
+        )  # fmt: skip
+
+
+def no_shape(item: PlacedObject) -> Array:
+    """Raise SpecError: nobody measured the objects of an image."""
+    raise SpecError("objects", item.shape, "an image of measured truth, which has none")
+
+
+def _sortable(scores: RowScores, task: str) -> dict[str, str]:
     """Return titles of scores that some row has, headline first, with the names of the scores."""
     finite = [name for name, column in scores.values.items() if np.isfinite(column).any()]
     names = in_order(name for name in finite if not name.startswith((*OF_TRUTH, OTHER_SCENE)))
-    headline = [name for name in names if name in HEADLINE["rooms"]]
+    headline = [name for name in names if name in HEADLINE[task]]
     return {metric(name).title: name for name in (*headline, *names)}
 
 

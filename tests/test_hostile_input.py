@@ -34,10 +34,15 @@ from iqtt import open_questions
 from iqtt.quiz.answers import read_answers
 from metrics.intake.answer_files import import_answers
 from metrics.intake.array_files import read_array
+from metrics.intake.truth_layouts import nyu
+from metrics.measured.describe import describe
+from metrics.measured.reader import MeasuredFile
+from metrics.measured.writer import Measured, Source, write_measured
 from metrics.score_file import read_scores, write_scores
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from scenegen import open_rooms
+from scenegen.camera import intrinsics
 from scenegen.common.errors import SceneGenError
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.read import parse_mesh, read_bytes
@@ -69,6 +74,14 @@ def honest(truths, tmp_path_factory):
         Image.fromarray((1000 * depth).astype("u2")).save(folder / name)
     (folder / "x.pfm").write_bytes(b"Pf\n8 6\n-1.0\n" + depth.tobytes())
     OpenEXR.File({}, {"Z": depth}).write(str(folder / "x.exr"))
+    image = np.zeros((6, 8, 3), np.uint8)
+    measured = Measured(image, depth, intrinsics(6, 8, 60.0, pixel_centers="half"), image + 1.0)
+    rows = [Source(f"{i}.png", "a", (6, 8), lambda: measured) for i in range(3)]
+    write_measured(folder / "measured.h5", rows, source="tests", licence="")
+    with h5py.File(folder / "nyu.mat", "w") as file:
+        file["images"], file["depths"] = image.T[None], depth.T[None]
+        file["scene"] = np.frombuffer(b"kitchen", np.uint8).astype("u2")
+        file["scenes"] = np.array([[file["scene"].ref]], h5py.ref_dtype)
     ball, ring = trimesh.creation.icosphere(1), trimesh.creation.annulus(0.5, 1, 1, sections=8)
     ball.export(folder / "ball.ply")
     ball.export(folder / "text.ply", encoding="ascii")
@@ -92,6 +105,15 @@ def read(path):
     elif name == "rooms.h5":
         with open_rooms(path) as rooms:
             list(rooms)
+    elif name == "measured.h5":
+        describe(path)
+        with MeasuredFile(path) as truth:
+            for row in range(len(truth)):
+                assert truth.view(row).mask.any()
+                assert truth.picture(row).shape[:2] == truth.size(row)
+    elif name == "nyu.mat":
+        new = path.parent / "new.h5"
+        write_measured(new, nyu(path, None), source="", licence="", overwrite=True)
     elif name.startswith("iqtt-"):
         with open_questions(path) as questions:
             list(questions)
@@ -182,6 +204,7 @@ def edit_hdf5(path, draw):
         holders = ["/"]
         file.visit(holders.append)
         arrays = [name for name in holders if isinstance(file[name], h5py.Dataset)]
+        arrays = [name for name in arrays if h5py.check_ref_dtype(file[name].dtype) is None]
         name = draw(st.sampled_from(arrays))
         act = draw(st.sampled_from(["attribute", "value", "array", "gone", "link", "stored"]))
         if act == "attribute":
@@ -234,8 +257,9 @@ def edit_bytes(path, draw):
     path.write_bytes(data[:first] + part + data[end:])
 
 
-READ = ("rooms.h5", "iqtt-val.h5", "predictions.h5", "answers.h5", "scores.json", "answers.json",
-        "answers.csv", "people.db", "weights.safetensors", *MESHES, *IMAGES)  # fmt: skip
+READ = ("rooms.h5", "iqtt-val.h5", "measured.h5", "nyu.mat", "predictions.h5", "answers.h5",
+        "scores.json", "answers.json", "answers.csv", "people.db", "weights.safetensors", *MESHES,
+        *IMAGES)  # fmt: skip
 
 
 @pytest.fixture
@@ -252,7 +276,7 @@ def folder(honest, tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", READ)
 def test_whatever_is_edited(name, honest, folder):
     path = folder / name
-    edit = {".h5": edit_hdf5, ".json": edit_json}.get(path.suffix, edit_bytes)
+    edit = {".h5": edit_hdf5, ".mat": edit_hdf5, ".json": edit_json}.get(path.suffix, edit_bytes)
 
     @settings(max_examples=100, deadline=None, derandomize=True, database=None,
               phases=[Phase.generate], suppress_health_check=list(HealthCheck))  # fmt: skip

@@ -160,14 +160,14 @@ def _name_of(pattern: str) -> str:
 
 
 def _print_hints(out: str, truth: str) -> None:
-    """Print what a submission of rooms holds, hints on mistakes, and the next command."""
+    """Print what a submission of images holds, hints on mistakes, and the next command."""
+    from metrics.measured.reader import open_images
     from metrics.submissions.reader import RoomPredictions, open_predictions
     from metrics.submissions.validation import hints
-    from scenegen.rooms.reader import RoomsFile
 
     with open_predictions(out) as opened:
         if isinstance(opened, RoomPredictions):
-            with RoomsFile(truth) as rooms:
+            with open_images(truth) as rooms:
                 found = hints(opened, rooms)
             normals = ", with normals" if opened.has_normals else ""
             print_line(f"{out}: {opened.kind}, alignment {opened.alignment}{normals}")

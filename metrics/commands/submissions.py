@@ -77,6 +77,16 @@ TRUTH = click.option(
     type=click.IntRange(1, MOST_PROCESSES),
     help="How many processes score [default: one a core].",
 )
+@click.option(
+    "--protocol",
+    default="",
+    metavar="NAME",
+    help="Of measured truth: a protocol of docs/real-data.md, or `all` for a table of all that suit"
+    " [default: declared].",
+)
+@click.option(
+    "--figure", "figure_path", type=OutputPath(), help="Draw --protocol all here: .pdf, .svg, .png."
+)
 @SCHEDULER
 @OVERWRITE
 def score(
@@ -90,6 +100,8 @@ def score(
     markdown: bool,
     scheduler: str | None,
     overwrite: bool,
+    protocol: str,
+    figure_path: str | None,
     **settings: Any,
 ) -> None:
     """Score a submission, or several training runs of one method, and print the headline."""
@@ -101,11 +113,17 @@ def score(
     from metrics.views.score_tables import text_report, write_csv
     from scenegen.files.new_file import check_writable, write_text
 
-    outputs = [Path(path) for path in (json_path, csv_path, html_path) if path]
+    paths = (json_path, csv_path, html_path, figure_path)
+    outputs = [Path(path) for path in paths if path]
     for path in outputs:
         check_writable(path, overwrite)
     if beside and html_path is None:
         raise click.UsageError("--beside is for the page: give --html, too")
+    if (protocol == "all") != bool(figure_path) and (figure_path or outputs):
+        raise click.UsageError("--protocol all gives a table and --figure; keep one with NAME")
+    if protocol == "all":
+        _score_all(submissions, truth, Settings(**settings), figure_path, markdown, overwrite)
+        return
     with open_runs(submissions, truth) as runs:
         refuse_inputs(outputs, [runs.truth.path])
         others = read_beside(beside, runs.truth)
@@ -113,7 +131,8 @@ def score(
             on_scheduler(scheduler, settings["processes"] or 0, scorer_versions) as cluster,
             progress_bar(len(runs.files[0]), "image") as bar,
         ):
-            scores = score_runs(runs, Settings(**settings, cluster=cluster), bar.update)
+            options = Settings(**settings, cluster=cluster, protocol=protocol)
+            scores = score_runs(runs, options, bar.update)
         for file in runs.files:
             for hint in hints(file, runs.truth):
                 print_line(f"hint: {file.path}: {hint}", err=True)
@@ -126,6 +145,22 @@ def score(
                 write_text(html_path, html_report(scores, runs, others), overwrite)
         finally:  # a page that cannot be made loses no score
             click.echo(text_report(scores, markdown, whole, line_width()))
+
+
+def _score_all(
+    submissions: tuple[str, ...], truth: str | None, settings: Any, figure: str | None,
+    markdown: bool, overwrite: bool,
+) -> None:  # fmt: skip
+    """Print the scores under all protocols that suit, and draw them."""
+    from metrics.scoring.evaluate import open_runs, score_protocols
+    from metrics.views.protocols import draw_protocols, protocols_report
+
+    with open_runs(submissions, truth) as runs:
+        with progress_bar(len(runs.files[0]), "image") as bar:
+            scores = score_protocols(runs, settings, bar.update)
+        if figure:
+            draw_protocols(figure, scores, overwrite)
+    click.echo(protocols_report(scores, markdown, line_width()))
 
 
 @click.command(epilog=EXAMPLE + "bench validate predictions.h5 --truth rooms.h5")
@@ -180,11 +215,18 @@ def view(
     tells both depths. The page asks for nothing outside this machine. Ctrl-C ends it.
     """
     needs("bench view", ("viser",), "view")
+    from metrics.measured.reader import MeasuredFile, open_images
     from metrics.submissions.reader import open_predictions
     from metrics.submissions.truths import find_truth
-    from metrics.viewing import MOST_SCORED, predicted_rooms, require_rooms, shown_scores
+    from metrics.viewing import (
+        MOST_SCORED,
+        MeasuredRooms,
+        no_shape,
+        predicted_rooms,
+        require_rooms,
+        shown_scores,
+    )
     from scenegen.common.web_hosts import hosts_of
-    from scenegen.rooms.reader import RoomsFile
     from scenegen.viewing.geometry import shapes_of
     from scenegen.viewing.page import RoomsPage
     from scenegen.viewing.server import serve, started
@@ -192,8 +234,12 @@ def view(
     hosts = hosts_of(host, public, names)
     with open_predictions(submission) as opened:
         predictions = require_rooms(opened)
-        with RoomsFile(find_truth(predictions, truth).path) as rooms:
-            shape_of = shapes_of(rooms.spec, **meshes)
+        rooms = open_images(find_truth(predictions, truth).path)
+        with rooms:
+            if isinstance(rooms, MeasuredFile):
+                drawn: Any = MeasuredRooms(rooms), no_shape
+            else:
+                drawn = rooms, shapes_of(rooms.spec, **meshes)
             if not items and not scores_path and len(predictions) > MOST_SCORED:
                 note = f"note: the first {MOST_SCORED} of {len(predictions)} rows are shown"
                 print_line(f"{note}; --items or --scores shows others", err=True)
@@ -202,7 +248,7 @@ def view(
                 scores = shown_scores(predictions, rooms, items, scores_path, bar.update)
             shown = predicted_rooms(predictions, rooms, scores)
             with started(f"{predictions.method}: {submission}", hosts, port) as server:
-                RoomsPage(server, rooms, shape_of, *shown)
+                RoomsPage(server, drawn[0], drawn[1], *shown)
                 serve(server, hosts, print_line, open_browser)
 
 

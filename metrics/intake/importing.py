@@ -1,15 +1,16 @@
-"""Import folders of predicted images as a submission of rooms."""
+"""Import folders of predicted images as a submission of rooms, or on measured truth."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
+from pathlib import Path, PurePath
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from metrics.intake.array_files import ArrayFileError, read_array
-from metrics.intake.matching import By, files_of, match_files
+from metrics.intake.matching import By, files_of, match_files, match_names
 from metrics.intake.outputs import (
     FILL,
     Frame,
@@ -20,14 +21,16 @@ from metrics.intake.outputs import (
     image_of,
     planar_from_distance,
 )
+from metrics.measured.reader import Images as TruthImages
+from metrics.measured.reader import MeasuredFile, open_images, rays_of, size_of
 from metrics.measures.alignment import Alignment
 from metrics.submissions.layout import KINDS, Shown
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.writer import RoomPredictionWriter
 from scenegen.common.errors import SceneGenError, SpecError
-from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
+Rays = Callable[[int, int], Array]
 Kind = Literal["depth", "disparity", "distance", "points"]
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # scene units for each, where the room's edge is 1 m
 
@@ -68,8 +71,11 @@ class Reading:
         if not 0.0 < self.scale < np.inf:
             raise SpecError("scale", self.scale, "a number above 0")
 
-    def geometry(self, stored: Array, normal: Array | None, fov_y_degrees: float) -> Geometry:
-        """Return the geometry of the numbers of a file, (h, w) or (h, w, 3). Raises OutputError."""
+    def geometry(self, stored: Array, normal: Array | None, rays: Rays) -> Geometry:
+        """Return the geometry of the numbers of a file, (h, w) or (h, w, 3). Raises OutputError.
+
+        `rays` returns the directions of the pixels of an image of a height and a width, z = -1.
+        """
         values = image_of(stored, self.kind, vectors=self.kind == "points")
         invalid = np.isin(values, self.invalid)
         values = np.where(
@@ -79,7 +85,8 @@ class Reading:
         )
         kind, alignment = self.kind, self.alignment or "none"
         if kind == "distance":
-            return Geometry("depth", alignment, planar_from_distance(values, fov_y_degrees), normal)
+            values = planar_from_distance(values, rays(*values.shape))
+            return Geometry("depth", alignment, values, normal)
         if kind == "disparity" and self.alignment in ("none", "scale", "median_scale"):
             positive = np.where(values > 0.0, values, np.nan)  # what is at infinity has no depth
             return Geometry("depth", alignment, 1.0 / positive, normal)
@@ -113,12 +120,11 @@ def import_rooms(
     Raises MatchError, ArrayFileError, OutputError and PredictionError, naming file and row; OSError
     and FileFormatError for the truth.
     """
-    with RoomsFile(truth) as rooms:
+    with open_images(truth) as rooms:
         paths, how = _images(pattern, rooms, reading, reading.kind == "points")
         normal_paths = None
         if normals is not None:
             normal_paths, _ = _images(normals, rooms, reading, vectors=True)
-        height, width = rooms.spec.height, rooms.spec.width
         alignment = _alignment(reading)
         with RoomPredictionWriter(
             out, truth, method=method, run=run, alignment=alignment, shown=shown, notes=notes,
@@ -130,11 +136,13 @@ def import_rooms(
                     normal = None
                     if normal_paths is not None:
                         where_normal, values = normal_paths(row)
-                        normal = _unit_vectors(values, where_normal)
-                    fov = float(rooms.read("camera/fov_y_degrees", row))
-                    geometry = reading.geometry(stored, normal, fov)
+                        normal = unit_vectors(values, where_normal)
+                    geometry = reading.geometry(stored, normal, partial(rays_of, rooms, row))
                     fitted = fitted_to(
-                        geometry, height, width, frame=reading.frame, missing=reading.missing
+                        geometry,
+                        *size_of(rooms, row),
+                        frame=reading.frame,
+                        missing=reading.missing,
                     )
                     writer.add(row, **fitted.values)
                 except (OutputError, PredictionError) as error:
@@ -158,7 +166,9 @@ def _alignment(reading: Reading) -> Alignment:
     return reading.alignment or default
 
 
-def _images(pattern: str, rooms: RoomsFile, reading: Reading, vectors: bool) -> tuple[Images, str]:
+def _images(
+    pattern: str, rooms: TruthImages, reading: Reading, vectors: bool
+) -> tuple[Images, str]:
     """Return what reads the image of a row, with its place, and how files are matched."""
     files = files_of(pattern)
     count = len(rooms)
@@ -166,8 +176,12 @@ def _images(pattern: str, rooms: RoomsFile, reading: Reading, vectors: bool) -> 
         stack = read_array(files[0], reading.array, vectors)
         if stack.ndim > (3 if vectors else 2) and len(stack) == count:
             return lambda row: (f"{files[0]}: row {row}", stack[row]), "one image for each row"
-    views = np.stack([rooms.read(name, slice(None)) for name in ("scene_index", "view_index")], 1)
-    matched = match_files(files, count, views, reading.match)
+    if isinstance(rooms, MeasuredFile):
+        names = [PurePath(rooms.name(row)).stem for row in range(count)]
+        matched = match_names(files, names) or match_files(files, count, None, reading.match)
+    else:
+        columns = [rooms.read(name, slice(None)) for name in ("scene_index", "view_index")]
+        matched = match_files(files, count, np.stack(columns, 1), reading.match)
 
     def image(row: int) -> tuple[object, Array]:
         path = matched.paths[row]
@@ -176,7 +190,7 @@ def _images(pattern: str, rooms: RoomsFile, reading: Reading, vectors: bool) -> 
     return image, f"{count} files {matched.how}"
 
 
-def _unit_vectors(values: Array, where: object) -> Array:
+def unit_vectors(values: Array, where: object) -> Array:
     """Return normals (h, w, 3) of a file: whole numbers encode -1 to 1."""
     if values.dtype.kind == "u":
         return image_of(values, "normal", vectors=True) * (2.0 / np.iinfo(values.dtype).max) - 1.0

@@ -2,7 +2,7 @@
 
 import glob
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -29,7 +29,7 @@ class Matched:
     how: str
 
 
-def files_of(pattern: str) -> list[Path]:
+def files_of(pattern: str, endings: Collection[str] = READERS) -> list[Path]:
     """Return the files of a pattern such as `out/*.png`, or in a folder, in order of names.
 
     Raises MatchError where there is none, or one of a folder is of no known format.
@@ -38,9 +38,9 @@ def files_of(pattern: str) -> list[Path]:
     if folder.is_dir():
         paths = [path for path in folder.iterdir() if not path.name.startswith(".")]
         for path in sorted(paths):
-            if path.is_file() and path.suffix.lower() not in READERS:
+            if path.is_file() and path.suffix.lower() not in endings:
                 hint = f"name the files with a pattern, such as '{folder}/*.png'"
-                expected = f"files that end in {', '.join(READERS)}"
+                expected = f"files that end in {', '.join(endings)}"
                 raise MatchError(folder, f"{path.name:.80}", expected, hint)
     else:
         paths = [Path(name) for name in glob.glob(_with_names_escaped(pattern))]
@@ -57,6 +57,14 @@ def _with_names_escaped(pattern: str) -> str:
         place /= part
         escaped /= glob.escape(part) if place.exists() else part
     return str(escaped)
+
+
+def match_names(paths: Sequence[Path], names: Sequence[str]) -> Matched | None:
+    """Return the file of each name, without its ending; None unless each has one."""
+    named = {path.stem: path for path in paths}
+    if len(named) < len(paths) or named.keys() != set(names) or len(named) < len(names):
+        return None
+    return Matched(tuple(named[name] for name in names), "by the names of the pictures")
 
 
 def match_files(
@@ -76,21 +84,21 @@ def match_files(
         if len(paths) != count:
             raise MatchError(paths[0].parent, f"{len(paths)} files", f"{count}, one for each row")
         return Matched(tuple(paths), f"in the order of their names: {paths[0].name} is row 0")
-    numbered = _numbered(paths)
-    two = len(next(iter(numbered))) == 2
+    by_number = numbered(paths)
+    two = len(next(iter(by_number))) == 2
     rows = {} if views is None else {tuple(pair): row for row, pair in enumerate(views.tolist())}
-    if two and len(rows) == count and 2 * len(rows.keys() & numbered.keys()) > count:
+    if two and len(rows) == count and 2 * len(rows.keys() & by_number.keys()) > count:
         how = "by scene and view in their names"
     elif two:
         hint = "say --match name to take files in the order of their names"
         found = f"names that differ in two numbers, such as {paths[0].name}"
         raise MatchError(paths[0].parent, found, "in one, the row, or in scene and view", hint)
     else:
-        first = 1 if (0,) not in numbered and (count,) in numbered else 0
+        first = 1 if (0,) not in by_number and (count,) in by_number else 0
         rows = {(first + row,): row for row in range(count)}
         how = f"by the number in their names, counted from {first}"
-    missing = [key for key in rows if key not in numbered]
-    extra = [numbered[key].name for key in numbered if key not in rows]
+    missing = [key for key in rows if key not in by_number]
+    extra = [by_number[key].name for key in by_number if key not in rows]
     folder = paths[0].parent
     if missing:
         shown = ", ".join("-".join(map(str, key)) for key in missing[:SHOWN])
@@ -102,12 +110,12 @@ def match_files(
     if extra:
         found = f"{len(paths)} files, also {', '.join(extra[:SHOWN])}"
         raise MatchError(folder, found, f"{count}, one for each row")
-    found_paths = tuple(numbered[key] for key in rows)
+    found_paths = tuple(by_number[key] for key in rows)
     return Matched(found_paths, f"{how}: {found_paths[0].name} is row 0")
 
 
-def _numbered(paths: Sequence[Path]) -> Mapping[tuple[int, ...], Path]:
-    """Return the files by the numbers that tell them apart.
+def numbered(paths: Sequence[Path]) -> Mapping[tuple[int, ...], Path]:
+    """Return the files by the numbers that tell them apart, in their order.
 
     Names that are alike but for numbers are told apart by those that differ; of others the last
     number counts.

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from metrics.intake.resampling import filled, nearest, resampled
 from metrics.measures.alignment import Alignment
 from metrics.submissions.writer import as_array
-from scenegen.camera import pixel_directions
 from scenegen.common.errors import SceneGenError
 from scenegen.common.names import did_you_mean
 from scenegen.description.specs import MAX_PIXELS
@@ -171,9 +170,8 @@ def image_of(values: Any, name: str, vectors: bool = False) -> Array:
     return array.astype(np.float64)
 
 
-def planar_from_distance(distance: Array, fov_y_degrees: float) -> Array:
-    """Return planar depth (h, w) of distances along the rays of a true camera."""
-    rays = pixel_directions(distance.shape[0], distance.shape[1], fov_y_degrees)
+def planar_from_distance(distance: Array, rays: Array) -> Array:
+    """Return planar depth (h, w) of distances along rays (h, w, 3), z = -1."""
     return np.asarray(distance / np.linalg.norm(rays, axis=-1))
 
 

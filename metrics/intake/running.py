@@ -13,15 +13,14 @@ from metrics.intake.importing import told_of_missing
 from metrics.intake.kept_rows import KeptRows, kept_rows
 from metrics.intake.model_file import Model, ModelError
 from metrics.intake.outputs import Frame, Geometry, Missing, OutputError, read_output
+from metrics.measured.reader import Images, MeasuredFile, matrix_of, open_images, size_of
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.writer import RoomPredictionWriter, as_array, write_answers
-from scenegen.camera import intrinsics
 from scenegen.common.errors import SpecError
 from scenegen.files.new_file import check_writable
 from scenegen.files.sets.shards import OpenFile
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.preview import srgb_bytes
-from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 Begun = TypeVar("Begun")
@@ -115,8 +114,10 @@ def count_rows(data: str | Path) -> int:
     from iqtt.files.reader import QuestionsFile, holds_questions
 
     with OpenFile(data, KIND) as opened:
-        reader = QuestionsFile if holds_questions(opened) else RoomsFile
-        return len(reader(opened))
+        if holds_questions(opened):
+            return len(QuestionsFile(opened))
+    with open_images(data) as images:
+        return len(images)
 
 
 # ---- rooms ----
@@ -131,7 +132,7 @@ def _run_rooms(
             found = f"infer of {model.name}, which takes none"
             raise ModelError("--intrinsics", found, "infer(image, intrinsics=None)")
         texts["notes"] = "\n".join(filter(None, (texts["notes"], TOLD)))
-    with RoomsFile(data) as rooms:
+    with open_images(data) as rooms:
         settings |= {"data": rooms.fingerprint}
         with kept_rows(out, settings, keep) as kept:
             done = kept.count
@@ -159,11 +160,10 @@ def _run_rooms(
 
 
 def _geometries(
-    model: Model, rooms: RoomsFile, call: Call, kept: KeptRows
+    model: Model, rooms: Images, call: Call, kept: KeptRows
 ) -> Iterator[tuple[int, Geometry]]:
     """Yield what is predicted for each row, in order: kept, or from the model."""
     size = call.batch if model.takes_batches else 1
-    height, width = rooms.spec.height, rooms.spec.width
 
     def begin(start: int) -> tuple[dict[int, Any], Callable[[], dict[int, Any]]]:
         stored = {row: kept.read(row) for row in range(start, min(start + size, len(rooms)))}
@@ -178,12 +178,12 @@ def _geometries(
                 continue
             try:
                 geometry = read_output(
-                    outputs[row], height, width,
+                    outputs[row], *size_of(rooms, row),
                     frame=call.frame, key=call.key, missing=call.missing,
                 )  # fmt: skip
             except OutputError as error:
                 raise error.inside(f"{model.name}: row {row}") from error
-            in_metres = rooms.spec.interior
+            in_metres = isinstance(rooms, MeasuredFile) or rooms.spec.interior
             if model.metres and geometry.alignment == "none" and not in_metres:
                 geometry = replace(geometry, alignment="scale")
             yield row, geometry
@@ -200,7 +200,7 @@ def _one_ahead(begin: Callable[[int], Begun], items: Iterable[int]) -> Iterator[
 
 
 def _begun(
-    model: Model, rooms: RoomsFile, call: Call, rows: Sequence[int]
+    model: Model, rooms: Images, call: Call, rows: Sequence[int]
 ) -> Callable[[], dict[int, Any]]:
     """Let the model begin some rows; the function returned waits for what it returns for each.
 
@@ -208,15 +208,19 @@ def _begun(
     """
     images, cameras = [], []
     for row in rows:
-        images.append(call.picture(rooms.read("image", row), rooms.place("image", row)))
-        fov = float(rooms.read("camera/fov_y_degrees", row))
-        size = rooms.spec.height, rooms.spec.width
-        cameras.append(intrinsics(*size, fov, pixel_centers="half"))
+        if isinstance(rooms, MeasuredFile):
+            images.append(rooms.picture(row))
+        else:
+            images.append(call.picture(rooms.read("image", row), rooms.place("image", row)))
+        cameras += [matrix_of(rooms, row)] if call.intrinsics else []
     if not model.takes_batches:
         (row,), told = rows, cameras if call.intrinsics else []
         one = model.begin("infer", f"row {row}", *images, *told)
         return lambda: {row: one()}
     where = f"rows {rows[0]} to {rows[-1]}"
+    if len({image.shape for image in images}) > 1:
+        found = f"images of {len({image.shape for image in images})} sizes"
+        raise OutputError(f"{model.name}: {where}", found, "one", "say --batch 1")
     batch = (np.stack(images), *([np.stack(cameras)] if call.intrinsics else []))
     several = model.begin("infer_batch", where, *batch)
 

@@ -15,6 +15,7 @@ scale is never negative, or a prediction that swaps near and far would count as 
   Wang et al. 2025 (MoGe), section 3.2 and its appendix.
 - disparity_scale_shift: 1 / max(s d + b, 1 / max(t)), where s d + b minimises
   sum (s d + b - 1 / t)^2, and d is the disparity, 1 / p. Source: Ranftl et al. 2020, section 5.
+  Another `cap` may take the place of max(t).
 """
 
 from typing import Literal, get_args
@@ -36,10 +37,15 @@ Alignment = Literal[
 ]
 SMALLEST_SHARE = 1e-4  # of the largest depth: less is raised to this before it is inverted
 STEPS = 200  # of the search of `l1_scale_shift`, which takes about ten
+MANY = 2**16  # points, of which a line is fitted to SOME first
+SOME = 8192
+NEAR = 0.15  # fraction of them near that line, on whose sides the line of all may run
 
 
-def align(p: Array, t: Array, alignment: Alignment) -> Array:
+def align(p: Array, t: Array, alignment: Alignment, cap: float | None = None) -> Array:
     """Return predicted depth (N,) after an alignment to the true depth (N,), both finite.
+
+    `cap` is that of `depth_of_disparity`.
 
     Where the formula gives a negative scale or none (p is 0 throughout, or constant where a shift
     is fitted, too), the scale is 0, the optimum under s >= 0. Raises MeasureError on another
@@ -55,7 +61,7 @@ def align(p: Array, t: Array, alignment: Alignment) -> Array:
     if alignment == "scale_shift":
         return _least_squares_line(unit, t)
     if alignment == "disparity_scale_shift":
-        return depth_of_disparity(1.0 / np.maximum(unit, SMALLEST_SHARE), t)
+        return depth_of_disparity(1.0 / np.maximum(unit, SMALLEST_SHARE), t, cap)
     if alignment == "scale":
         scale = _ratio(float(unit @ t), float(unit @ unit))
     elif alignment == "scale_l1":
@@ -67,14 +73,14 @@ def align(p: Array, t: Array, alignment: Alignment) -> Array:
     return np.asarray(scale * unit + shift)
 
 
-def depth_of_disparity(d: Array, t: Array) -> Array:
+def depth_of_disparity(d: Array, t: Array, cap: float | None = None) -> Array:
     """Return depth (N,) of disparity (N,), known up to scale and shift, fitted to the true depth.
 
-    As `disparity_scale_shift`; no depth exceeds the largest true one.
+    As `disparity_scale_shift`; no depth exceeds `cap`, by default the largest true one.
     """
     target = 1.0 / t
     fitted = _least_squares_line(d / (float(np.abs(d).max()) or 1.0), target)
-    return np.asarray(1.0 / np.maximum(fitted, target.min()))
+    return np.asarray(1.0 / np.maximum(fitted, target.min() if cap is None else 1.0 / cap))
 
 
 def align_points(p: Array, t: Array, alignment: Alignment) -> Array:
@@ -117,6 +123,9 @@ def l1_scale_shift(p: Array, t: Array, weights: Array) -> tuple[float, float]:
     next s is where they meet, until the sum there lies on both tangents. If the enclosed range does
     not shrink by half, the next s is its middle.
     """
+    found = _l1_of_many(p, t, weights) if len(p) > MANY else None
+    if found is not None:
+        return found
     total, rounding = float(weights.sum()), 1e-13 * float(weights @ np.abs(p))
 
     def tangent(s: float) -> tuple[float, float, float]:
@@ -171,8 +180,51 @@ def l1_scale_shift(p: Array, t: Array, weights: Array) -> tuple[float, float]:
     return best[1], best[2]
 
 
+def _l1_of_many(p: Array, t: Array, weights: Array) -> tuple[float, float] | None:
+    """Return what `l1_scale_shift` returns, from fewer points; None where that is not sure.
+
+    Points far to one side of the line of some points are taken together as their weighted mean.
+    Their sum is then never larger than it was, and as large where all of them are on one side. So
+    an optimum that leaves them there is one of all points.
+    """
+    some = slice(None, None, len(p) // SOME)
+    scale, shift = l1_scale_shift(p[some], t[some], weights[some])
+    rest = scale * p + shift - t
+    size = np.abs(rest)
+    count = int(NEAR * len(p))
+    near = size <= np.partition(size, count)[count]
+    sides = ~near & (rest > 0.0), ~near & (rest < 0.0)
+    points = [values[near] for values in (p, t, weights)]
+    for side in sides:
+        if side.any():
+            weight = float(weights @ side)
+            means = (float((weights * values) @ side) / weight for values in (p, t))
+            points = [np.append(a, b) for a, b in zip(points, (*means, weight), strict=True)]
+    if len(points[0]) > MANY:
+        return None
+    scale, shift = l1_scale_shift(*points)
+    rest = scale * p + shift - t
+    kept = (rest[sides[0]] >= 0.0).all() and (rest[sides[1]] <= 0.0).all()
+    return (scale, shift) if kept else None
+
+
 def _weighted_median(values: Array, weights: Array) -> float:
-    """Return the smallest value up to which half of all weight lies."""
+    """Return the smallest value up to which half of all weight lies.
+
+    Of many values, those far below and far above that of some are each taken as one value.
+    """
+    if len(values) > MANY:
+        some = slice(None, None, len(values) // SOME)
+        order = np.argsort(values[some])
+        reached = np.cumsum(weights[some][order])
+        ends = np.searchsorted(reached, [0.45 * reached[-1], 0.55 * reached[-1]])
+        low, high = values[some][order[ends]]
+        below, above = values < low, values > high
+        before, after, half = weights @ below, weights @ above, 0.5 * float(weights.sum())
+        if before < half and after < half:
+            near = ~(below | above)
+            values = np.concatenate([[-np.inf], values[near], [np.inf]])
+            weights = np.concatenate([[before], weights[near], [after]])
     order = np.argsort(values)
     reached = np.cumsum(weights[order])
     return float(values[order[np.searchsorted(reached, 0.5 * reached[-1])]])

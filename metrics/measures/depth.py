@@ -6,7 +6,7 @@ positive. `compare_depth` selects and checks the pixels once, and every score ta
 the formulas, p is a predicted depth, t the true one, and means are over the scored pixels.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,10 +24,21 @@ DELTA_BASE = 1.25
 
 @dataclass(frozen=True)
 class DepthPair:
-    """Predicted and true depth (N,) of the scored pixels, checked."""
+    """Predicted and true depth (N,) of the scored pixels, checked.
+
+    `known` is what was computed of the truth; a pair that is aligned shares it.
+    """
 
     predicted: Array
     true: Array
+    known: dict[str, Array] = field(default_factory=dict, repr=False, compare=False)
+
+    @property
+    def true_log(self) -> Array:
+        """The true ln t, t at least SMALLEST_LOG_DEPTH, (N,)."""
+        if "log" not in self.known:
+            self.known["log"] = np.log(np.maximum(self.true, SMALLEST_LOG_DEPTH))
+        return self.known["log"]
 
 
 def compare_depth(
@@ -103,10 +114,11 @@ def silog(pair: DepthPair) -> float:
     camera. Source: the KITTI depth benchmark (Uhrig et al. 2017): the root of the scale-invariant
     error of Eigen et al. 2014, section 3.2, times 100.
     """
-    predicted, true = (np.maximum(d, SMALLEST_LOG_DEPTH) for d in (pair.predicted, pair.true))
-    difference = np.log(predicted) - np.log(true)
+    difference = np.log(np.maximum(pair.predicted, SMALLEST_LOG_DEPTH)) - pair.true_log
     seen = pair.predicted > SMALLEST_LOG_DEPTH
-    if seen.any():
+    if seen.all():
+        difference -= difference.mean()
+    elif seen.any():
         difference = np.where(seen, difference - difference[seen].mean(), difference)
     return float(100.0 * np.sqrt(np.square(difference).mean()))
 
@@ -118,7 +130,7 @@ def delta(pair: DepthPair, power: int) -> float:
     "Threshold", with powers 1, 2 and 3.
     """
     p, t, limit = pair.predicted, pair.true, DELTA_BASE**power
-    return float(np.mean((p < limit * t) & (t < limit * p)))
+    return float(np.count_nonzero((p < limit * t) & (t < limit * p)) / len(p))
 
 
 def depth_scores(
@@ -131,7 +143,9 @@ def depth_scores(
     its name. `aligned` says that the alignment was made already.
     """
     fitted = pair if aligned else align(pair, alignment)
-    named = {score.__name__: score(fitted) for score in (mse_depth, rmse, abs_rel, silog)}
+    squared = mse_depth(fitted)
+    named = {"mse_depth": squared, "rmse": float(np.sqrt(squared))}
+    named |= {score.__name__: score(fitted) for score in (abs_rel, silog)}
     named |= {f"delta_{power}": delta(fitted, power) for power in (1, 2, 3)}
     if alignment == "none":
         return named | {score.__name__: score(pair) for score in (sq_rel, rmse_log, log10, irmse)}

@@ -104,6 +104,25 @@ def linearised_means(values: ArrayLike, clusters: ArrayLike) -> Array:
     return np.asarray(mean + (sums - mean * sizes) * (len(sizes) / len(table)))[:, None]
 
 
+def pooled_means(values: ArrayLike, clusters: ArrayLike, weights: Array, root: bool) -> Array:
+    """Return a number for each of S clusters, (S,), whose mean is the weighted mean of all values.
+
+    As `linearised_means`, with a weight of each of the (N,) values, such as its pixels. With `root`
+    the mean is the root of the weighted mean of squares, and the numbers its first terms (the
+    delta method).
+    """
+    table, sums, sizes = _cluster_sums(
+        weights * np.square(values) if root else weights * np.asarray(values), clusters
+    )
+    _, weight, _ = _cluster_sums(weights, clusters)
+    mean = float(table.sum() / weight.sum())
+    apart = (sums - mean * weight) * (len(sizes) / weight.sum())
+    if not root:
+        return np.asarray(mean + apart)
+    value = math.sqrt(mean)
+    return np.asarray(value + apart / (2.0 * value)) if value > 0.0 else np.zeros(len(sizes))
+
+
 def _cluster_sums(values: ArrayLike, clusters: ArrayLike) -> tuple[Array, Array, Array]:
     """Return values (N,), and the sums and the sizes of their clusters, (S,) each."""
     table, labels = as_float64(values, "values"), np.asarray(clusters)

@@ -15,6 +15,7 @@ from metrics.measures.statistics import (
     cluster_means,
     clustered_wilson_interval,
     linearised_means,
+    pooled_means,
     wilson_interval,
 )
 from metrics.scoring.metric_names import (
@@ -139,6 +140,37 @@ def estimates(scores: Mapping[str, Array], scene: Array, bootstrap: Bootstrap) -
                 float(each[:, k].std(ddof=1)) if len(each) > 1 else None,
             )
     return {name: means_of[name] for name in scores if name in means_of}
+
+
+ROOTS = ("rmse", "rmse_log", "irmse", "normal_rmse_degrees")  # of means of squares
+
+
+def pooled_means_of(name: str, values: Array, clusters: Array, weights: Array) -> Array:
+    """Return `pooled_means` of a score (N,): over pixels, a root is one of all of them."""
+    over_pixels = bool((weights != 1.0).any())
+    return pooled_means(values, clusters, weights, over_pixels and name in ROOTS)
+
+
+def pooled_estimates(
+    scores: Mapping[str, Array], clusters: Array, weights: Array, bootstrap: Bootstrap
+) -> dict[str, Score]:
+    """Return the weighted mean of every score (R, N); intervals resample clusters (N,).
+
+    Entries without a score are left out; a score that none has is not returned.
+    """
+    found: dict[str, Score] = {}
+    for names, there in by_presence(scores):
+        cluster, weight = clusters[there], weights[there]
+        for name in names:
+            runs = scores[name][:, there]
+            each = np.array([pooled_means_of(name, run, cluster, weight) for run in runs])
+            means, unit = each.mean(axis=0), metric(name).unit
+            (low,), (high,) = bootstrap_interval(means[:, None], *bootstrap)
+            low, high = with_width(means, low, high, unit)
+            std = float(each.mean(axis=1).std(ddof=1)) if len(each) > 1 else None
+            count = len(means)
+            found[name] = Score(float(means.mean()), finite(low), finite(high), unit, count, std)
+    return {name: found[name] for name in scores if name in found}
 
 
 def with_width(means: Array, low: float, high: float, unit: str) -> tuple[float, float]:

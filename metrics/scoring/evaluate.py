@@ -5,6 +5,9 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from metrics.measured.protocols import ProtocolError
+from metrics.measured.reader import Images, MeasuredFile, open_images
+from metrics.scoring.measured import score_measured
 from metrics.scoring.questions import score_questions
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import score_rooms
@@ -29,7 +32,7 @@ class Runs(NamedTuple):
     """
 
     files: Sequence[Predictions]
-    truth: "RoomsFile | AnswersFile"
+    truth: "Images | AnswersFile"
     truth_given: bool
 
 
@@ -77,26 +80,51 @@ def open_runs(paths: Sequence[str | Path], truth: str | Path | None = None) -> I
         yield Runs(files, opened, place.source == "given")
 
 
-def _opened_truth(task: str, path: Path) -> "RoomsFile | AnswersFile":
-    if task == "rooms":
-        return RoomsFile(path)
+def _opened_truth(task: str, path: Path) -> "Images | AnswersFile":
+    if task != "iqtt":
+        return open_images(path)
     from iqtt.files.reader import AnswersFile
 
     return AnswersFile(path)
 
 
 def score_runs(runs: Runs, settings: Settings, progress: Progress) -> ScoreFile:
-    """Score open submissions. Raises as `score`."""
+    """Score open submissions. Raises as `score`, and ProtocolError."""
+    if settings.protocol:
+        _require_measured(runs)
     truth, options = runs.truth, (runs.truth_given, settings, progress)
     if isinstance(truth, RoomsFile):
-        rooms = [file for file in runs.files if isinstance(file, RoomPredictions)]
-        scores = score_rooms(rooms, truth, *options)
+        scores = score_rooms(_images(runs), truth, *options)
+    elif isinstance(truth, MeasuredFile):
+        (scores,) = score_measured(_images(runs), truth, *options)
     else:
         answers = [file for file in runs.files if isinstance(file, QuestionPredictions)]
         scores = score_questions(answers, truth, *options)
     for file in runs.files:
         file.require_unchanged()
     return scores
+
+
+def score_protocols(runs: Runs, settings: Settings, progress: Progress) -> list[ScoreFile]:
+    """Score open submissions under all protocols that suit them. Raises as `score_runs`."""
+    _require_measured(runs)
+    assert isinstance(runs.truth, MeasuredFile), "others were refused"
+    options = runs.truth_given, settings, progress
+    scores = score_measured(_images(runs), runs.truth, *options, all_protocols=True)
+    for file in runs.files:
+        file.require_unchanged()
+    return scores
+
+
+def _images(runs: Runs) -> list[RoomPredictions]:
+    return [file for file in runs.files if isinstance(file, RoomPredictions)]
+
+
+def _require_measured(runs: Runs) -> None:
+    """Raise ProtocolError for truth that is exact, and has no pixels or ranges to choose."""
+    if not isinstance(runs.truth, MeasuredFile):
+        expected = "measured truth, as `bench truth` makes it"
+        raise ProtocolError("protocol", f"one for {runs.truth.path}", expected)
 
 
 def _check_alike(files: Sequence[Predictions]) -> None:

@@ -17,6 +17,7 @@ HEADLINE = {
         "shape_error", "behind_depth_error", "relief_iou", "chamfer", "hausdorff", "mse_depth",
     ),
     "iqtt": ("iqtt_accuracy",),
+    "measured": ("abs_rel", "delta_1", "rmse", "silog"),
 }  # fmt: skip
 RECALL_WITHIN = ("0.02", "0.05")  # scene units
 OBJECT_SCORES = (
@@ -153,6 +154,10 @@ class Metric:
         "", "objects", "relief", "inside", "bends", "behind", "boundary", "planes", "partner"
     ] = ""
     of: Literal["points", "depth", "normals", "field of view", "answers"] = "depth"
+
+    def suits(self, task: str) -> bool:
+        """Return whether items of a task have this score; a scene unit is 1 m of measured truth."""
+        return self.task == task or (task == "measured" and self.name in MEASURED)
 
     @property
     def direction(self) -> str:
@@ -398,6 +403,12 @@ ALL: dict[str, Metric] = {
         _ACCURACY,
     )
 }
+MEASURED = frozenset(
+    metric.name
+    for metric in ALL.values()
+    if metric in (*_MORE_DEPTH, *_NORMALS)
+    or metric.name.partition("_after_")[0] in {m.name for m in (*_DEPTH, *_POINT_MAPS)}
+)  # scores of truth that others measured
 ALL |= {
     EMPTY_ROOM + name: replace(
         ALL[name],

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import ConfigDict, FailFast, Field
 
 from iqtt.floors import Floor
+from metrics.measured.protocols import BY_NAME
 from metrics.measures.alignment import Alignment
 from metrics.scoring.estimates import (
     ACCURACY,
@@ -30,6 +31,7 @@ from metrics.scoring.estimates import (
     floor_column,
     grouped_estimates,
     object_sizes,
+    pooled_estimates,
     question_skill,
     skills,
 )
@@ -67,14 +69,19 @@ NotNegative = Annotated[Number, Field(ge=0.0)]
 TupleOf = Annotated[tuple[Value, ...], FailFast()]
 ByKey = Annotated[Mapping[str, Value], FailFast()]
 # Columns of items that identify each entry; the first one ascends.
-ID_COLUMNS = {"rooms": ("row", "scene_index", "view_index"), "iqtt": ("question",)}
-OPTIONAL_COLUMNS = {"rooms": ("view_angle_degrees",), "iqtt": ("shape",)}
+ID_COLUMNS = {
+    "rooms": ("row", "scene_index", "view_index"),
+    "iqtt": ("question",),
+    "measured": ("row", "group", "pixels"),
+}
+OPTIONAL_COLUMNS = {"rooms": ("view_angle_degrees",), "iqtt": ("shape",), "measured": ()}
 # Columns of objects, beside their scores: whole numbers, and a text.
 OBJECT_COLUMNS = ("row", "object", "pixels")
 SHAPE_COLUMN = "shape"
 COUNTS = {
     "rooms": ("rows_in_truth", "rows_penalised", "pixels"),
     "iqtt": ("questions_in_truth", "answers", "abstained"),
+    "measured": ("rows_in_truth", "rows_penalised"),
 }
 GROUPINGS = {
     "rooms": ("by_view_angle", "by_object_shape", "by_object_size"),
@@ -82,6 +89,7 @@ GROUPINGS = {
         *("by_distractor", "by_rotation_angle", "by_position"),
         *("by_answer", "by_outcome", "by_circle"),
     ),
+    "measured": (),
 }
 _STRICT = ConfigDict(extra="forbid")
 
@@ -188,6 +196,7 @@ class ScoreFile:
         answer_groups: questions only: by grouping, then by group.
         path: where it was read from; no part of the content.
         shown: rooms: which image of a scene the method was shown.
+        protocol: measured truth: by which of `metrics.measured.protocols` it was scored; else "".
         older: whether it was read from a file of an older format, in which scores of CHANGED have
             other definitions.
     """
@@ -202,6 +211,7 @@ class ScoreFile:
     path: Path | None = None
     shown: Shown = "scored_view"
     older: bool = False
+    protocol: str = ""
 
     @property
     def runs(self) -> int:
@@ -215,8 +225,31 @@ class ScoreFile:
 
     @property
     def clusters(self) -> Array:
-        """The scene of each image, whose errors are correlated; each question by itself, (N,)."""
-        return self.columns["scene_index" if self.task == "rooms" else "question"]
+        """The scene or group of each image, whose errors are correlated; or each question, (N,)."""
+        names = {"rooms": "scene_index", "measured": "group", "iqtt": "question"}
+        return self.columns[names[self.task]]
+
+    @property
+    def grouped(self) -> bool:
+        """Whether some items share a cluster: views of a scene, images of a drive."""
+        return len(np.unique(self.clusters)) < len(self.ids)
+
+    @property
+    def unit(self) -> str:
+        """What intervals resample, in the plural."""
+        if self.task == "measured":
+            return "groups" if self.grouped else "images"
+        return (
+            "scenes" if self.task == "rooms" else "shapes" if "shape" in self.items else "questions"
+        )
+
+    @property
+    def weights(self) -> Array | None:
+        """The weight of each image in a mean over all, (N,); None for a mean of scenes."""
+        if self.task != "measured":
+            return None
+        by_pixels = BY_NAME[self.protocol].mean == "pixels"
+        return self.columns["pixels"] if by_pixels else np.ones(len(self.ids))
 
     @property
     def truth(self) -> tuple[Task, str]:
@@ -283,12 +316,15 @@ class ScoreFile:
         if self.task == "iqtt":
             shapes = self.items.get("shape", self.ids)
             return {ACCURACY: accuracy(self._runs_of_scores[ACCURACY], shapes, self._bootstrap)}
+        if self.weights is not None:
+            weights = self.weights
+            return pooled_estimates(self._runs_of_scores, self.clusters, weights, self._bootstrap)
         return estimates(self._runs_of_scores, self.clusters, self._bootstrap)
 
     @cached_property
     def skills(self) -> Mapping[str, Skill]:
         """The skills of some of the scores, by name."""
-        if self.task == "rooms":
+        if self.task != "iqtt":
             return skills(self.items, self.clusters, self._bootstrap, self.shown)
         kinds = {
             kind: group.n for kind, group in self.answer_groups.get("by_distractor", {}).items()

@@ -1,6 +1,6 @@
 """Scores of submissions that predict rooms, from the scores of their rows."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from metrics.scoring.runs import (
     meta_of,
     refuse_copies,
 )
-from metrics.scoring.truth_digests import rooms_digest
+from metrics.scoring.truth_digests import images_digest
 from metrics.submissions.reader import RoomPredictions
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
@@ -36,27 +36,16 @@ def score_rooms(
 ) -> ScoreFile:
     """Score runs of one method on an open rooms file; raises as `evaluate.score`."""
     rows = matched_rows(files, truth, settings.allow_partial)
-    for file in files:
-        if file.kind != files[0].kind:
-            expected = f"{files[0].kind} as in {files[0].path}"
-            raise ScoringError(f"{file.path}: {file.kind}", file.kind, expected)
-        if file.has_normals != files[0].has_normals:
-            found, expected = ("normals", "none") if file.has_normals else ("none", "normals")
-            raise ScoringError(f"{file.path}: normal", found, f"{expected} as in {files[0].path}")
+    require_one_kind(files)
     scored = score_rows(files, truth, rows, settings, progress)
     scores, bad = scored.scores, scored.bad
-    if bad and settings.non_finite == "error":
-        first = next(iter(bad.values()))
-        shown = ", ".join(map(str, list(bad)[:IDS_SHOWN])) + ", ..." * (len(bad) > IDS_SHOWN)
-        listed = f"rows that cannot be scored, {len(bad)} in all: {shown}"
-        advice = "mend them, or score them at the worst with --non-finite penalise"
-        raise ScoringError(first.where, first.found, first.expected, f"{listed}; {advice}")
+    require_scored(bad, settings)
 
     def alike(i: int, j: int) -> bool:
         return all(np.array_equal(x[i], x[j], equal_nan=True) for x in scores.values())
 
     refuse_copies(files, alike)
-    digest = rooms_digest(truth, scored.digests)
+    digest = images_digest(truth, scored.digests)
     scene = truth.read("scene_index", slice(None))
     view = truth.read("view_index", slice(None))
     angle = view_angles(scene, view, truth.read("camera/world_from_camera", slice(None)))[rows]
@@ -80,6 +69,27 @@ def score_rooms(
     objects[SHAPE_COLUMN] = shape
     shown = files[0].shown
     return ScoreFile("rooms", files[0].method, alignment, items, meta, objects, shown=shown)
+
+
+def require_one_kind(files: Sequence[RoomPredictions]) -> None:
+    """Raise ScoringError unless all submissions have one kind of geometry, all normals or none."""
+    for file in files:
+        if file.kind != files[0].kind:
+            expected = f"{files[0].kind} as in {files[0].path}"
+            raise ScoringError(f"{file.path}: {file.kind}", file.kind, expected)
+        if file.has_normals != files[0].has_normals:
+            found, expected = ("normals", "none") if file.has_normals else ("none", "normals")
+            raise ScoringError(f"{file.path}: normal", found, f"{expected} as in {files[0].path}")
+
+
+def require_scored(bad: Mapping[int, ScoringError], settings: Settings) -> None:
+    """Raise the first error of rows that cannot be scored, unless they are to be penalised."""
+    if bad and settings.non_finite == "error":
+        first = next(iter(bad.values()))
+        shown = ", ".join(map(str, list(bad)[:IDS_SHOWN])) + ", ..." * (len(bad) > IDS_SHOWN)
+        listed = f"rows that cannot be scored, {len(bad)} in all: {shown}"
+        advice = "mend them, or score them at the worst with --non-finite penalise"
+        raise ScoringError(first.where, first.found, first.expected, f"{listed}; {advice}")
 
 
 def view_angles(scene_index: Array, view_index: Array, world_from_camera: Array) -> Array:

@@ -11,12 +11,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measured.protocols import BY_NAME, ProtocolError
+from metrics.measured.reader import Images, MeasuredFile, open_images
 from metrics.scoring.image_scores import (
     FirstView,
     reference_of,
     score_prediction,
     true_relief,
 )
+from metrics.scoring.measured_rows import scores_of_view
 from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE
 from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.scoring.truth_digests import RowDigests, view_digests
@@ -32,7 +35,8 @@ from scenegen.rooms.reader import RoomsFile
 Array = NDArray[Any]
 # What another process must know to score rows, small, as it is sent along with each chunk: the
 # paths and identities of the submissions, and the path of the truth.
-Job = tuple[tuple[tuple[Path, Identity], ...], Path]
+# The names are those of protocols, for truth that was measured.
+Job = tuple[tuple[tuple[Path, Identity], ...], Path, tuple[str, ...]]
 CHUNK = 8  # rows scored between two reports of progress
 CHUNKS = 8  # of them that a worker of a cluster scores in one go
 FEW = 32  # rows that are not worth starting processes for
@@ -71,16 +75,40 @@ def score_rows(
     scene, view = (truth.read(name, slice(None))[rows] for name in ("scene_index", "view_index"))
     others = rows[other_scenes(scene, view)]
     triples = np.stack([rows, others, first_views(truth)[rows]], axis=-1)
-    chunks = [triples[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
+    return _scored(files, truth, triples, (), settings, progress)
+
+
+def score_measured_rows(
+    files: Sequence[RoomPredictions],
+    truth: MeasuredFile,
+    rows: Array,
+    protocols: tuple[str, ...],
+    settings: Settings,
+    progress: Progress = lambda done: None,
+) -> ScoredRows:
+    """Score these M rows as `score_rows`; names of scores are `PROTOCOL SCORE`."""
+    return _scored(files, truth, rows, protocols, settings, progress)
+
+
+def _scored(
+    files: Sequence[RoomPredictions],
+    truth: Images,
+    rows: Array,
+    protocols: tuple[str, ...],
+    settings: Settings,
+    progress: Progress,
+) -> ScoredRows:
+    """Score rows, or triples of them, by the processes or cluster of the settings."""
+    chunks = [rows[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
     submissions = tuple((file.path.absolute(), file.identity) for file in files)
-    job = submissions, truth.path.absolute()
+    job = submissions, truth.path.absolute(), protocols
     processes = min(settings.processes or processors(), len(chunks))
     few = settings.processes is None and len(rows) <= FEW
     parts: Iterable[ScoredRows]
     if settings.cluster is not None:
         parts = _on_cluster(job, chunks, settings.cluster)
     elif processes == 1 or few:
-        parts = _scored_here(RowScorer(files, truth), chunks)
+        parts = _scored_here(_scorer(files, truth, protocols), chunks)
     else:
         parts = _in_processes(job, chunks, processes)
     scored = []
@@ -172,8 +200,7 @@ class RowScorer:
                 try:
                     scores.append(score())
                 except PredictionError as error:
-                    where = f"{file.path}: row {row}: {error.where}"
-                    bad[row] = ScoringError(where, error.found, error.expected, error.hint)
+                    bad[row] = ScoringError(*_placed(error, file, row))
                     scores.append(score(non_finite="penalise"))
             images.append(scores)
             floors.append(reference.floors)
@@ -197,7 +224,54 @@ class RowScorer:
         )
 
 
-def _scored_here(scorer: RowScorer, chunks: Sequence[Array]) -> Iterator[ScoredRows]:
+class MeasuredScorer:
+    """Scores rows of open submissions against an open truth that was measured."""
+
+    def __init__(
+        self, files: Sequence[RoomPredictions], truth: MeasuredFile, protocols: tuple[str, ...]
+    ) -> None:
+        """Take files that stay open as long as rows are scored."""
+        self._files, self._truth = files, truth
+        self._protocols = [BY_NAME[name] for name in protocols]
+        self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in files]
+
+    def score(self, rows: Array) -> ScoredRows:
+        """Return the scores of rows, (N,), as `RowScorer.score`."""
+        bad: dict[int, ScoringError] = {}
+        digests: dict[int, RowDigests] = {}
+        images = []
+        for row in rows.tolist():
+            view, runs = self._truth.view(row), []
+            for file, entries in zip(self._files, self._entries, strict=True):
+                predicted = file.view(entries[row])
+                score = functools.partial(
+                    scores_of_view, predicted, view, self._protocols, self._truth.dense
+                )
+                try:
+                    runs.append(score())
+                except PredictionError as error:
+                    bad[row] = ScoringError(*_placed(error, file, row))
+                    runs.append(score(penalise=True))
+                except ProtocolError as error:
+                    raise error.inside(f"{self._truth.path}: row {row}") from error
+            images.append(runs)
+            digests[row] = view.digests
+        names = {f"{a} {b}": (a, b) for a, b in images[0][0]}
+        scores = {
+            name: np.array([[run[key] for run in runs] for runs in images]).T
+            for name, key in names.items()
+        }
+        return ScoredRows(scores, {}, {}, bad, digests)
+
+
+def _placed(error: PredictionError, file: RoomPredictions, row: int) -> tuple[str, str, str, str]:
+    """Return an error's fields, with file and row before its place."""
+    return f"{file.path}: row {row}: {error.where}", error.found, error.expected, error.hint
+
+
+def _scored_here(
+    scorer: RowScorer | MeasuredScorer, chunks: Sequence[Array]
+) -> Iterator[ScoredRows]:
     with one_thread():
         yield from map(scorer.score, chunks)
 
@@ -215,18 +289,29 @@ def _in_processes(job: Job, chunks: Sequence[Array], processes: int) -> Iterator
 def _on_cluster(job: Job, chunks: Sequence[Array], cluster: Cluster) -> Iterator[ScoredRows]:
     """Yield what `RowScorer.score` gives for the chunks, in their order."""
     submissions = tuple((path, on_any_machine(identity)) for path, identity in job[0])
+    apart = (submissions, *job[1:])
     tasks = [chunks[i : i + CHUNKS] for i in range(0, len(chunks), CHUNKS)]
-    for scored in cluster.in_order(functools.partial(_score_apart, (submissions, job[1])), tasks):
+    for scored in cluster.in_order(functools.partial(_score_apart, apart), tasks):
         yield from scored
 
 
-def _opened(job: Job, opening: ExitStack) -> RowScorer:
+def _scorer(
+    files: Sequence[RoomPredictions], truth: Images, protocols: tuple[str, ...]
+) -> RowScorer | MeasuredScorer:
+    if isinstance(truth, MeasuredFile):
+        return MeasuredScorer(files, truth, protocols)
+    return RowScorer(files, truth)
+
+
+def _opened(job: Job, opening: ExitStack) -> RowScorer | MeasuredScorer:
     """Open the files of a job, until the stack is closed."""
-    truth = opening.enter_context(RoomsFile(job[1]))
+    truth = open_images(job[1])
+    opening.enter_context(truth)
     files = [open_predictions(path, tried=identity) for path, identity in job[0]]
     for file in files:
         opening.enter_context(file)
-    return RowScorer([file for file in files if isinstance(file, RoomPredictions)], truth)
+    rooms = [file for file in files if isinstance(file, RoomPredictions)]
+    return _scorer(rooms, truth, job[2])
 
 
 def _score_apart(job: Job, chunks: Sequence[Array]) -> list[ScoredRows]:
@@ -240,7 +325,7 @@ def _score_in_worker(job: Job, rows: Array) -> ScoredRows:
 
 
 @functools.cache
-def _scorer_of_this_process(job: Job) -> RowScorer:
+def _scorer_of_this_process(job: Job) -> RowScorer | MeasuredScorer:
     """Open the files of a job when its first chunk comes; a worker process has only one job."""
     opening = ExitStack()
     atexit.register(opening.close)

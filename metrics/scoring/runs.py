@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.floors import Floor
+from metrics.measured.reader import Images
 from metrics.measures.statistics import RESAMPLES
 from metrics.scoring.image_scores import NonFinite
 from metrics.scoring.records import Meta, Submission
@@ -20,7 +21,6 @@ from metrics.submissions.truths import match_problems
 from scenegen.common.errors import SceneGenError
 from scenegen.files.row_file import writer_name
 from scenegen.files.sets.cluster import Cluster
-from scenegen.rooms.reader import RoomsFile
 
 if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
@@ -47,6 +47,7 @@ class Settings:
         cluster: whose workers score rooms instead; they must see the files. Changes no number.
         floors: a file of floors of questions, as `iqtt floors` writes it; None for those of the
             package.
+        protocol: of measured truth, one of `metrics.measured.protocols`; "" for "declared".
     """
 
     seed: int = 0
@@ -56,6 +57,7 @@ class Settings:
     processes: int | None = None
     cluster: Cluster | None = None
     floors: str | Path | None = None
+    protocol: str = ""
 
 
 def scorer_versions() -> dict[str, str]:
@@ -68,7 +70,7 @@ def _releases() -> dict[str, str]:
 
 
 def matched_rows(
-    files: Sequence[Predictions], truth: "RoomsFile | AnswersFile", partial: bool
+    files: Sequence[Predictions], truth: "Images | AnswersFile", partial: bool
 ) -> Array:
     """Return the rows of the truth that all files answer, in ascending order.
 
@@ -104,7 +106,7 @@ def refuse_copies(files: Sequence[Predictions], same: Callable[[int, int], Any])
 
 def meta_of(
     files: Sequence[Predictions],
-    truth: "RoomsFile | AnswersFile",
+    truth: "Images | AnswersFile",
     truth_given: bool,
     fingerprint: str,
     digest: str,
@@ -113,7 +115,7 @@ def meta_of(
     question_floors: Sequence[Floor] = (),
 ) -> Meta:
     """Return what a score file records beside its items."""
-    resampled = files[0].task == "rooms" or len(files) > 1
+    resampled = files[0].task != "iqtt" or len(files) > 1
     return Meta(
         truth_fingerprint=fingerprint,
         truth_path=str(truth.path),

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 from numpy.typing import NDArray
 
+from metrics.measured.reader import Images, MeasuredFile
 from metrics.scoring.known_tests import Task
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.runs import ScoringError
 from metrics.submissions.truths import TrueView
 from scenegen.files.content import column_digest, dataset_digest, joint_digest, row_digest
-from scenegen.layout import SCORED, TRUTH_DIGEST
+from scenegen.layout import TRUTH_DIGEST
 from scenegen.rooms.reader import RoomsFile
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def view_digests(view: TrueView) -> RowDigests:
     return tuple(row_digest(getattr(view, name)) for name in PER_PIXEL)
 
 
-def stored_digest(truth: "RoomsFile | AnswersFile") -> str | None:
+def stored_digest(truth: "Images | AnswersFile") -> str | None:
     """Return the digest that an open truth states of itself; None where it states none."""
     if isinstance(truth, RoomsFile):
         digest = truth.attributes.get("truth_digest")
@@ -41,16 +42,27 @@ def stored_digest(truth: "RoomsFile | AnswersFile") -> str | None:
     return truth.stored_truth_digest
 
 
-def stated_truth(truth: "RoomsFile | AnswersFile") -> tuple[Task, str | None]:
-    """Return what an open truth says that it is, as `ScoreFile.truth`; None for no digest."""
-    return "rooms" if isinstance(truth, RoomsFile) else "iqtt", stored_digest(truth)
+def stated_truth(truth: "Images | AnswersFile") -> tuple[Task, str | None]:
+    """Return what an open truth says that it is, as `ScoreFile.truth`; None for no digest.
+
+    Of measured truth the protocol is missing, which is no affair of the truth.
+    """
+    measured: Task = "measured" if isinstance(truth, MeasuredFile) else "iqtt"
+    return "rooms" if isinstance(truth, RoomsFile) else measured, stored_digest(truth)
 
 
-def require_truth(file: ScoreFile, truth: tuple[Task, str | None], owner: object) -> None:
+def require_truth(
+    file: ScoreFile, truth: tuple[Task, str | None], owner: object, protocol: str | None = None
+) -> None:
     """Raise OtherTruthError unless a score file is of this truth, that of `owner`.
 
     This is the rule for "the same test set": one task, and one digest of what scores depend on.
+    Where a protocol is given, "" for none, the file's must be the same.
     """
+    if protocol not in (None, file.protocol):
+        found, expected = f"scores under the protocol {file.protocol}", f"{protocol}, as {owner}"
+        hint = f"score it again with --protocol {protocol}"
+        raise OtherTruthError(file.place, found, expected, hint)
     if file.truth != truth:
         found, expected = (
             f"scores of {task}, truth of digest {digest or 'none':.12}"
@@ -60,13 +72,17 @@ def require_truth(file: ScoreFile, truth: tuple[Task, str | None], owner: object
         raise OtherTruthError(file.place, found, expected, "score it with the same --truth")
 
 
-def rooms_digest(truth: RoomsFile, scored: Mapping[int, RowDigests]) -> str:
-    """Return the digest of a truth of which some rows were scored; the others are read here.
+def images_digest(truth: Images, scored: Mapping[int, RowDigests]) -> str:
+    """Return the digest of rooms or measured truth, some rows of which were scored.
+
+    The others are read here.
 
     Raises ScoringError where it is not the one that was written with the file.
     """
     columns = {}
-    for name in SCORED:
+    for name in truth.SCORED:
+        if name not in truth.fields:  # measured truth may have no normals
+            continue
         if name in PER_PIXEL:
             place = PER_PIXEL.index(name)
             columns[name] = column_digest(
@@ -109,11 +125,11 @@ def file_digests(path: Path, task: str) -> tuple[str, str, int]:
 
     The pictures of a file of answers lie beside it. Their digest is the one stored with them.
 
-    Raises FileFormatError for a file that is none, and ScoringError as `rooms_digest`.
+    Raises FileFormatError for a file that is none, and ScoringError as `images_digest`.
     """
     if task == "rooms":
         with RoomsFile(path) as rooms:
-            return rooms_digest(rooms, {}), rooms.stored_digests()["image"], len(rooms)
+            return images_digest(rooms, {}), rooms.stored_digests()["image"], len(rooms)
     from iqtt.files.layout import SCORED as OF_ANSWERS
     from iqtt.files.reader import AnswersFile, QuestionsFile
 

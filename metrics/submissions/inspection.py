@@ -39,7 +39,7 @@ class Inspection:
     """What was found in a submission.
 
     Attributes:
-        task: None where it is neither of the two.
+        task: None where it is none of `layout.TASKS`.
         texts: its root attributes that are as they should be.
         arrays: the data sets that can be used, by name: stored ones, or arrays.
         ids: (M,) int64, rows of the truth or indices of questions; None where they are unusable.
@@ -66,7 +66,7 @@ def inspect(file: h5py.File) -> Inspection:
     result.task = result.texts.get("task")
     if result.task is None:
         return result
-    if result.task == "rooms" and result.texts.get("truth_fingerprint") == "":
+    if result.task != "iqtt" and result.texts.get("truth_fingerprint") == "":
         expected = "the attribute 'fingerprint' of the rooms file"
         result.problems.append(Problem("truth_fingerprint", "value", expected, "an empty text"))
     file_faults = list(faults(file))
@@ -151,7 +151,7 @@ def _take_arrays(
     if result.task == "iqtt" and not {"answer", "scores"} & present:
         found = f"neither; found {_names(file)}"
         result.problems.append(Problem("answer", "present", "answer, or scores", found))
-    if result.task == "rooms":
+    if result.task != "iqtt":
         result.problems[before:before] = _kind_problems(present, file)
 
 

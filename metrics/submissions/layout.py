@@ -4,13 +4,14 @@ import unicodedata
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
+from metrics.measured.layout import FORMAT_NAME as MEASURED
 from metrics.measures.answers import CANDIDATES
 from metrics.submissions.rules import OUTCOMES, RULES, kind_text, shape_text
 from scenegen.files.schema import Column
 
 FORMAT_NAME = "pix2shape-bench/predictions"
 FORMAT_VERSION = "1.0"
-TASKS = ("rooms", "iqtt")
+TASKS = ("rooms", "iqtt", "measured")  # measured: depth on truth that others measured
 Shown = Literal["scored_view", "first_view", "no_view"]
 # Kinds of geometry: the data set of each, and what a method of it may not know. The first is meant
 # where a submission does not say.
@@ -22,7 +23,8 @@ KINDS: dict[str, tuple[str, ...]] = {
 ALIGNMENTS = KINDS["depth"]
 LONGEST_NAME = 200  # characters of method and run, which tables and file names repeat
 LONGEST_TEXT = 10_000
-DATA_FORMATS = {"pix2shape-bench/rooms": "rooms", "pix2shape-bench/iqtt": "questions"}
+DATA_FORMATS = {"pix2shape-bench/rooms": "rooms", "pix2shape-bench/iqtt": "questions",
+                MEASURED: "measured truth"}  # fmt: skip
 _DIRECTION_CONTROLS = frozenset("\u202a\u202b\u202c\u202d\u202e\u2066\u2067\u2068\u2069")
 
 
@@ -54,7 +56,7 @@ ATTRIBUTES = (
     Attribute("alignment", "what the method cannot know, and the truth may decide for it, by kind: "
               + "; ".join(f"{kind} {', '.join(kinds)}" for kind, kinds in KINDS.items())
               + "; the first by default",
-              required=False, tasks=("rooms",), choices=ALIGNMENTS),
+              required=False, tasks=("rooms", "measured"), choices=ALIGNMENTS),
     Attribute("shown", "which image of a scene the method was shown to predict a view: that of the"
               " view, that of the scene's first view alone, or none; scored_view by default",
               required=False, tasks=("rooms",), choices=get_args(Shown)),
@@ -96,10 +98,11 @@ COLUMNS = {
                " -2 was not asked; the first is `answer`", axes=("answer",)),
     ),
 }  # fmt: skip
+COLUMNS["measured"] = COLUMNS["rooms"]  # in metres; images are padded as in the truth
 NEEDED = {"row": "", "question": "", **dict.fromkeys(KINDS, f"one of {', '.join(KINDS)}; "),
           "answer": "this, or both; ", "scores": "this, or both; "}  # fmt: skip
 SIZES = {"xyz": (3,), "answer": CANDIDATES}  # of axes that are alike in all files
-ID_NAMES = {"rooms": "row", "iqtt": "question"}
+ID_NAMES = {"rooms": "row", "iqtt": "question", "measured": "row"}
 
 
 def attributes(task: str) -> tuple[Attribute, ...]:
@@ -141,6 +144,9 @@ def describe_format() -> str:
         lines += ["", f"Datasets for task {task!r}, M {subject}:"]
         lines += [_describe_column(column) for column in COLUMNS[task]]
     lines += [
+        "",
+        "Task 'measured' has the datasets of task 'rooms', in metres. Images have the size to which"
+        " those of the truth are padded; what is beyond the size of a row is not read.",
         "",
         "Each row of the truth comes once; all are scored, so a missing one is an error.",
         "A submission is one file: links and data outside it are refused, and so are datasets of"

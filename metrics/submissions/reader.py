@@ -143,9 +143,23 @@ class PredictedView:
 
 
 class RoomPredictions(Predictions):
-    """Predicted depth, disparity or points of rooms, and optionally normals and field of view."""
+    """Predicted depth, disparity or points, and optionally normals and field of view.
+
+    They are of rooms, or of images whose truth was measured (`task`).
+    """
 
     task = "rooms"
+
+    def __init__(
+        self,
+        path: Path,
+        content: Inspection,
+        file: h5py.File | None,
+        identity: Identity | None = None,
+    ) -> None:
+        """Take over as `Predictions`."""
+        super().__init__(path, content, file, identity)
+        self.task = content.task or self.task
 
     @property
     def height(self) -> int:

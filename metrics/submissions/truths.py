@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measured.reader import Images, MeasuredFile, padded_size
 from metrics.submissions.layout import ID_NAMES
 from metrics.submissions.problems import Problem, first_ids
 from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
@@ -87,7 +88,7 @@ def find_truth(predictions: Predictions, named: str | Path | None = None) -> Fou
             from iqtt.files.reader import answers_beside
 
             truth = answers_beside(place) or place
-        elif os.path.isfile(truth_path(place)):
+        elif predictions.task == "rooms" and os.path.isfile(truth_path(place)):
             if named is None:
                 trial.try_file(place)
             truth = truth_beside(place) or place
@@ -101,7 +102,7 @@ def find_truth(predictions: Predictions, named: str | Path | None = None) -> Fou
 
 
 def match_problems(
-    predictions: Predictions, truth: "RoomsFile | AnswersFile | QuestionsFile"
+    predictions: Predictions, truth: "Images | AnswersFile | QuestionsFile"
 ) -> list[Problem]:
     """Return why a submission does not answer an open truth: another one, other sizes, rows.
 
@@ -117,8 +118,8 @@ def match_problems(
     if isinstance(truth, RoomsFile) and not truth.has_truth:
         expected = f"the file of truth, such as {truth_path(truth.path).name}"
         return [Problem("truth", "present", expected, f"{truth.path}, rooms without truth")]
-    if isinstance(predictions, RoomPredictions) and isinstance(truth, RoomsFile):
-        height, width = truth.spec.height, truth.spec.width
+    if isinstance(predictions, RoomPredictions) and isinstance(truth, Images):
+        height, width = padded_size(truth)
         if (predictions.height, predictions.width) != (height, width):
             found = f"images of {predictions.height}x{predictions.width}"
             problems.append(
@@ -134,7 +135,7 @@ def match_problems(
     if len(missing):
         found = f"{len(missing)} of {count} missing"
         problems.append(Problem(name, "complete", "every one", found, first_ids(missing)))
-    if isinstance(predictions, QuestionPredictions) and not isinstance(truth, RoomsFile):
+    if isinstance(predictions, QuestionPredictions) and not isinstance(truth, Images):
         problems += _answer_problems(predictions, truth.answers)
     return problems
 
@@ -187,6 +188,13 @@ def read_true_view(truth: RoomsFile, row: int) -> TrueView:
         where = truth.place("camera/world_from_camera", row)
         raise FileFormatError(where, found, "a rigid transform")
     return view
+
+
+def surface_of(truth: Images, row: int) -> Array:
+    """Return the pixels (H, W) of a row whose depth is known. Raises FileFormatError."""
+    if isinstance(truth, MeasuredFile):
+        return truth.view(row).mask
+    return read_true_view(truth, row).mask
 
 
 def _is_rigid(matrix: Array) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from metrics.measured.reader import Images, open_images
 from metrics.submissions.hints.no_value import no_value_hints
 from metrics.submissions.hints.tasks import answer_hints, room_hints
 from metrics.submissions.problems import HINT, MOST_IDS, Problem
@@ -17,9 +18,8 @@ from metrics.submissions.reader import (
     inspect_predictions,
 )
 from metrics.submissions.rules import Against, broken_rules
-from metrics.submissions.truths import FoundTruth, find_truth, match_problems, read_true_view
+from metrics.submissions.truths import FoundTruth, find_truth, match_problems, surface_of
 from scenegen.common.errors import FileFormatError, SceneGenError
-from scenegen.rooms.reader import RoomsFile
 
 
 def validate(
@@ -85,7 +85,7 @@ def _hints_on_source(truth: FoundTruth) -> list[Problem]:
 def _against_rooms(
     predictions: RoomPredictions, truth_path: Path, progress: Callable[[int], Any]
 ) -> list[Problem]:
-    with RoomsFile(truth_path) as truth:
+    with open_images(truth_path) as truth:
         problems = match_problems(predictions, truth)
         if any(problem.rule in ("match", "shape") for problem in problems):
             return problems
@@ -101,16 +101,17 @@ def _against_rooms(
 
 
 def _row_problems(
-    predictions: RoomPredictions, i: int, row: int, truth: RoomsFile
+    predictions: RoomPredictions, i: int, row: int, truth: Images
 ) -> Iterator[tuple[Problem, int]]:
     """Yield what is wrong with the values of a row, and at how many pixels."""
-    surface = read_true_view(truth, row).mask
+    surface = surface_of(truth, row)
+    height, width = surface.shape
     readers = {predictions.kind: predictions.geometry}
     if predictions.has_normals:
         readers["normal"] = predictions.normal
     for name, read in readers.items():
         try:
-            values = read(i)
+            values = read(i)[:height, :width]
         except FileFormatError as error:
             why = str(error).removeprefix(f"{predictions.path}: {name}, row {row}: ")
             yield Problem(name, "readable", "rows that can be read", why), 0

@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
+from metrics.measured.reader import MeasuredFile, open_images, padded_size, size_of
 from metrics.measures.alignment import Alignment
 from metrics.measures.answers import answers_from_scores
 from metrics.submissions import layout, rules
@@ -22,11 +23,10 @@ from metrics.submissions.problems import PredictionError, first_error, first_ids
 from scenegen.files.row_file import new_hdf5_file, writer_name
 from scenegen.files.schema import Column
 from scenegen.files.table import Table
-from scenegen.rooms.reader import RoomsFile
 
 
 class RoomPredictionWriter:
-    """Writes predicted geometry, and optionally normals, of the rooms of a file; a context manager.
+    """Writes predicted geometry, and optionally normals, of a file's images; a context manager.
 
     The file appears under its name when the block ends without an error and every row was given.
     Memory stays flat. Not to be shared between threads.
@@ -48,7 +48,7 @@ class RoomPredictionWriter:
         """Check the texts; the files are opened when the block begins.
 
         Args:
-            truth: the rooms file that is predicted, recorded as given.
+            truth: the file of rooms, or of measured truth, that is predicted; recorded as given.
             method, run: who predicts; runs of one method are averaged.
             alignment: what the method cannot know: "none", "median_scale", "scale" or
                 "scale_shift"; None for "none", or "scale_shift" of disparity.
@@ -111,10 +111,10 @@ class RoomPredictionWriter:
             raise PredictionError(self._path, "not open", "rows to be added inside the with block")
         row = self._checked_row(row)
         where = f"{self._path}: row {row}"
+        height, width = size_of(self._truth, row)
+        surface = np.ones((height, width), np.bool_)
         if self._truth.has_truth:
-            surface = np.isfinite(self._truth.read("depth", row))
-        else:
-            surface = np.ones((self._truth.spec.height, self._truth.spec.width), np.bool_)
+            surface = np.isfinite(self._truth.read("depth", row)[:height, :width])
         sizes = dict(zip(("y", "x"), ((size,) for size in surface.shape), strict=True))
         images = {"depth": depth, "disparity": disparity, "points": points, "normal": normal}
         values = {}
@@ -135,9 +135,18 @@ class RoomPredictionWriter:
             found, expected = ("one", "none") if name in values else ("none", "one")
             raise PredictionError(f"{where}: {name}", found, f"{expected}, as in the first row")
         self._fov.append(values.pop("fov_y_degrees", np.array(np.nan)))
-        self._table.append(values)
+        self._table.append({name: self._padded(image) for name, image in values.items()})
         self._rows.append(row)
         self._written[row] = True
+
+    def _padded(self, image: rules.Array) -> rules.Array:
+        """Return an image (h, w, ...) in the size to which those of the truth are padded."""
+        height, width = padded_size(self._truth)
+        if image.shape[:2] == (height, width):
+            return image
+        padded = np.zeros((height, width, *image.shape[2:]), image.dtype)
+        padded[: len(image), : image.shape[1]] = image
+        return padded
 
     def _check_kind(self, values: Mapping[str, rules.Array], where: str, surface: Any) -> None:
         """Raise PredictionError unless there is one geometry, as the alignment allows."""
@@ -155,7 +164,7 @@ class RoomPredictionWriter:
     @contextmanager
     def _opened(self) -> Iterator[None]:
         with (
-            RoomsFile(self._truth_path) as self._truth,
+            open_images(self._truth_path) as self._truth,
             new_hdf5_file(self._path, self._overwrite) as self._file,
         ):
             self._written = np.zeros(len(self._truth), np.bool_)
@@ -170,7 +179,12 @@ class RoomPredictionWriter:
     def _new_table(self, values: Mapping[str, rules.Array]) -> Table:
         columns = [
             # Without axes, which would be data sets of their own: readers go by the shape.
-            replace(column, shape=values[column.name].shape, axes=None, more=_shape(column))
+            replace(
+                column,
+                shape=self._padded(values[column.name]).shape,
+                axes=None,
+                more=_shape(column),
+            )
             for column in layout.COLUMNS["rooms"]
             if column.name in values and column.own_chunk
         ]
@@ -200,7 +214,11 @@ class RoomPredictionWriter:
         self._table.write_packed()
         for column in self._table.columns if len(missing) else ():
             file[column.name].resize(len(self._rows), axis=0)
-        file.attrs.update({**self._texts, "truth_fingerprint": self._truth.fingerprint})
+        texts = {**self._texts, "truth_fingerprint": self._truth.fingerprint}
+        if isinstance(self._truth, MeasuredFile):
+            texts["task"] = "measured"
+            del texts["shown"]  # there are no scenes of several views
+        file.attrs.update(texts)
         fov = {"fov_y_degrees": np.array(self._fov)} if "fov_y_degrees" in self._names else {}
         _write_columns(file, "rooms", {"row": np.array(self._rows), **fov})
 

@@ -9,6 +9,7 @@ import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from metrics.measured.reader import open_images
 from metrics.scoring.records import ScoreFile, Task
 from metrics.scoring.truth_digests import stated_truth
 from scenegen.common.errors import SceneGenError
@@ -54,11 +55,9 @@ def _stated_truth(file: ScoreFile, path: Path) -> tuple[Task, str | None] | None
     """Return what a file says that it is, if it is a truth of the task; else None."""
     try:
         trial.try_file(path)
-        if file.task == "rooms":
-            from scenegen.rooms.reader import RoomsFile
-
-            with RoomsFile(path) as rooms:
-                return stated_truth(rooms)
+        if file.task != "iqtt":
+            with open_images(path) as images:
+                return stated_truth(images)
         from iqtt.files.reader import AnswersFile
 
         with AnswersFile(path) as answers:

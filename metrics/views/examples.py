@@ -10,17 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.questions.specs import LETTERS
+from metrics.measured.reader import Images, MeasuredFile
 from metrics.measures.answers import ABSTAINED
 from metrics.scoring.geometry import depth_as_scored
+from metrics.scoring.measured_rows import depth_as_declared
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
-from metrics.views.pictures import Picture, data_url, view_pictures
+from metrics.views.pictures import Picture, data_url, depth_pictures, view_pictures
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.common.text_table import number
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.preview import srgb_bytes
-from scenegen.rooms.reader import RoomsFile
 
 if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
@@ -50,14 +51,12 @@ class Example:
 Lists = list[tuple[str, list[Example]]]  # titles and examples
 
 
-def examples_of(
-    scores: ScoreFile, truth: "RoomsFile | AnswersFile", submission: Predictions
-) -> Lists:
+def examples_of(scores: ScoreFile, truth: "Images | AnswersFile", submission: Predictions) -> Lists:
     """Return titles and examples: the best, median and worst scenes, or answers right and wrong.
 
     Raises OSError and FileFormatError where a file, all of which are open, cannot be read.
     """
-    if isinstance(truth, RoomsFile):
+    if isinstance(truth, Images):
         assert isinstance(submission, RoomPredictions)
         name = shown_score(scores)
         return _scenes(scores, truth, submission, name) if name else []
@@ -106,7 +105,7 @@ def chosen_scenes(
     return {title: entries.tolist() for title, entries in lists.items() if len(entries)}
 
 
-def _scenes(scores: ScoreFile, truth: RoomsFile, submission: RoomPredictions, name: str) -> Lists:
+def _scenes(scores: ScoreFile, truth: Images, submission: RoomPredictions, name: str) -> Lists:
     values = np.asarray(scores.items[name], float)
     chosen = chosen_scenes(scores.clusters, values, metric(name).higher_is_better)
     entries = [entry for entries in chosen.values() for entry in entries]
@@ -114,14 +113,14 @@ def _scenes(scores: ScoreFile, truth: RoomsFile, submission: RoomPredictions, na
     count = len(np.unique(scores.clusters[np.isfinite(values)]))
     lists: Lists = []
     for place, entries in chosen.items():
-        title = f"{place.capitalize()} {len(entries)} of {count} scenes by {metric(name).title}"
-        title = title if count > 1 else "The only scene"
+        of_all = f"{len(entries)} of {count} {scores.unit} by {metric(name).title}"
+        title = f"{place.capitalize()} {of_all}" if count > 1 else "The only scene"
         lists.append((title, [shown[entry] for entry in entries]))
     return lists
 
 
 def room_examples(
-    scores: ScoreFile, rooms: RoomsFile, predictions: RoomPredictions, entries: Sequence[int]
+    scores: ScoreFile, rooms: Images, predictions: RoomPredictions, entries: Sequence[int]
 ) -> Iterator[Example]:
     """Yield entries of a score file with the pictures of `pictures.view_pictures`.
 
@@ -138,9 +137,13 @@ def room_examples(
 
 
 def room_pictures(
-    rooms: RoomsFile, predictions: RoomPredictions, row: int, place: int
+    rooms: Images, predictions: RoomPredictions, row: int, place: int
 ) -> list[Picture]:
     """Return the pictures of a row; `place` is that of its prediction."""
+    if isinstance(rooms, MeasuredFile):
+        truth = rooms.view(row)
+        predicted = depth_as_declared(predictions.view(place), truth)
+        return depth_pictures(rooms.picture(row), truth.depth, predicted)
     true_depth = rooms.read("depth", row)
     fov_y_degrees = float(rooms.read("camera/fov_y_degrees", row))
     return view_pictures(
@@ -155,6 +158,8 @@ def room_pictures(
 
 def entry_name(scores: ScoreFile, entry: int) -> str:
     """Return scene, view and row of an entry, in words."""
+    if scores.task == "measured":
+        return f"row {int(scores.ids[entry])}"
     row, scene, view = (int(scores.items[n][entry]) for n in ("row", "scene_index", "view_index"))
     angles = scores.items.get("view_angle_degrees")
     known = angles is not None and np.isfinite(angles[entry])
@@ -165,7 +170,7 @@ def entry_name(scores: ScoreFile, entry: int) -> str:
 def _entry_scores(scores: ScoreFile, entry: int) -> str:
     return ", ".join(
         f"{metric(name).title} {number(float(scores.items[name][entry]))}"
-        for name in (AS_SEEN, *HEADLINE["rooms"])
+        for name in (AS_SEEN, *HEADLINE[scores.task])
         if name in scores.items and np.isfinite(scores.items[name][entry])
     )
 

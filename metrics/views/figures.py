@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measured.reader import Images, MeasuredFile, open_images
 from metrics.scoring.geometry import depth_as_scored
+from metrics.scoring.measured_rows import depth_as_declared
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import Score, ScoreFile
-from metrics.submissions.reader import RoomPredictions, open_predictions
+from metrics.submissions.reader import PredictedView, RoomPredictions, open_predictions
 from metrics.views.by_angle import angle_floors
 from metrics.views.plots import KINDS, LINE, kind_of, load_matplotlib
 from scenegen.common.errors import SceneGenError
@@ -24,9 +26,9 @@ from scenegen.common.names import did_you_mean
 from scenegen.files.new_file import written_beside
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.preview import srgb_bytes
-from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
+Line = tuple[Array, Array, Sequence[Array]]  # of a grid: picture, true depth, depths
 COLUMN, PAGE = 3.25, 6.75  # inches: a column, and both, of two-column papers
 SUFFIXES = (".pdf", ".svg", ".png")
 # The groupings that a figure can show, each with the words below it.
@@ -58,6 +60,7 @@ def draw_scores(
     name: str = "",
     width: float = COLUMN,
     overwrite: bool = False,
+    labels: Sequence[str] = (),
 ) -> None:
     """Draw one score of several methods: a dot and an interval each, and the floor, dashed.
 
@@ -65,13 +68,15 @@ def draw_scores(
         path: to write; its suffix is one of SUFFIXES.
         name: of the score; by default the first one of the headline that all files have.
         width: inches.
+        labels: of the files; by default the names of their methods.
 
     Raises FigureError where the files are of two tasks, or one lacks the score; OSError.
     """
     name = _common(files, name)
     floor = _floor(files[0], name)
     with _figure(path, overwrite, width, 0.35 + 0.17 * len(files)) as axes:
-        for place, (file, label) in enumerate(zip(files, labels_of(files), strict=True)):
+        named = zip(files, labels or labels_of(files), strict=True)
+        for place, (file, label) in enumerate(named):
             color, marker = KINDS[kind_of(place)]
             _dot(axes, file.metrics[name], len(files) - place, color, marker, along="y")
             axes.text(-0.02, len(files) - place, label, ha="right", va="center",
@@ -131,7 +136,7 @@ def draw_grid(
     width: float = PAGE,
     overwrite: bool = False,
 ) -> None:
-    """Draw rows of a rooms file: image, true depth, then depth and error of each submission.
+    """Draw rows of a truth: image, true depth, then depth and error of each submission.
 
     All depths share the range of the true ones. Errors are shown from none to a tenth of that
     range, or more. Depth known up to a scale or shift is aligned as it is for its scores.
@@ -141,18 +146,14 @@ def draw_grid(
     """
     opened = [open_predictions(path) for path in submissions]
     try:
-        with RoomsFile(truth) as rooms:
+        with open_images(truth) as rooms:
             lines = []
             for row in rows:
                 if not 0 <= row < len(rooms):
                     raise FigureError(
                         f"{truth}: row {row}", "no such row", f"0 to {len(rooms) - 1}"
                     )
-                true = rooms.read("depth", row).astype(np.float64)
-                picture = srgb_bytes(np.nan_to_num(decode_image(rooms.read("image", row))))
-                fov = float(rooms.read("camera/fov_y_degrees", row))
-                depths = [_predicted(file, row, true, fov) for file in opened]
-                lines.append((picture, true, depths))
+                lines.append(_line(rooms, row, [_view(file, row) for file in opened]))
     finally:
         for file in opened:
             file.close()
@@ -168,18 +169,30 @@ def labels_of(files: Sequence[ScoreFile]) -> list[str]:
     ]
 
 
-def _predicted(file: Any, row: int, true: Array, fov_y_degrees: float) -> Array:
+def _line(rooms: Images, row: int, views: Sequence[PredictedView]) -> Line:
+    """Return picture, true depth, and depths as scored, of a row."""
+    if isinstance(rooms, MeasuredFile):
+        truth = rooms.view(row)
+        depths = [depth_as_declared(view, truth) for view in views]
+        return rooms.picture(row), truth.depth.astype(np.float64), depths
+    true = rooms.read("depth", row).astype(np.float64)
+    picture = srgb_bytes(np.nan_to_num(decode_image(rooms.read("image", row))))
+    fov = float(rooms.read("camera/fov_y_degrees", row))
+    return picture, true, [depth_as_scored(view, true, fov) for view in views]
+
+
+def _view(file: Any, row: int) -> PredictedView:
     if not isinstance(file, RoomPredictions):
         raise FigureError(file.path, "answers to questions", "predictions of rooms")
     places = np.flatnonzero(file.rows == row)
     if not len(places):
         raise FigureError(f"{file.path}: row {row}", "no prediction", "one of this row")
-    return depth_as_scored(file.view(int(places[0])), true, fov_y_degrees)
+    return file.view(int(places[0]))
 
 
 def _grid(
     path: str | Path,
-    lines: Sequence[tuple[Array, Array, Sequence[Array]]],
+    lines: Sequence[Line],
     methods: Sequence[str],
     width: float,
     overwrite: bool,

@@ -82,7 +82,7 @@ def headline_section(files: Sequence[ScoreFile]) -> Section:
     kept = [i for i in range(len(head)) if i not in empty]
     cells = ([row[i] for i in kept] for row in rows)
     table = make_table("Headline", [head[i] for i in kept], cells)
-    over = "scenes" if scores.task == "rooms" else "shapes or questions"
+    over = scores.unit if scores.task != "iqtt" else "shapes or questions"
     notes = unread_notes(files)
     notes += [f"{SKILL} {what_the_floor_is(scores)}"] if scores.skills else []
     notes += [

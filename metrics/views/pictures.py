@@ -52,11 +52,9 @@ def view_pictures(
     fov_y_degrees: float,
     predicted_normal: Array | None = None,
 ) -> list[Picture]:
-    """Return image, depths, error and normals of one view.
+    """Return those of `depth_pictures`, and normals, true and predicted, of one view of a room.
 
-    Both depths share one scale, from the truth's nearest to its farthest. The error |predicted -
-    true| runs from none to a tenth of that range, or more. Normals are shown as (x, y, z) = (red,
-    green, blue). Pixels that are not scored are grey. No value needs to be finite.
+    Normals are shown as (x, y, z) = (red, green, blue). No value needs to be finite.
 
     Args:
         radiance: (H, W, 3); true, predicted: planar depth, (H, W), scene units.
@@ -65,30 +63,44 @@ def view_pictures(
         predicted_normal: camera frame, (H, W, 3), of any length.
     """
     scored = np.isfinite(true)
+    if predicted_normal is None:
+        drawn = np.clip(np.nan_to_num(predicted.astype(np.float64)), -FARTHEST, FARTHEST)
+        name, normal = DERIVED_NORMALS, normals_from_depth(drawn, fov_y_degrees, scored)[0]
+    else:
+        name, normal = NORMALS, predicted_normal
+    pictures = {TRUE_NORMALS: _normals(true_normal), name: _normals(normal)}
+    for picture in pictures.values():
+        picture[~scored] = NOT_SCORED
+    return [
+        *depth_pictures(srgb_bytes(np.nan_to_num(radiance)), true, predicted),
+        *(Picture(caption, data_url(pixels)) for caption, pixels in pictures.items()),
+    ]
+
+
+def depth_pictures(shown: NDArray[np.uint8], true: Array, predicted: Array) -> list[Picture]:
+    """Return an image (H, W, 3), sRGB bytes, depths (H, W), true and predicted, and their error.
+
+    Both depths share one scale, from the truth's nearest to its farthest. The error |predicted -
+    true| runs from none to a tenth of that range, or more. Pixels that are not scored are grey.
+    """
+    scored = np.isfinite(true)
     near, far = (true[scored].min(), true[scored].max()) if scored.any() else (0.0, 1.0)
     span = max(float(far - near), 1e-9)
     drawn = np.clip(np.nan_to_num(predicted.astype(np.float64)), -FARTHEST, FARTHEST)
     error = np.abs(predicted_or_far(predicted) - true) / (0.1 * span)
-    if predicted_normal is None:
-        name, normal = DERIVED_NORMALS, normals_from_depth(drawn, fov_y_degrees, scored)[0]
-    else:
-        name, normal = NORMALS, predicted_normal
     pictures = {
         TRUE_DEPTH: _coloured((true - near) / span, "depth"),
         DEPTH: _coloured((drawn - near) / span, "depth"),
         ERROR: _coloured(error, "error"),
-        TRUE_NORMALS: _normals(true_normal),
-        name: _normals(normal),
     }
     for picture in pictures.values():
         picture[~scored] = NOT_SCORED
     depths = {"bar": "depth", "ends": (number(float(near)), number(float(far)))}
     errors = {"bar": "error", "ends": ("0", f"≥ {0.1 * span:.2g}")}
     bars: dict[str, dict[str, Any]] = {TRUE_DEPTH: depths, DEPTH: depths, ERROR: errors}
-    shown = {IMAGE: srgb_bytes(np.nan_to_num(radiance)), **pictures}
     return [
         Picture(caption, data_url(pixels), **bars.get(caption, {}))
-        for caption, pixels in shown.items()
+        for caption, pixels in {IMAGE: shown, **pictures}.items()
     ]
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from metrics.measured.reader import Images
 from metrics.score_file import read_scores
 from metrics.scoring.estimates import CONFIDENCE
 from metrics.scoring.evaluate import Runs
@@ -24,7 +25,6 @@ from metrics.views.score_tables import (
     source_text,
 )
 from metrics.views.table import make_table
-from scenegen.rooms.reader import RoomsFile
 
 if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
@@ -52,7 +52,7 @@ def html_report(
     where a picture's row cannot be read.
     """
     for file in beside:
-        require_truth(file, scores.truth, scores.method)
+        require_truth(file, scores.truth, scores.method, scores.protocol)
     files = [scores, *beside]
     sections = [headline_section(files)]
     if scores.task == "iqtt":
@@ -60,8 +60,9 @@ def html_report(
         remark = "One answer shows the shape of the reference, turned. The questions are spread"
         remark, title = f"{remark} evenly over the file.", "Questions"
     else:
-        remark, title = ROOMS_REMARK, "Scenes"
-        remark += " Of each scene it is the view whose score is nearest to the scene's mean."
+        remark, title = ROOMS_REMARK, "Scenes" if scores.task == "rooms" else "Images"
+        if scores.grouped:
+            remark += f" Of several in {scores.unit} the one nearest to their mean is shown."
     examples = [] if runs is None else examples_of(scores, runs.truth, runs.files[0])
     if examples:
         sections.append(Section(title, remarks=[remark], examples=examples))
@@ -85,7 +86,7 @@ def curves_section(files: Sequence[ScoreFile]) -> list[Section]:
     return [Section(title, charts=charts, notes=[CURVES_REMARK])] if charts else []
 
 
-def read_beside(paths: Sequence[str | Path], truth: "RoomsFile | AnswersFile") -> list[ScoreFile]:
+def read_beside(paths: Sequence[str | Path], truth: "Images | AnswersFile") -> list[ScoreFile]:
     """Read score files to show beside those of a truth that is about to be scored against.
 
     Raises OtherTruthError where one is of another truth; of those that state no digest, as they
@@ -99,7 +100,7 @@ def read_beside(paths: Sequence[str | Path], truth: "RoomsFile | AnswersFile") -
 
 
 def _distributions(scores: ScoreFile) -> Iterator[Chart]:
-    for name in (*HEADLINE["rooms"], "normal_mean_degrees", "derived_normal_mean_degrees"):
+    for name in (*HEADLINE[scores.task], "normal_mean_degrees", "derived_normal_mean_degrees"):
         if name in scores.items:
             values = np.asarray(scores.items[name], float)
             chart = histogram(values, metric(name).title, metric(name).unit)
@@ -110,7 +111,7 @@ def _distributions(scores: ScoreFile) -> Iterator[Chart]:
 def _all_numbers(scores: ScoreFile) -> Iterator[Section]:
     """Yield what is folded at the end: all scores, their definitions, and where they come from."""
     yield Section("All numbers")
-    for table in group_tables(scores) if scores.task == "rooms" else ():
+    for table in group_tables(scores) if scores.task != "iqtt" else ():
         yield Section(table.title.capitalize(), tables=[table], folded=True)
     title = f"All scores ({len(scores.metrics)})"
     yield Section(title, tables=[all_scores(scores)], folded=True)

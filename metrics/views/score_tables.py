@@ -9,6 +9,7 @@ from typing import get_args
 import numpy as np
 
 from iqtt.questions.specs import LETTERS
+from metrics.measured.protocols import BY_NAME, DECLARED
 from metrics.measures.alignment import Alignment
 from metrics.measures.statistics import FEW_CLUSTERS
 from metrics.scoring.estimates import CONFIDENCE, question_skill
@@ -45,7 +46,7 @@ GROUP_TITLES = {
     "by_circle": "circular: right in every order of the answers",
 }
 ALIGNMENT_SCORES = ("abs_rel", "rmse", "delta_1")
-GROUP_SCORES = {"rooms": HEADLINE["rooms"], "iqtt": ("iqtt_accuracy",)}
+GROUP_SCORES = HEADLINE | {"iqtt": ("iqtt_accuracy",)}
 
 
 def text_report(
@@ -239,6 +240,9 @@ def title_of(scores: ScoreFile) -> str:
     size = f"{len(scores.ids)} questions"
     if scores.task == "rooms":
         size = f"{len(scores.ids)} images of {len(np.unique(scores.clusters))} scenes"
+    if scores.task == "measured":
+        size = f"{len(scores.ids)} images"
+        size += f" in {len(np.unique(scores.clusters))} groups" if scores.grouped else ""
     runs = f", mean of {scores.runs} runs" if scores.runs > 1 else ""
     return f"{plain(scores.method)}: {size} of {plain(scores.meta.truth_path)}{runs}"
 
@@ -253,11 +257,14 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
         yield f"{SKILL} {what_the_floor_is(scores)}"
     yield from partner_sentences(scores)
     bootstrap = f"{meta.resamples} resamples, seed {meta.seed}"
-    if scores.task == "rooms":
+    if scores.task != "iqtt":
         claim = f"alignment: {scores.alignment}"
         if scores.alignment != "none":
             claim += ", fitted to the truth of each image before all scores"
-        yield f"intervals: bootstrap over scenes, {bootstrap}; {claim}"
+        yield f"intervals: bootstrap over {scores.unit}, {bootstrap}; {claim}"
+        if scores.protocol:
+            yield f"protocol {scores.protocol}: {BY_NAME[scores.protocol].source}; 1 unit is 1 m"
+            yield from measured_sentences(scores)
     else:
         how = "Wilson's" if scores.runs == 1 else f"bootstrap, {bootstrap}"
         over = "questions, as the truth does not tell their shapes"
@@ -275,6 +282,17 @@ def notes_of(scores: ScoreFile) -> Iterator[str]:
     )
     runs = ", ".join(f"{run.path} {run.sha256[:12]}" for run in meta.submissions)
     yield f"submissions: {plain(runs)}"
+
+
+def measured_sentences(scores: ScoreFile) -> Iterator[str]:
+    """Yield what the truth of measured images cannot tell."""
+    yield "scores of objects: none, as nobody marked them"
+    if not scores.grouped:
+        yield "images count as independent, as no groups are known; frames of a drive are alike"
+    if scores.protocol == DECLARED.name and "boundary_f1" not in scores.items:
+        yield "boundaries: none, as depth is known at too few pixels"
+    if scores.protocol == DECLARED.name and "normal_mean_degrees" not in scores.items:
+        yield "normals: none, unless both the truth and the predictions have them"
 
 
 def unread_notes(files: Sequence[ScoreFile]) -> list[str]:
@@ -309,8 +327,8 @@ def partner_sentences(scores: ScoreFile) -> list[str]:
 
 def few_clusters(scores: ScoreFile) -> list[str]:
     """Return a warning where bootstrapped intervals rest on too few scenes or shapes; else none."""
-    labels = scores.clusters if scores.task == "rooms" else scores.items.get("shape", scores.ids)
-    units = "scenes" if scores.task == "rooms" else "shapes"
+    labels = scores.items.get("shape", scores.clusters)
+    units = "shapes" if scores.task == "iqtt" else scores.unit
     return too_few_warning(len(np.unique(labels)), units) if scores.meta.resamples else []
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import back_project, pixel_size, transform_points, transform_vectors
+from scenegen.camera import pixel_size, transform_points, transform_vectors
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.description.scenes import PlacedObject, SceneSpec
 from scenegen.description.specs import BUILT_IN, DatasetSpec
@@ -59,7 +59,7 @@ def has_surfel(depth: Array) -> Array:
 
 def surfels_of(room: Room, predicted: Array | None = None) -> Surfels:
     """Return the surfels of a view, or of other points, (H, W, 3), camera frame, scene units."""
-    image = back_project(room.depth, room.fov_y_degrees) if predicted is None else predicted
+    image = room.points if predicted is None else predicted
     depth = -image[..., 2]
     seen = has_surfel(depth) & (np.abs(image) <= FARTHEST).all(axis=-1)
     points = image[seen]

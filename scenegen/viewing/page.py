@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,6 +52,12 @@ MOST_REASONS = 3  # why meshes are missing
 CLICK = 3.0  # pixels of the screen by which a click may miss
 NOTHING_CLICKED = "Click on a surfel to read its values."
 STYLE = "margin:0.4em 0.8em;font-size:0.85em;overflow-wrap:anywhere"
+
+
+class Rooms(Protocol):
+    """Views by their rows: a file of rooms, or what is shown as one."""
+
+    def __getitem__(self, row: int) -> Room: ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +107,7 @@ class RoomsPage:
     def __init__(
         self,
         server: "ViserServer",
-        rooms: RoomsFile,
+        rooms: Rooms,
         shape_of: ShapeOf,
         scenes: Scenes,
         predicted: Predicted | None = None,

@@ -1,26 +1,30 @@
 """A hint on numbers that stand for "no value", such as 1e10, 65504 or 0, among depths."""
 
+import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measured.reader import Images, padded_size
 from metrics.submissions.problems import HINT, Problem, first_ids
 from metrics.submissions.reader import RoomPredictions
 from metrics.submissions.rules import LARGEST
 from scenegen.common.errors import FileFormatError
-from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
-ROWS = 256  # that are looked at, spread evenly
+ROWS = 256  # that are looked at, spread evenly; fewer of large images
+MOST_PIXELS = ROWS * 2**16  # of all of them
+FEWEST_ROWS = 24
 FAR = 10.0  # spreads of the other values by which a number that several pixels share stands out
 VERY_FAR = 10_000.0  # the same, of a number at a single pixel
 
 
-def no_value_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]:
+def no_value_hints(predictions: RoomPredictions, truth: Images) -> list[Problem]:
     """Return a hint where pixels of true surfaces hold a number that stands for "no value"."""
     entries = np.flatnonzero((predictions.rows >= 0) & (predictions.rows < len(truth)))
-    spread = np.linspace(0, max(0, len(entries) - 1), ROWS).astype(np.int64)
+    rows = max(FEWEST_ROWS, min(ROWS, MOST_PIXELS // math.prod(padded_size(truth))))
+    spread = np.linspace(0, max(0, len(entries) - 1), rows).astype(np.int64)
     zero_is_none = predictions.kind != "disparity" and predictions.alignment != "scale_shift"
     images: dict[float, list[tuple[int, int]]] = {}  # by mark, its rows and their pixels
     for entry in entries[np.unique(spread)].tolist() if len(entries) else []:
@@ -39,13 +43,13 @@ def no_value_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Probl
     if not images:
         return []
     value, found = max(images.items(), key=lambda item: len(item[1]))
-    pixels, rows = sum(count for _, count in found), [row for row, _ in found]
+    pixels, ids = sum(count for _, count in found), [row for row, _ in found]
     text = (
-        f"{value:g} at {pixels:,} pixels of {len(rows)} images looks like a mark for no value;"
+        f"{value:g} at {pixels:,} pixels of {len(ids)} images looks like a mark for no value;"
         f" say --invalid {value:g} --missing nearest to bench import"
     )
     expected = "a value of the surface at each pixel"
-    return [Problem(predictions.kind, HINT, expected, text, first_ids(rows))]
+    return [Problem(predictions.kind, HINT, expected, text, first_ids(ids))]
 
 
 def no_value_mark(values: Array, zero_is_none: bool) -> tuple[float, int] | None:

@@ -6,15 +6,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measured.reader import Images, MeasuredFile
 from metrics.submissions.reader import RoomPredictions
 from metrics.submissions.rules import LARGEST
 from scenegen.camera import pixel_directions, pixel_size
 from scenegen.common.errors import FileFormatError
-from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 ROWS = 24
+FEWEST_PIXELS = 20  # of measured depth in an image
 SIDE = 32  # pixels per side that hints look at, at most twice as many
+SPARSE_SIDE = 256  # the same, where depth is known at few pixels
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +60,7 @@ class Sample:
         return np.asarray((self.rays * self.true_depth[..., None])[self.mask])
 
 
-def sample_rooms(predictions: RoomPredictions, truth: RoomsFile) -> list[Sample]:
+def sample_rooms(predictions: RoomPredictions, truth: Images) -> list[Sample]:
     """Return the usable ones of some rows that are spread evenly over a submission."""
     entries = np.flatnonzero((predictions.rows >= 0) & (predictions.rows < len(truth)))
     if len(entries) == 0:
@@ -76,7 +78,7 @@ def mirrored_grid(count: int, about: int) -> Array:
     return np.unique(np.concatenate([first, count - 1 - first]))
 
 
-def _sample(predictions: RoomPredictions, i: int, truth: RoomsFile) -> Sample | None:
+def _sample(predictions: RoomPredictions, i: int, truth: Images) -> Sample | None:
     row = int(predictions.rows[i])
     try:
         disparity = predictions.kind == "disparity"
@@ -84,6 +86,8 @@ def _sample(predictions: RoomPredictions, i: int, truth: RoomsFile) -> Sample | 
         normal = predictions.normal(i) if predictions.has_normals else None
     except FileFormatError:
         return None
+    if isinstance(truth, MeasuredFile):
+        return _measured_sample(depth, truth, row)
     height, width = depth.shape
     grid = np.ix_(mirrored_grid(height, SIDE), mirrored_grid(width, SIDE))
     fov = float(truth.read("camera/fov_y_degrees", row))
@@ -108,3 +112,21 @@ def _sample(predictions: RoomPredictions, i: int, truth: RoomsFile) -> Sample | 
         pose[:3, 3],
         fov,
     )
+
+
+def _measured_sample(depth: Array, truth: MeasuredFile, row: int) -> Sample | None:
+    """Return a sample of an image whose truth may be sparse, so that more pixels are looked at."""
+    height, width = truth.size(row)
+    side = SIDE if truth.dense else SPARSE_SIDE
+    grid = np.ix_(mirrored_grid(height, side), mirrored_grid(width, side))
+    depth, true = depth[:height, :width][grid], truth.read("depth", row)[:height, :width][grid]
+    usable = np.isfinite(true) & (np.abs(depth) <= LARGEST)
+    if np.count_nonzero(usable) < FEWEST_PIXELS:
+        return None
+    rays, no = truth.rays(row, height, width), np.broadcast_to(np.nan, (*usable.shape, 3))
+    # Without a camera, rays are those of no field of view: a distance along them is the depth.
+    rays = np.broadcast_to((0.0, 0.0, -1.0), no.shape) if rays is None else rays[grid]
+    return Sample(
+        depth, true.astype(np.float64), usable, rays, 0.0, None, None, no, np.eye(3), np.zeros(3),
+        np.nan,
+    )  # fmt: skip

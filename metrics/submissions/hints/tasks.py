@@ -1,22 +1,23 @@
-"""All hints on a submission of rooms, and on answers to questions: scores that are distances."""
+"""All hints on a submission of images, and on answers to questions: scores that are distances."""
 
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measured.reader import Images, MeasuredFile
 from metrics.measures.statistics import wilson_interval
 from metrics.submissions.hints.depth import depth_hints, disparity_hints
 from metrics.submissions.hints.normals import normal_hints
 from metrics.submissions.hints.order import order_hints
 from metrics.submissions.hints.points import point_hints
 from metrics.submissions.hints.samples import sample_rooms
+from metrics.submissions.hints.shifts import shift_hints
 from metrics.submissions.problems import HINT, Problem
 from metrics.submissions.reader import QuestionPredictions, RoomPredictions
-from scenegen.rooms.reader import RoomsFile
 
 
-def room_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]:
+def room_hints(predictions: RoomPredictions, truth: Images) -> list[Problem]:
     """Return hints on a submission whose images have the size of the truth's.
 
     They rest on 24 images for depth and normals, and on a few pixels of at most 4096 rows of the
@@ -28,6 +29,8 @@ def room_hints(predictions: RoomPredictions, truth: RoomsFile) -> list[Problem]:
         hints = disparity_hints(samples)
     else:
         hints = depth_hints(samples, predictions.alignment, predictions.kind)
+    if isinstance(truth, MeasuredFile):
+        return hints + shift_hints(predictions, truth)
     if predictions.kind == "points":
         hints += point_hints(samples, predictions.alignment)
     if predictions.has_normals:

@@ -20,6 +20,7 @@ from metrics.measures.statistics import (
     cluster_means,
     linearised_means,
 )
+from metrics.scoring.estimates import pooled_means_of
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import ScoreFile
 from metrics.views.compare.paired_tests import (
@@ -146,8 +147,8 @@ def compare(
         return Difference(
             metric=name,
             method=labels[i],
-            value=float(cluster_means(a, paired.clusters).mean()),
-            reference_value=float(cluster_means(b, paired.clusters).mean()),
+            value=paired.value,
+            reference_value=paired.reference_value,
             difference=float(apart.mean()),
             low=low,
             high=high,
@@ -195,7 +196,8 @@ class _Paired(NamedTuple):
     """A score of a method and of the reference, over the M rows that have it.
 
     Attributes:
-        values, reference_values, clusters: of each row, (M,).
+        values, reference_values: of each row, (M,).
+        value, reference_value: their means, as score files have them.
         apart: differences of scenes, or of questions, (S,).
         means, sums: differences of what is independent, for intervals and for tests: of scenes, or
             of shapes that are asked about.
@@ -203,7 +205,8 @@ class _Paired(NamedTuple):
 
     values: Array
     reference_values: Array
-    clusters: NDArray[np.int64]
+    value: float
+    reference_value: float
     apart: Array
     means: Array
     sums: Array
@@ -215,13 +218,21 @@ def _paired(
     """Return a score of two files; `orders` are from `common_rows`. Raises as `pair`."""
     a, b, there = pair(file, reference, name, orders)
     clusters = reference.clusters[orders[1]][there]
+    weights = reference.weights
+    if weights is not None:
+        weight = weights[orders[1]][there]
+        ours, theirs = (pooled_means_of(name, v, clusters, weight) for v in (a, b))
+        apart = ours - theirs
+        value, reference_value = float(ours.mean()), float(theirs.mean())
+        return _Paired(a, b, value, reference_value, apart, apart, apart)
     apart = cluster_means(a - b, clusters)
+    x, y = (float(cluster_means(values, clusters).mean()) for values in (a, b))
     if reference.task == "rooms":
-        return _Paired(a, b, clusters, apart, apart, apart)
+        return _Paired(a, b, x, y, apart, apart, apart)
     shapes = reference.items.get("shape", reference.ids)[orders[1]][there]
     index = np.unique(shapes, return_inverse=True)[1]
     sums = np.bincount(index, apart).astype(np.float64)
-    return _Paired(a, b, clusters, apart, linearised_means(apart, shapes)[:, 0], sums)
+    return _Paired(a, b, x, y, apart, linearised_means(apart, shapes)[:, 0], sums)
 
 
 def _interval(means: Array, seed: int, resamples: int) -> tuple[float | None, float | None]:
@@ -269,10 +280,10 @@ def _notes(
             if seen.setdefault(submission.sha256, label) != label:
                 yield f"{label} and {seen[submission.sha256]} were scored from the same submission"
     if not all(file.comparable for file in files):
-        unit = "rows" if files[0].task == "rooms" else "questions"
+        unit = "questions" if files[0].task == "iqtt" else "rows"
         yield f"compared over the {items} {unit} that all of the files score"
-    if files[0].task == "rooms" and least_p_value(clusters) > ALPHA:
+    if files[0].task != "iqtt" and least_p_value(clusters) > ALPHA:
         yield (
-            f"{clusters} scenes cannot show any difference: the least possible p-value is"
+            f"{clusters} {files[0].unit} cannot show any difference: the least possible p-value is"
             f" {least_p_value(clusters):.3g}"
         )

@@ -34,7 +34,7 @@ def require_same_test(
         raise ComparisonError("comparison", f"{len(files)} score file", "two or more")
     first = files[0]
     for file in files:
-        require_truth(file, first.truth, first.place)
+        require_truth(file, first.truth, first.place, first.protocol)
         if not file.comparable and not allow_incomparable:
             why = "; ".join(file.warnings) or "not comparable"
             raise ComparisonError(
@@ -46,7 +46,7 @@ def require_same_test(
 
     names = tuple(dict.fromkeys(metrics or shown() or HEADLINE[first.task]))
     for name in names:
-        if metric(name).task != first.task:
+        if not metric(name).suits(first.task):
             raise ComparisonError("metric", name, f"a score of task {first.task!r}")
     older = [file for file in files if file.older]
     others = [name for name in names if changed(name)]

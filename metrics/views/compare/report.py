@@ -6,6 +6,7 @@ from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
 
+from metrics.measured.reader import open_images
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
@@ -45,7 +46,6 @@ from metrics.views.score_tables import (
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import Interval, number
-from scenegen.rooms.reader import RoomsFile
 
 FORMAT_NAME = "pix2shape-bench/comparison"
 FORMAT_VERSION = "1.0"
@@ -122,6 +122,9 @@ def _size(comparison: Comparison) -> str:
     """Return over how many items methods are compared, in words."""
     if comparison.task == "rooms":
         return f"{comparison.items:,} images of {comparison.clusters:,} scenes"
+    if comparison.task == "measured":
+        groups = f" in {comparison.clusters:,} groups"
+        return f"{comparison.items:,} images" + groups * (comparison.clusters < comparison.items)
     return f"{comparison.items:,} questions"
 
 
@@ -174,8 +177,8 @@ def _probability(p: float) -> str:
 def _legend(comparison: Comparison) -> list[str]:
     """Return in sentences what the columns of a comparison say."""
     tests = {d.test for d in comparison.differences}
-    rooms = comparison.task == "rooms"
-    items, apart = ("scenes", "scenes") if rooms else ("questions", "shapes")
+    of_task = {"rooms": ("scenes", "scenes"), "measured": ("groups", "groups")}
+    items, apart = of_task.get(comparison.task, ("questions", "shapes"))
     if len(tests) > 1:
         test = "exact McNemar test; sign flips for means over several runs"
     elif tests == {SIGN_FLIP}:
@@ -192,7 +195,9 @@ def _legend(comparison: Comparison) -> list[str]:
         " as the differences spread here; none: no difference, or none can be told.",
         *(
             f"warning: {text}"
-            for text in (too_few_warning(comparison.clusters, "scenes") if rooms else ())
+            for text in (
+                too_few_warning(comparison.clusters, items) if items != "questions" else ()
+            )
         ),
     ]
 
@@ -214,10 +219,10 @@ def html_report(
     OSError and FileFormatError where a picture's row cannot be read.
     """
     _require_scored(files, truth, submissions)
-    rooms = comparison.task == "rooms"
+    images = comparison.task != "iqtt"
     digest = comparison.truth_digest[:12]
     basis = f"Over {_size(comparison)}, truth {digest}; paired tests at 5%, corrected."
-    examples = _examples(comparison, files, truth, submissions) if rooms else []
+    examples = _examples(comparison, files, truth, submissions) if images else []
     sections = [
         Section(
             "",
@@ -231,11 +236,12 @@ def html_report(
             notes=[*_legend(comparison), *comparison.notes],
         ),
     ]
-    if rooms:
+    if images:
         remark = ROOMS_REMARK if examples else _NO_PICTURES
         sections.append(Section("Scenes", remarks=[remark], examples=examples))
+    if comparison.task == "rooms":
         sections += curves_section(files)
-    else:
+    elif not images:
         sections += kinds_sections(files)
     return html_page(
         f"Compared with {comparison.reference}",
@@ -313,7 +319,8 @@ def _examples(
     score, labels = metric(name), [names[i] for i, path in enumerate(paths) if path is not None]
     chosen = chosen_scenes(reference.clusters[orders[0]], apart, score.higher_is_better)
     with ExitStack() as stack:
-        rooms = stack.enter_context(RoomsFile(where))
+        rooms = open_images(where)
+        stack.enter_context(rooms)
         opened = [stack.enter_context(open_predictions(path)) for _, path in there]
         seen_in = {
             place: [
@@ -325,7 +332,7 @@ def _examples(
         }
     lists: Lists = []
     for place, entries in chosen.items():
-        scenes = f"{len(entries)} scenes" if len(entries) > 1 else "1 scene"
+        scenes = f"{len(entries)} {reference.unit if len(entries) > 1 else reference.unit[:-1]}"
         title = f"{scenes} by the difference in {score.title}, {_LISTS[place]}: "
         examples = [
             Example(

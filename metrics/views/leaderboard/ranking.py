@@ -125,18 +125,18 @@ def rankings(
     ComparisonError where they disagree about its scenes, and UnknownMetricError.
     """
     _require_once(files)
-    tasks = {name: metric(name).task for name in metrics or ()}
-    groups: dict[tuple[tuple[Task, str], Shown | None, bool], list[ScoreFile]] = {}
+    wanted = {name: metric(name) for name in metrics or ()}
+    groups: dict[tuple[tuple[Task, str, str], Shown | None, bool], list[ScoreFile]] = {}
     for file in files:
-        key = (file.truth, file.shown_of_several, file.older)
+        key = ((*file.truth, file.protocol), file.shown_of_several, file.older)
         groups.setdefault(key, []).append(file)
     ranked = []
     for (truth, seen, older), members in groups.items():
         task = truth[0]
-        together = [file for file in files if (file.truth, file.older) == (truth, older)]
+        together = [f for f in files if (*f.truth, f.protocol, f.older) == (*truth, older)]
         _require_same_rows(together)
         require_same_floors(together)
-        names = [name for name in tasks if tasks[name] == task]
+        names = [name for name, score in wanted.items() if score.suits(task)]
         behind_first = sorted(HEADLINE[task], key=lambda name: name != BEHIND)
         headline = [n for n in behind_first if n != BEHIND or seen in ("first_view", "no_view")]
         there = [n for n in headline if any(n in file.metrics for file in members)]
@@ -150,7 +150,8 @@ def _require_once(files: Sequence[ScoreFile]) -> None:
     """Raise LeaderboardError where two files hold scores of the same submissions."""
     for first, second in itertools.combinations(files, 2):
         runs, others = ({run.sha256 for run in file.meta.submissions} for file in (first, second))
-        if runs == others and first.truth == second.truth:
+        same = (first.truth, first.protocol) == (second.truth, second.protocol)
+        if runs == others and same:
             found = f"scores of the same submissions as {first.place}"
             raise LeaderboardError(second.place, found, "each submission once")
 
@@ -305,14 +306,14 @@ def _by_key(file: ScoreFile) -> dict[str, Score | Skill]:
 def _why_none_is_told_apart(file: ScoreFile, key: str) -> str:
     """Return in a sentence why a test set cannot tell methods apart by a column; or nothing."""
     name = key.removeprefix(SKILL_OF)
-    if file.task != "rooms" or name not in file.metrics:
+    if file.task == "iqtt" or name not in file.metrics:
         return ""
     of_objects = [name for name in OBJECT_SCORES if name in file.items]
     scenes, scored = len(np.unique(file.clusters)), file.metrics[name].n
     if of_objects and not file.metrics.keys() & set(of_objects):
         why = "no image shows an object that counts, so the empty room is the truth"
     elif scored < 2:
-        why = f"only {scored} of {scenes} scenes has a score of {metric(name).title}"
+        why = f"only {scored} of {scenes} {file.unit} has a score of {metric(name).title}"
     else:
         return ""
     return f"This test set cannot tell methods apart: {why}. No method has a rank."
@@ -332,6 +333,9 @@ def _title(file: ScoreFile) -> str:
     if file.task == "iqtt":
         kind = f" of the kind {plain(*file.by_distractor)}" if len(file.by_distractor) == 1 else ""
         return f"Mental rotation: {len(file.ids):,} questions{kind}, {name}"
+    if file.task == "measured":
+        groups = f" of {len(np.unique(file.clusters)):,} groups" if file.grouped else ""
+        return f"Measured depth: {len(file.ids):,} images{groups}, {name}, protocol {file.protocol}"
     task = {"first_view": "Rooms from the first view", "no_view": "Rooms from no view"}.get(
         file.shown_of_several or "", "Rooms"
     )
@@ -358,8 +362,9 @@ def _label(file: ScoreFile, name: str, supervised: bool) -> str:
 def _notes(files: Sequence[ScoreFile], key: str) -> Iterator[str]:
     first, name = files[0], key.removeprefix(SKILL_OF)
     truth = f", truth {first.meta.truth_digest[:12]}"
-    if first.task == "rooms":
-        yield f"{len(first.ids):,} images of {len(np.unique(first.clusters)):,} scenes{truth}."
+    if first.task != "iqtt":
+        clusters = f"{len(np.unique(first.clusters)):,} {first.unit}"
+        yield f"{len(first.ids):,} images of {clusters}{truth}."
         if first.older:
             yield (
                 "These are files of format 1.0, in which Chamfer, Hausdorff and others are defined"
@@ -374,17 +379,18 @@ def _notes(files: Sequence[ScoreFile], key: str) -> Iterator[str]:
         yield f"{len(first.ids):,} questions{truth}; chance is {chance:.4f}."
     if any(file.skills for file in files):
         yield f"{SKILL} {what_the_floor_is(first)}"
-    over = "shapes" if "shape" in first.items else "questions"
     yield (
-        f"[low, high]: {INTERVAL} over {'scenes' if first.task == 'rooms' else over}."
+        f"[low, high]: {INTERVAL} over {first.unit}."
         " ±: standard deviation over training runs. Bold: better than the next best method, and the"
         " 95% interval of their paired difference does not hold 0."
     )
     yield SHARED
     yield from (f"{file.method}: {text}." for file in files for text in floor_sentences(file))
-    scored = first.metrics[name].n if first.task == "rooms" and name in first.metrics else 0
+    scored = first.metrics[name].n if first.task != "iqtt" and name in first.metrics else 0
     warnings = (
-        too_few_warning(scored, f"scenes with a score of {metric(name).title}") if scored else []
+        too_few_warning(scored, f"{first.unit} with a score of {metric(name).title}")
+        if scored
+        else []
     )
     yield from (f"Warning: {text}." for text in few_clusters(first) or warnings)
 

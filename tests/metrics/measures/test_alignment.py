@@ -7,6 +7,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from metrics.measures import alignment
 from metrics.measures.alignment import align_points, l1_scale, l1_scale_shift
 from metrics.measures.checks import MeasureError
 
@@ -52,3 +53,20 @@ def test_points_are_aligned_in_least_squares_only():
     points = np.ones((2, 3))
     with pytest.raises(MeasureError):
         align_points(points, points, "scale_l1")
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.05, 1.0])
+def test_a_line_through_many_points_is_found_from_few(noise, monkeypatch):
+    """It is the optimum of all: the sum of errors is that of the search over all points."""
+    rng = np.random.default_rng(0)
+    t = rng.uniform(0.5, 8.0, 20_000)
+    p = 0.4 * t * (1.0 + noise * rng.standard_normal(len(t))) + 0.3
+    sums, scales = [], []
+    for many in (len(t), 10_000):
+        monkeypatch.setattr(alignment, "MANY", many)
+        scales.append(alignment.l1_scale(p, t, 1.0 / t))
+        scale, shift = alignment.l1_scale_shift(p, t, 1.0 / t)
+        sums.append(np.abs(scale * p + shift - t) @ (1.0 / t))
+    assert scales[0] == scales[1]
+    assert sums[1] == pytest.approx(sums[0], rel=1e-13, abs=1e-9)
+    assert noise == 0.0 or alignment._l1_of_many(p, t, 1.0 / t) is not None

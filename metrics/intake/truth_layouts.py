@@ -1,0 +1,329 @@
+"""Measured truth from public sets, as they are downloaded: one function for each layout.
+
+Each is built from the set's published description, which it names. The sets themselves were not at
+hand: the tests write files of these layouts. What a set leaves open about its camera is left open.
+"""
+
+import json
+import re
+import struct
+from collections.abc import Callable, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from metrics.intake.array_files import read_array
+from metrics.intake.outputs import image_of, planar_from_distance
+from metrics.intake.truth_files import picture_of, size_of
+from metrics.measured.reader import rays_of_matrix
+from metrics.measured.writer import Measured, Source, TruthError
+from scenegen.common.errors import FileFormatError
+from scenegen.files import trial
+from scenegen.files.input_file import (
+    HDF5_ERRORS,
+    StoredArray,
+    checking,
+    open_file,
+    open_unchecked,
+)
+
+Array = NDArray[Any]
+STEPS = 65533  # of MoGe's depth, between near and far
+INFINITE = 65535
+SINTEL_TAG = 202021.25  # begins files of depth and of cameras
+FRAME = re.compile(r"(\d{4}_\d\d_\d\d_drive_\d{4}_sync)\D(?:.*\D)?(\d{10})(?!\d)")
+
+
+class Layout(NamedTuple):
+    """A public set: how a folder or file of it is read, and what a table says of it."""
+
+    read: Callable[[Path, Path | None], Sequence[Source]]
+    source: str
+    licence: str
+
+
+def _pinhole(fx: float, fy: float, cx: float, cy: float) -> Array:
+    return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+
+
+# Of camera_params.m, for 640x480 pixels. MATLAB's first pixel has its centre at 1, ours at 0.5.
+NYU_CAMERA = _pinhole(
+    518.85790117450188, 519.46961112127485, 325.58244941119034 - 0.5, 253.73616633400465 - 0.5
+)
+DIODE_CAMERA = _pinhole(886.81, 927.06, 512.0, 384.0)  # of intrinsics.txt; 1024x768 pixels
+
+
+def _found(folder: Path, pattern: str) -> list[Path]:
+    """Return the files of a pattern in a folder, in order. Raises TruthError where none is."""
+    paths = sorted(folder.glob(pattern)) if folder.is_dir() else []
+    if not paths:
+        raise TruthError(folder, "none of its files", f"a folder that holds {pattern}")
+    return paths
+
+
+def _other(path: Path, what: str) -> Path:
+    """Return the path of a file that belongs to a picture. Raises TruthError where it is not."""
+    if not path.is_file():
+        raise TruthError(path, f"no {what}", "a file beside its picture")
+    return path
+
+
+def moge(folder: Path, _split: Path | None) -> list[Source]:
+    """Return the rows of a folder of MoGe's evaluation: image, depth.png and meta.json each.
+
+    Groups are the folders above. Depth is planar, and coded by its logarithm between near and far.
+    """
+    index = folder / ".index.txt"
+    lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
+    folders = [folder / line for line in lines if line.strip()] or [
+        path.parent for path in _found(folder, "**/meta.json")
+    ]
+    rows = []
+    for place in folders:
+        picture = next((p for p in (place / "image.jpg", place / "image.png") if p.is_file()), None)
+        if picture is None:
+            raise TruthError(place, "no image.jpg", "a picture beside its depth.png")
+        name = place.relative_to(folder).as_posix()
+        group = place.parent.relative_to(folder).as_posix()
+        read = partial(_of_moge, picture, place)
+        rows.append(Source(name, name if group == "." else group, size_of(picture), read))
+    return rows
+
+
+def _of_moge(picture: Path, place: Path) -> Measured:
+    path = _other(place / "depth.png", "depth")
+    height, width = size_of(path)
+    codes = read_array(path).astype(np.float64)
+    about = _json(_other(place / "meta.json", "camera"))
+    try:
+        with Image.open(path) as image:
+            near, far = (float(image.info[name]) for name in ("near", "far"))
+            unit = float(image.info.get("unit", 1.0))  # of older files, metres
+        matrix = np.array(about["intrinsics"], np.float64) * [[width], [height], [1.0]]
+    except (KeyError, TypeError, ValueError) as error:
+        raise TruthError(place, f"{error!s:.80}", "near, far and a matrix, as MoGe has") from error
+    depth = unit * near * (far / near) ** ((codes - 1.0) / STEPS)
+    known = (codes > 0) & (codes < INFINITE)
+    return Measured(picture_of(picture), np.where(known, depth, 0.0), matrix)
+
+
+def _json(path: Path) -> Any:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, RecursionError) as error:
+        raise TruthError(path, f"no JSON ({error!s:.60})", "an object") from error
+
+
+def nyu(path: Path, split: Path | None, depths: str = "depths") -> list[Source]:
+    """Return the rows of nyu_depth_v2_labeled.mat, all or those of `testNdxs` of splits.mat.
+
+    MATLAB's axes are reversed. Groups are scenes.
+    """
+    try:
+        trial.try_file(path)
+        with open_file(path, "labelled .mat of NYU Depth V2") as file, checking(file):
+            count, _, width, height = file["images"].shape
+            if file[depths].shape != (count, width, height):
+                found = f"shape {file[depths].shape}"
+                raise TruthError(f"{path}: {depths}", found, f"{(count, width, height)}")
+            scenes = [_matlab_text(file, ref) for ref in file["scenes"][()].reshape(-1)]
+    except (*HDF5_ERRORS, AttributeError) as error:
+        if isinstance(error, FileFormatError | TruthError):
+            raise
+        found = f"no images, {depths} and scenes ({error!s:.80})"
+        raise TruthError(path, found, "the labelled .mat of NYU Depth V2") from error
+    chosen = range(count) if split is None else _nyu_split(split, count)
+    return [
+        Source(f"{i + 1:04d}", scenes[i], (height, width), partial(_of_nyu, path, depths, i))
+        for i in chosen
+    ]
+
+
+def _of_nyu(path: Path, depths: str, i: int) -> Measured:
+    try:
+        # `nyu` has looked at its thousands of objects.
+        with open_unchecked(path, "labelled .mat of NYU Depth V2") as file:
+            image, depth = (StoredArray(file[name])[i] for name in ("images", depths))
+    except HDF5_ERRORS as error:
+        raise TruthError(f"{path}: picture {i + 1}", f"{error!s:.80}", "one to read") from error
+    picture = np.ascontiguousarray(image.transpose(2, 1, 0))
+    return Measured(picture, depth.T, NYU_CAMERA if depth.T.shape == (480, 640) else None)
+
+
+def _matlab_text(file: h5py.File, reference: Any) -> str:
+    return "".join(map(chr, np.asarray(file[reference][()], np.int64).reshape(-1)[:200].tolist()))
+
+
+def _nyu_split(path: Path, count: int) -> list[int]:
+    from scipy.io import loadmat
+
+    try:
+        numbers = np.asarray(loadmat(path)["testNdxs"]).reshape(-1).astype(np.int64) - 1
+    except Exception as error:  # of a reader of many formats
+        raise TruthError(path, f"no testNdxs ({error!s:.60})", "splits.mat of NYU") from error
+    if not len(numbers) or numbers.min() < 0 or numbers.max() >= count:
+        raise TruthError(path, "numbers of other pictures", f"1 to {count}")
+    return [int(number) for number in numbers]
+
+
+def kitti(folder: Path, split: Path | None) -> list[Source]:
+    """Return the rows of KITTI's annotated depth, all or those of a list of the Eigen split.
+
+    A folder holds DRIVE/proj_depth/groundtruth/image_02/FRAME.png, at any depth, and the pictures
+    of the raw data, DATE/DRIVE/image_02/data/FRAME.png, with DATE/calib_cam_to_cam.txt. Depth is
+    256 metres a step, 0 where nothing was measured. Groups are drives.
+    """
+    depths, pictures = dict[tuple[str, str], Path](), dict[tuple[str, str], Path]()
+    for path in _found(folder, "**/image_02/**/*.png"):
+        match = FRAME.search(path.as_posix())
+        if match is not None and "velodyne_raw" not in path.parts:
+            places = depths if "groundtruth" in path.parts else pictures
+            places[match[1], match[2]] = path
+    keys = sorted(depths)
+    if split is not None:
+        lines = split.read_text(encoding="utf-8", errors="replace").splitlines()
+        found = [FRAME.search(line) for line in lines if line.strip()]
+        if not found or not all(found):
+            raise TruthError(split, "lines without drive and frame", "a list of the Eigen split")
+        listed = [(match[1], match[2]) for match in found if match]
+        keys = [key for key in listed if key in depths]  # 45 of 697 frames have no annotated depth
+    if not keys:
+        raise TruthError(folder, "no annotated depth", "DRIVE/proj_depth/groundtruth/image_02")
+    rows = []
+    for drive, frame in keys:
+        if (drive, frame) not in pictures:
+            found_name = f"no picture of {drive}, frame {frame}"
+            raise TruthError(folder, found_name, f"{drive[:10]}/{drive}/image_02/data/{frame}.png")
+        picture = pictures[drive, frame]
+        read = partial(_of_kitti, picture, depths[drive, frame])
+        rows.append(Source(f"{drive}_{frame}", drive, size_of(picture), read))
+    return rows
+
+
+def _of_kitti(picture: Path, path: Path) -> Measured:
+    calibration = picture.parents[3] / "calib_cam_to_cam.txt"
+    matrix = None
+    if calibration.is_file():
+        text = calibration.read_text(encoding="utf-8", errors="replace")
+        line = re.search(r"^P_rect_02: (.+)$", text, re.MULTILINE)
+        numbers = line[1].split() if line else []
+        try:
+            matrix = np.array(numbers, np.float64).reshape(3, 4)[:, :3]
+        except ValueError as error:
+            raise TruthError(calibration, "no P_rect_02 of 12 numbers", "KITTI's file") from error
+    return Measured(picture_of(picture), read_array(path) / 256.0, matrix)
+
+
+def diode(folder: Path, _split: Path | None) -> list[Source]:
+    """Return the rows of DIODE: NAME.png, NAME_depth.npy and NAME_depth_mask.npy each.
+
+    Groups are scans. The camera is that of the set's development kit.
+    """
+    rows = []
+    for path in _found(folder, "**/*_depth.npy"):
+        picture = _other(path.with_name(path.name.replace("_depth.npy", ".png")), "picture")
+        group = path.parent.relative_to(folder).as_posix()
+        read = partial(_of_diode, picture, path)
+        rows.append(Source(picture.stem, group, size_of(picture), read))
+    return rows
+
+
+def _of_diode(picture: Path, path: Path) -> Measured:
+    depth = image_of(read_array(path), "depth")
+    place = _other(path.with_name(path.name.replace("_depth.npy", "_depth_mask.npy")), "mask")
+    mask = image_of(read_array(place), "mask")
+    if mask.shape != depth.shape:
+        raise TruthError(place, f"shape {mask.shape}", f"{depth.shape}, as the depth")
+    matrix = DIODE_CAMERA if depth.shape == (768, 1024) else None
+    return Measured(picture_of(picture), np.where(mask > 0.0, depth, 0.0), matrix)
+
+
+def hypersim(folder: Path, _split: Path | None) -> list[Source]:
+    """Return the rows of Hypersim: distances along rays, which become planar depth.
+
+    SCENE/images/scene_CAM_geometry_hdf5/frame.NNNN.depth_meters.hdf5 with the tone-mapped pictures
+    of scene_CAM_final_preview. The camera is the set's usual one, 886.81 pixels at a width of 1024;
+    a few scenes have others, which their files do not tell here. Groups are scenes.
+    """
+    rows = []
+    for path in _found(folder, "**/images/scene_*_geometry_hdf5/frame.*.depth_meters.hdf5"):
+        camera = path.parent.name.replace("_geometry_hdf5", "_final_preview")
+        frame = path.name.replace("depth_meters.hdf5", "tonemap.jpg")
+        picture = _other(path.parents[1] / camera / frame, "picture")
+        scene = path.parents[2].name
+        name = f"{scene}_{camera[: -len('_final_preview')]}_{frame.split('.')[1]}"
+        read = partial(_of_hypersim, picture, path)
+        rows.append(Source(name, scene, size_of(picture), read))
+    return rows
+
+
+def _of_hypersim(picture: Path, path: Path) -> Measured:
+    try:
+        with open_file(path, "file of distances") as file, checking(file):
+            distance = image_of(file["dataset"][()], "dataset")
+    except HDF5_ERRORS as error:
+        if isinstance(error, FileFormatError):
+            raise
+        raise TruthError(path, f"{error!s:.80}", "a data set named dataset") from error
+    height, width = distance.shape
+    focal = 886.81 * width / 1024
+    matrix = _pinhole(focal, focal, width / 2, height / 2)
+    rays = rays_of_matrix(matrix, (height, width), height, width)
+    return Measured(picture_of(picture), planar_from_distance(distance, rays), matrix)
+
+
+def sintel(folder: Path, _split: Path | None) -> list[Source]:
+    """Return the rows of MPI Sintel: depth/SCENE/frame_NNNN.dpt and the pictures of the final pass.
+
+    Cameras are those of camdata_left, where it is there. Groups are scenes.
+    """
+    rows = []
+    for path in _found(folder, "**/depth/*/frame_*.dpt"):
+        scene, root = path.parent.name, path.parents[2]
+        picture = _other(root / "final" / scene / f"{path.stem}.png", "picture of the final pass")
+        camera = root / "camdata_left" / scene / f"{path.stem}.cam"
+        read = partial(_of_sintel, picture, path, camera)
+        rows.append(Source(f"{scene}_{path.stem}", scene, size_of(picture), read))
+    return rows
+
+
+def _of_sintel(picture: Path, path: Path, camera: Path) -> Measured:
+    data = _tagged(path)
+    width, height = struct.unpack("<ii", data[:8]) if len(data) >= 8 else (0, 0)
+    if min(width, height) < 1 or len(data) != 8 + 4 * width * height:
+        raise TruthError(path, f"{len(data)} bytes for {height}x{width}", "4 bytes a pixel")
+    depth = np.frombuffer(data[8:], "<f4").reshape(height, width)
+    matrix = None
+    if camera.is_file():
+        numbers = _tagged(camera)
+        if len(numbers) != 8 * 21:
+            raise TruthError(camera, f"{len(numbers)} bytes", "matrices of 9 and 12 numbers")
+        matrix = np.frombuffer(numbers[:72], "<f8").reshape(3, 3)
+    return Measured(picture_of(picture), depth, matrix)
+
+
+def _tagged(path: Path) -> bytes:
+    """Return what follows the tag of a file of Sintel. Raises TruthError."""
+    data = path.read_bytes()
+    if data[:4] != struct.pack("<f", SINTEL_TAG):
+        raise TruthError(path, "no tag of Sintel", "a .dpt or .cam file")
+    return data[4:]
+
+
+LAYOUTS = {
+    "moge": Layout(moge, "MoGe's evaluation data (github.com/microsoft/MoGe, docs/eval.md)",
+                   "that of each set"),
+    "nyu": Layout(nyu, "NYU Depth V2, Silberman et al. 2012: depths (filled)", "not stated"),
+    "nyu-raw": Layout(partial(nyu, depths="rawDepths"),
+                      "NYU Depth V2, Silberman et al. 2012: rawDepths", "not stated"),
+    "kitti": Layout(kitti, "KITTI depth, Uhrig et al. 2017, and raw data, Geiger et al. 2013",
+                    "CC BY-NC-SA 3.0"),
+    "diode": Layout(diode, "DIODE, Vasiljevic et al. 2019, and its development kit", "MIT"),
+    "hypersim": Layout(hypersim, "Hypersim, Roberts et al. 2021", "CC BY-SA 3.0"),
+    "sintel": Layout(sintel, "MPI Sintel depth, Butler et al. 2012", "not stated"),
+}  # fmt: skip

@@ -1,0 +1,88 @@
+"""How the numbers of one prediction move with the protocol: one table, and one figure."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from metrics.measured.protocols import BY_NAME, PROTOCOLS, Crop
+from metrics.scoring.metric_names import HEADLINE
+from metrics.scoring.records import ScoreFile
+from metrics.views.figures import COLUMN, draw_scores
+from metrics.views.score_tables import INTERVAL, score_cell, title_of
+from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
+from scenegen.common.text_table import piped
+
+
+def protocols_report(
+    scores: Sequence[ScoreFile], as_markdown: bool = False, width: int | None = None
+) -> str:
+    """Return a row for each protocol under which a method was scored, with what it takes."""
+    left_out = [p.name for p in PROTOCOLS if p.name not in {file.protocol for file in scores}]
+    notes = [
+        f"[low, high]: {INTERVAL} over {scores[0].unit}; 1 unit is 1 m",
+        "numbers of two protocols are not comparable; bench score --protocol NAME --json keeps one",
+    ]
+    if left_out:
+        why = "they suit neither these images nor what is predicted"
+        notes.append(f"left out, as {why}: {', '.join(left_out)}")
+    form = to_markdown if as_markdown else to_text
+    return form(title_of(scores[0]), [protocols_table(scores)], notes, width)
+
+
+def protocols_table(scores: Sequence[ScoreFile]) -> Table:
+    """Return the headline under each protocol."""
+    names = [name for name in HEADLINE["measured"] if name in scores[0].metrics]
+    rows: list[Sequence[Cell | str]] = []
+    for file in scores:
+        protocol = BY_NAME[file.protocol]
+        share = f"{file.columns['pixels'].sum() / scores[0].columns['pixels'].sum():.0%}"
+        cells = [score_cell(file.metrics[name]) for name in names]
+        rows.append(
+            [
+                protocol.name,
+                file.alignment,
+                range_text(protocol.least, protocol.largest),
+                share,
+                *cells,
+            ]
+        )
+    return make_table("", ("protocol", "alignment", "metres", "pixels", *names), rows)
+
+
+def draw_protocols(path: str | Path, scores: Sequence[ScoreFile], overwrite: bool = False) -> None:
+    """Draw the first score of the headline under each protocol. Raises as `draw_scores`."""
+    labels = [file.protocol for file in scores]
+    draw_scores(path, scores, "abs_rel", COLUMN, overwrite, labels)
+
+
+def range_text(low: float, high: float) -> str:
+    """Return a range of depths in words."""
+    if np.isfinite(high):
+        return f"{low:g} to {high:g}"
+    return f"from {low:g}" if low else "all"
+
+
+def markdown_table() -> str:
+    """Return the table of protocols of docs/real-data.md."""
+    head = ("protocol", "pixels", "metres", "alignment", "clipped to", "mean over", "source")
+    rows = [
+        (
+            f"`{p.name}`",
+            ", then ".join(_crop_text(crop) for crop in p.crops) or "all",
+            range_text(p.least, p.largest),
+            p.alignment or "as declared",
+            "-" if p.clip is None else range_text(*p.clip),
+            p.mean,
+            p.source,
+        )
+        for p in PROTOCOLS
+    ]
+    return "\n".join(piped([head, *rows]))
+
+
+def _crop_text(crop: Crop) -> str:
+    if crop.unit == "bottom":
+        return f"{crop.size[0]}x{crop.size[1]} at the lower edge"
+    ends = f"rows {crop.top:g} to {crop.bottom:g}, columns {crop.left:g} to {crop.right:g}"
+    return f"{ends} of {crop.size[0]}x{crop.size[1]}" if crop.unit == "pixels" else ends

@@ -1,0 +1,238 @@
+"""The way of a user from a folder to tables and figures, and one line for each mistake."""
+
+import json
+import os
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from measured_scenes import scene
+from PIL import Image
+
+import cli
+from metrics.measured.reader import MeasuredFile
+from metrics.score_file import read_scores
+from metrics.scoring.metric_names import OBJECT_SCORES
+
+MODEL = "def infer(image):\n    return {'depth_metric': image[..., 0] / 25.0 + 0.1}\n"
+K = [[60.0, 0.0, 32.0], [0.0, 60.0, 24.0], [0.0, 0.0, 1.0]]
+
+
+def bench(*arguments):
+    return CliRunner().invoke(cli.bench, [str(argument) for argument in arguments])
+
+
+@pytest.fixture
+def here(tmp_path, monkeypatch):
+    """Eight pictures with depth in millimetres, holes as 0, a camera, and groups of two."""
+    monkeypatch.chdir(tmp_path)
+    rng = np.random.default_rng(0)
+    for name in ("rgb", "gt"):
+        (tmp_path / name).mkdir()
+    for i in range(8):
+        depth = scene(i, 48, 64)
+        steps = np.round(1000 * depth).astype(np.uint16)
+        steps[rng.random(steps.shape) < 0.3] = 0
+        Image.fromarray(steps).save(f"gt/depth_{i}.png")
+        grey = np.round(25 * depth).astype(np.uint8)
+        Image.fromarray(np.stack([grey] * 3, -1)).save(f"rgb/frame_{i}.png")
+    lines = (f"frame_{i}.png,scene {i // 2}\n" for i in range(8))
+    (tmp_path / "scenes.csv").write_text("".join(lines))
+    (tmp_path / "K.json").write_text(json.dumps(K))
+    (tmp_path / "model.py").write_text(MODEL)
+    return tmp_path
+
+
+def made(*more):
+    return bench("truth", "--images", "rgb/*.png", "--depth", "gt/*.png", "--out", "mine.h5", *more)
+
+
+WAY = (
+    ["info", "mine.h5"],
+    ["run", "model.py", "--data", "mine.h5", "--out", "a.h5"],
+    ["import", "--depth", "gt", "--unit", "mm", "--invalid", "0", "--missing", "nearest",
+     "--data", "mine.h5", "--out", "b.h5"],
+    ["validate", "a.h5", "--truth", "mine.h5"],
+    ["score", "a.h5", "--truth", "mine.h5", "--json", "a.json"],
+    ["score", "b.h5", "--truth", "mine.h5", "--json", "b.json", "--csv", "b.csv"],
+    ["score", "a.h5", "--truth", "mine.h5", "--protocol", "moge", "--json", "m.json"],
+    ["score", "a.h5", "--truth", "mine.h5", "--protocol", "all"],
+    ["compare", "a.json", "b.json"],
+    ["leaderboard", "a.json", "b.json", "m.json"],
+)  # fmt: skip
+PICTURES = (
+    ["score", "a.h5", "--truth", "mine.h5", "--html", "a.html"],
+    ["score", "a.h5", "--truth", "mine.h5", "--protocol", "all", "--figure", "all.svg"],
+    ["compare", "a.json", "b.json", "--html", "c.html"],
+    ["figure", "a.h5", "b.h5", "--truth", "mine.h5", "--items", "1", "--out", "grid.png"],
+    ["figure", "a.json", "b.json", "--out", "scores.png"],
+)
+
+
+def done(*commands):
+    for command in commands:
+        found = bench(*command)
+        assert found.exit_code == 0, (command, found.output)
+
+
+def test_from_a_folder_to_tables(here):
+    """Each command of the way succeeds, and what it says is what was put in."""
+    more = [
+        "--intrinsics",
+        "K.json",
+        "--groups",
+        "scenes.csv",
+        "--source",
+        "me",
+        "--license",
+        "CC0",
+    ]
+    assert made("--unit", "mm", "--invalid", "0", *more).exit_code == 0
+    with MeasuredFile("mine.h5") as truth:
+        depth = np.asarray(Image.open("gt/depth_3.png")) / 1000.0
+        np.testing.assert_allclose(np.nan_to_num(truth.view(3).depth), depth, rtol=1e-6)
+        assert (truth.name(3), truth.groups.tolist()) == ("frame_3.png", [0, 0, 1, 1, 2, 2, 3, 3])
+        assert truth.matrix(3).tolist() == K
+    done(*WAY)
+    a, b = read_scores("a.json"), read_scores("b.json")
+    assert b.metrics["abs_rel"].value < 1e-6
+    assert 0.01 < a.metrics["abs_rel"].value < 0.2
+    assert (a.metrics["abs_rel"].n, a.protocol, a.unit) == (4, "declared", "groups")
+    refused = bench("compare", "a.json", "m.json")
+    assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
+
+
+@pytest.mark.slow
+def test_pages_and_figures_are_drawn(here):
+    """Reports, comparisons and figures show measured truth; objects have no scores."""
+    assert made("--unit", "mm", "--invalid", "0", "--groups", "scenes.csv").exit_code == 0
+    done(*WAY, *PICTURES)
+    assert Path("a.html").read_text().count("data:image/webp") >= 4
+    assert Path("c.html").read_text().count("data:image/webp") >= 4
+    assert Path("grid.png").stat().st_size > 5000
+    assert Path("all.svg").read_text().count("<g id") > 20
+    assert not set(OBJECT_SCORES) & set(read_scores("a.json").metrics)
+
+
+def text(path, content):
+    return lambda: Path(path).write_text(content)
+
+
+def matrix(**places):
+    def write():
+        k = np.array(K)
+        for place, value in places.items():
+            k[int(place[1]), int(place[2])] = value
+        Path("K.json").write_text(json.dumps(k.tolist()))
+
+    return write
+
+
+def saved(path, array):
+    return lambda: Image.fromarray(array).save(path)
+
+
+MM, CAMERA = ["--unit", "mm"], ["--intrinsics", "K.json"]
+BAD = {
+    "a picture without truth": (lambda: os.remove("gt/depth_3.png"), MM),
+    "truth without a picture": (lambda: os.remove("rgb/frame_3.png"), MM),
+    "two truths for one": (saved("gt/depth_03.png", np.ones((48, 64), "u2")), MM),
+    "two pictures of one name": (
+        saved("rgb/frame_3.bmp", np.ones((48, 64, 3), "u1")), [*MM, "--images", "rgb"],
+    ),
+    "two truths of one name": (
+        saved("gt/depth_3.tiff", np.ones((48, 64), "u2")), [*MM, "--depth", "gt"],
+    ),
+    "another size": (saved("gt/depth_3.png", np.ones((24, 32), np.uint16)), MM),
+    "no valid pixel": (saved("gt/depth_3.png", np.zeros((48, 64), np.uint16)), MM),
+    "colours for depth": (saved("gt/depth_3.png", np.full((48, 64, 3), (1, 2, 3), np.uint8)), MM),
+    "no picture": (text("rgb/frame_3.png", "no"), MM),
+    "an empty picture": (text("rgb/frame_3.png", ""), MM),
+    "an unknown ending": (
+        lambda: os.rename("gt/depth_3.png", "gt/depth_3.dat"), [*MM, "--depth", "gt"],
+    ),
+    "no files": (lambda: None, [*MM, "--images", "none/*.png"]),
+    "a dead link": (lambda: (os.remove("gt/depth_3.png"), os.symlink("no", "gt/depth_3.png")), MM),
+    "unknown units": (lambda: None, []),
+    "two units": (lambda: None, [*MM, "--scale", "2"]),
+    "a normalised matrix": (matrix(_00=0.9, _11=1.2, _02=0.5, _12=0.5), [*MM, *CAMERA]),
+    "a matrix of another size": (matrix(_00=600, _11=600, _02=320, _12=240), [*MM, *CAMERA]),
+    "a matrix that is none": (matrix(_22=2.0), [*MM, *CAMERA]),
+    "an infinite matrix": (matrix(_00=float("inf")), [*MM, *CAMERA]),
+    "no matrix": (text("K.json", "[1, 2"), [*MM, *CAMERA]),
+    "a picture without group": (
+        text("scenes.csv", "frame_0.png,a\n"), [*MM, "--groups", "scenes.csv"],
+    ),
+    "a picture in two groups": (
+        text("scenes.csv", "frame_0.png,a\nframe_0.png,b\n"), [*MM, "--groups", "scenes.csv"],
+    ),
+    "a layout that is not there": (lambda: None, ["--layout", "kitti", "--data", "rgb"]),
+    "distances without a camera": (lambda: None, [*MM, "--kind", "distance"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_mistake_is_one_line(name, here):
+    """The exit code is 2, and no file is left under the name of the output."""
+    spoil, more = BAD[name]
+    spoil()
+    found = made(*more)
+    assert found.exit_code == 2, found.output
+    lines = found.stderr.strip().split("\n")
+    assert (lines[0].startswith("Error") and len(lines) == 1) or lines[0].startswith("Usage"), lines
+    assert not os.path.exists("mine.h5")
+
+
+def test_an_unknown_unit_is_guessed(here):
+    """A median of thousands is millimetres, and the guess is said with that number."""
+    found = made().stderr
+    assert "--unit mm" in found
+    for i in range(8):
+        depth = np.asarray(Image.open(f"gt/depth_{i}.png")) / 1000.0
+        os.remove(f"gt/depth_{i}.png")
+        np.save(f"gt/depth_{i}.npy", depth)
+    assert "--unit m," in bench("truth", "--images", "rgb", "--depth", "gt", "--out", "m.h5").stderr
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, -1.0, 0.0, 1e39])
+def test_what_is_no_depth_has_none(value, here):
+    """Values that no sensor means are pixels without truth."""
+    for i in range(8):
+        depth = np.asarray(Image.open(f"gt/depth_{i}.png")) / 1000.0
+        os.remove(f"gt/depth_{i}.png")
+        np.save(f"gt/depth_{i}.npy", np.where(depth > 0, depth, value))
+    done = bench("truth", "--images", "rgb", "--depth", "gt", "--unit", "m", "--out", "mine.h5")
+    assert done.exit_code == 0, done.output
+    with MeasuredFile("mine.h5") as truth:
+        stored = np.load("gt/depth_0.npy")
+        known = (stored > 0) & (stored < 1e38)
+        assert np.array_equal(np.isfinite(truth.view(0).depth), known)
+
+
+def linked(path):
+    with h5py.File(path, "r+") as file:
+        del file["images"]
+        file["images"] = h5py.ExternalLink("/etc/passwd", "images")
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [
+        lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
+        lambda path: path.write_bytes(b""),
+        lambda path: h5py.File(path, "w").close(),
+        linked,
+    ],
+    ids=["truncated", "empty", "without arrays", "a link"],
+)
+def test_a_broken_mat_is_one_line(edit, tmp_path):
+    path = tmp_path / "nyu.mat"
+    with h5py.File(path, "w") as file:
+        file["images"], file["depths"] = np.zeros((2, 3, 64, 48), "u1"), np.ones((2, 64, 48), "f4")
+        file["scenes"] = np.zeros((1, 2))
+    edit(path)
+    done = bench("truth", "--layout", "nyu", "--data", path, "--out", tmp_path / "mine.h5")
+    assert (done.exit_code, done.stderr.strip().count("\n")) == (2, 0), done.output
+    assert not (tmp_path / "mine.h5").exists()

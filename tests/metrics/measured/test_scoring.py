@@ -1,0 +1,206 @@
+"""Measured truth is scored, compared and ranked; rooms and other protocols stay apart."""
+
+import json
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+
+from metrics.measured.protocols import ProtocolError
+from metrics.measured.reader import MeasuredFile
+from metrics.score_file import read_scores, write_scores
+from metrics.scoring.evaluate import open_runs, score, score_protocols
+from metrics.scoring.runs import ScoringError, Settings
+from metrics.scoring.truth_digests import OtherTruthError
+from metrics.submissions.problems import JsonError
+from metrics.submissions.reader import open_predictions
+from metrics.submissions.validation import validate
+from metrics.submissions.writer import RoomPredictionWriter
+from metrics.viewing import MeasuredRooms, no_shape, predicted_rooms, shown_scores
+from metrics.views.compare.compare import compare
+from metrics.views.leaderboard.ranking import rankings
+from metrics.views.protocols import protocols_report
+from metrics.views.report import html_report
+from metrics.views.score_tables import text_report
+from scenegen.common.web_hosts import Hosts
+from scenegen.rooms.reader import RoomsFile
+from scenegen.viewing.geometry import pixel_colors
+
+
+def noisy(depth, rng):
+    return depth * (1.0 + 0.1 * rng.standard_normal(depth.shape))
+
+
+def test_scores_are_means_over_images_at_the_measured_pixels(measured, predicted, tmp_path):
+    truth = measured(normals=True)
+    path = predicted(truth, noisy)
+    scores = score([path], truth)
+    expected = []
+    with h5py.File(truth) as file, h5py.File(path) as said:
+        for row, (height, width) in enumerate(file["size"][()]):
+            t = file["depth"][row, :height, :width].astype(float)
+            p = said["depth"][row, :height, :width].astype(float)
+            known = np.isfinite(t)
+            expected.append(np.mean(np.abs(p - t)[known] / t[known]))
+            assert scores.columns["pixels"][row] == known.sum()
+    assert scores.columns["abs_rel"][0] == pytest.approx(expected, rel=1e-12)
+    assert scores.metrics["abs_rel"].value == pytest.approx(np.mean(expected), rel=1e-12)
+    assert (scores.metrics["abs_rel"].n, scores.unit, scores.protocol) == (6, "groups", "declared")
+    assert {"boundary_f1", "abs_rel_after_scale_shift_l1"} <= set(scores.metrics)
+    write_scores(scores, tmp_path / "s.json")
+    again = read_scores(tmp_path / "s.json")
+    assert again.metrics == scores.metrics
+    assert again.protocol == "declared"
+    assert "groups" in text_report(again)
+    assert not validate(path, truth)
+
+
+def test_processes_change_no_bit(measured, predicted):
+    truth = measured(count=40)
+    path = predicted(truth, noisy)
+    one, two = (score([path], truth, Settings(processes=n)) for n in (1, 2))
+    for name, column in one.columns.items():
+        assert np.array_equal(column, two.columns[name], equal_nan=True)
+
+
+def test_a_mean_over_pixels_is_that_of_all_of_them(measured, predicted):
+    truth = measured()
+    file = score([predicted(truth, noisy)], truth)
+    file = replace(file, protocol="nyu-eigen-pixels")
+    weights = file.columns["pixels"] / file.columns["pixels"].sum()
+    for name in ("abs_rel", "delta_1"):
+        expected = weights @ file.items[name]
+        assert file.metrics[name].value == pytest.approx(expected, rel=1e-12)
+    expected = np.sqrt(weights @ np.square(file.items["rmse"]))
+    assert file.metrics["rmse"].value == pytest.approx(expected, rel=1e-12)
+    better = replace(file, columns={**file.columns, "rmse": file.columns["rmse"] * 0.5})
+    difference = compare([file, better], ["rmse"]).differences[0]
+    assert difference.difference == pytest.approx(-expected / 2, rel=1e-12)
+    assert difference.verdict == "better" or difference.p_holm > 0.03  # six groups
+
+
+def test_two_protocols_never_share_a_table(measured, predicted, tmp_path):
+    truth = measured()
+    a, b = predicted(truth, noisy, "a"), predicted(truth, lambda d, rng: d, "b")
+    first = score([a], truth, Settings(protocol="moge"))
+    second = score([b], truth, Settings(protocol="moge"))
+    other = score([b], truth, Settings(protocol="affine-depth"))
+    assert compare([first, second]).differences[0].difference < 0.0
+    with pytest.raises(OtherTruthError):
+        compare([first, other])
+    assert [len(r.entries) for r in rankings([first, second, other])] == [2, 1]
+    with pytest.raises(OtherTruthError):
+        html_report(first, beside=[other])
+
+
+def test_all_protocols_that_suit_stand_in_one_table(measured, predicted):
+    truth = measured()
+    path = predicted(truth, noisy)
+    with open_runs([path], truth) as runs:
+        scores = score_protocols(runs, Settings(), lambda done: None)
+    names = [file.protocol for file in scores]
+    assert {"declared", "kitti-eigen-garg", "kitti-eigen-garg-median", "moge"} <= set(names)
+    assert not {"nyu-eigen", "kitti-kb"} & set(names)
+    for file in scores:
+        alone = score([path], truth, Settings(protocol=file.protocol))
+        assert alone.metrics["abs_rel"] == file.metrics["abs_rel"]
+    assert all(name in protocols_report(scores) for name in names)
+
+
+@pytest.mark.parametrize(
+    ("kind", "good", "bad"),
+    [
+        ({"alignment": "scale"}, "moge-scale", "kitti-eigen"),
+        ({"alignment": "scale_shift"}, "affine-depth", "moge-scale"),
+        ({}, "affine-disparity", "affine-depth"),
+    ],
+)
+def test_what_a_method_cannot_know_is_not_scored(measured, predicted, kind, good, bad):
+    truth = measured()
+    change = noisy if kind else lambda d, rng: {"disparity": 3.0 / d + 0.1}
+    path = predicted(truth, change, **kind)
+    assert score([path], truth, Settings(protocol=good)).metrics["delta_1"].value > 0.9
+    with pytest.raises(ProtocolError):
+        score([path], truth, Settings(protocol=bad))
+    with pytest.raises(ProtocolError):
+        score([path], truth, Settings(protocol="no-such"))
+
+
+def test_truth_of_twenty_points_has_depth_alone(measured, predicted):
+    """No boundaries and no normals, which the report says once each."""
+    truth = measured(share=20 / (48 * 64))
+    scores = score([predicted(truth, noisy)], truth)
+    assert scores.metrics["delta_1"].value > 0.9
+    names = [name for name in scores.metrics if "boundary" in name or "normal" in name]
+    assert not names
+    lines = " ".join(text_report(scores).split())
+    assert (lines.count("boundaries: none"), lines.count("normals: none")) == (1, 1)
+
+
+def test_points_are_scored_on_the_rays_of_the_matrix(measured, predicted):
+    truth = measured()
+    with MeasuredFile(truth) as file:
+        rays = [file.rays(row, *file.size(row)) for row in range(len(file))]
+    at = iter(rays)
+    path = predicted(truth, lambda d, rng: {"points": next(at) * d[..., None]})
+    scores = score([path], truth)
+    assert scores.metrics["points_rel"].value < 1e-6
+    assert scores.metrics["points_delta_1"].value == 1.0
+
+
+def test_values_that_are_not_finite_are_refused_or_penalised(measured, predicted):
+    truth = measured()
+    path = predicted(truth, noisy)
+    with h5py.File(path, "r+") as file:
+        depth = file["depth"][0]
+        depth[:40, :60] = np.nan
+        file["depth"][0] = depth
+    with pytest.raises(ScoringError):
+        score([path], truth)
+    scores = score([path], truth, Settings(non_finite="penalise"))
+    assert scores.columns["abs_rel"][0, 0] == 4.0
+    assert scores.meta.counts["rows_penalised"] == 1
+
+
+def test_a_protocol_is_for_measured_truth_alone(rooms_path, measured, predicted, tmp_path):
+    path, copy = tmp_path / "r.h5", measured()
+    with RoomsFile(rooms_path) as rooms, RoomPredictionWriter(path, rooms_path, method="m") as out:
+        for row, room in enumerate(rooms):
+            out.add(row, room.depth)
+    with pytest.raises(ProtocolError):
+        score([path], rooms_path, Settings(protocol="moge"))
+    with pytest.raises(ScoringError):
+        score([path], copy)
+
+
+@pytest.mark.parametrize("edit", [{"protocol": "no-such"}, {"protocol": ""}, {"objects": {"a": 1}}])
+def test_a_score_file_with_a_wrong_protocol_is_refused(measured, predicted, tmp_path, edit):
+    truth, path = measured(count=4), tmp_path / "s.json"
+    write_scores(score([predicted(truth, noisy)], truth), path)
+    path.write_text(json.dumps(json.loads(path.read_text()) | edit))
+    with pytest.raises(JsonError):
+        read_scores(path)
+
+
+def test_images_are_views_of_the_3d_page(measured, predicted):
+    """Each a scene of its own, with points on the rays of its matrix, the worst image first."""
+    pytest.importorskip("viser")
+    from scenegen.viewing.page import RoomsPage
+    from scenegen.viewing.server import started
+
+    truth = measured()
+    worst = iter(range(12))
+    path = predicted(truth, lambda d, rng: d * (1.5 if next(worst) == 7 else 1.1))
+    with open_predictions(path) as file, MeasuredFile(truth) as opened:
+        shown = predicted_rooms(file, opened, shown_scores(file, opened))
+        with started("test", Hosts(), 0) as server:
+            page = RoomsPage(server, MeasuredRooms(opened), no_shape, *shown)
+            clouds = {cloud.kind: cloud for cloud in page.clouds}
+        view = opened.view(7)
+        points = (view.rays * view.depth[..., None])[view.mask]
+        np.testing.assert_allclose(clouds["/truth"].surfels.points, points, rtol=1e-6)
+        aside = clouds["/prediction"].surfels.points - 1.5 * points
+        np.testing.assert_allclose(np.ptp(aside, axis=0), 0.0, atol=1e-4)
+        colors = pixel_colors(clouds["/truth"].room, "Image").astype(int)
+        assert np.abs(colors - opened.picture(7)).max() < 2
