@@ -10,8 +10,10 @@ from typing import Any
 
 import drjit
 import mitsuba
+import numpy as np
 
 from scenegen.rendering.pictures.matter import TEXEL_RANGE, Tables
+from scenegen.rendering.tables import aligned
 
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
@@ -32,8 +34,8 @@ def _matter_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
 
         def __init__(self, tables: Tables) -> None:
             mi.BSDF.__init__(self, mi.Properties())
-            self.of_face = mi.UInt32(tables.of_face)
-            self.rows = mi.Float(tables.rows.ravel())
+            self.of_face = mi.UInt32(aligned(tables.of_face, np.uint32))
+            self.rows = mi.Float(aligned(tables.rows))
             self.texels, self.heights = mi.UInt32(tables.texels), mi.Float16(tables.heights)
             sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
             diffuse, glossy = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection

@@ -27,7 +27,7 @@ from scenegen.rendering.pictures.development import develop
 from scenegen.rendering.pictures.matter import Matter, Soup, gather_matter
 from scenegen.rendering.pictures.matter_bsdf import matter_bsdf
 from scenegen.rendering.pictures.sky import Outside, outside
-from scenegen.rendering.tables import unit
+from scenegen.rendering.tables import aligned, unit
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -164,11 +164,11 @@ def _mesh(
         name, 3 * count, count, properties, has_vertex_normals=True, has_vertex_texcoords=True
     )
     if radiance is not None:
-        mesh.add_attribute("face_radiance", 3, radiance.astype(np.float32).ravel())
+        mesh.add_attribute("face_radiance", 3, aligned(radiance))
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = soup.corners.astype(np.float32).ravel()
-    parameters["vertex_normals"] = soup.normals.astype(np.float32).ravel()
-    parameters["vertex_texcoords"] = soup.uv.astype(np.float32).ravel()
-    parameters["faces"] = np.arange(3 * count, dtype=np.uint32)
+    parameters["vertex_positions"] = aligned(soup.corners)
+    parameters["vertex_normals"] = aligned(soup.normals)
+    parameters["vertex_texcoords"] = aligned(soup.uv)
+    parameters["faces"] = aligned(np.arange(3 * count), np.uint32)
     parameters.update()
     return mesh
