@@ -20,7 +20,8 @@ class KnownTest:
         rows: how many images or questions it has.
         command: what makes the set, but for its place.
         purpose: what it is for.
-        pictures: digest of the images.
+        pictures: digest of the images; empty where they differ between machines by rounding, and
+            `scenegen verify` compares them.
         superseded: whether older code made it, whose bits were others.
     """
 
@@ -55,6 +56,12 @@ _ROOMS = {  # purpose, rows, command
         "built-in objects of the test split",
         1500,
         f"{_RENDER} --seed 1000 --size 64 --preset shapenet --object-split test",
+    ),
+    "interiors-512-1": (
+        "furnished rooms, for networks that were trained on photographs",
+        400,
+        "scenegen render --preset interiors --n 100 --views 0,10,20,30 --seed 1000 --size 512"
+        " --object-split test --spp 16 --denoise",
     ),
 }
 # Digests of truth and pictures. `bench sets make NAME` prints those of the files that it makes.

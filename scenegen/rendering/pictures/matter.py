@@ -23,8 +23,8 @@ Folder = Mapping[str, tuple[MapFiles, ...]] | None
 TEXEL_RANGE = 255.0
 GLOW = "glow"
 ACCENT_SHARE = 0.35  # of rooms in which one wall has another colour
-LAMP_FLUX = 0.03  # of a lamp, in the units of the sky's radiance times square metres
-CEILING_FLUX = 0.1
+LAMP_FLUX = 0.018  # of a lamp, in the units of the sky's radiance times square metres
+CEILING_FLUX = 0.13
 WARM = (1.0, 0.72, 0.44)  # linear RGB of lamps, of some 3000 K
 OUT_OF_SIGHT = -50.0  # height in metres of triangles that only fill tables
 LEAST_SHINING = 4096
@@ -41,7 +41,7 @@ class Tables:
             of a repeat; metallic, specular, two unused; first value, width and height of its bumps,
             which are 0 for smooth ones; one unused.
         texels: square roots of linear RGB, and roughness, 8 bits each, uint32.
-        heights: of bumps, metres, float16.
+        heights: of bumps, metres, float32.
     """
 
     of_face: Array
@@ -171,7 +171,7 @@ def _unseen(count: int) -> tuple[Array, Array, Array]:
 def _tables(materials: list[Material], of_face: Array) -> Tables:
     rows = np.zeros((len(materials), 12), np.float32)
     texels: list[Array] = []
-    heights: list[Array] = [np.zeros(1, np.float16)]
+    heights: list[Array] = [np.zeros(1, np.float32)]
     first_texel, first_height = 0, 1
     for row, one in zip(rows, materials, strict=True):
         packed = _packed(one)
@@ -181,7 +181,7 @@ def _tables(materials: list[Material], of_face: Array) -> Tables:
         first_texel += packed.size
         if one.height is not None:
             row[8:11] = first_height, one.height.shape[1], one.height.shape[0]
-            heights.append(one.height.astype(np.float16).ravel())
+            heights.append(one.height.ravel())
             first_height += one.height.size
     return Tables(of_face.astype(np.uint32), rows, np.concatenate(texels), np.concatenate(heights))
 

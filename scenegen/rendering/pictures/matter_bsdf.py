@@ -36,7 +36,7 @@ def _matter_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
             mi.BSDF.__init__(self, mi.Properties())
             self.of_face = mi.UInt32(aligned(tables.of_face, np.uint32))
             self.rows = mi.Float(aligned(tables.rows))
-            self.texels, self.heights = mi.UInt32(tables.texels), mi.Float16(tables.heights)
+            self.texels, self.heights = mi.UInt32(tables.texels), mi.Float(tables.heights)
             sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
             diffuse, glossy = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection
             self.m_components = [diffuse | sides, glossy | sides]
@@ -82,7 +82,7 @@ def _matter_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
                 si.uv, dr.select(bumpy, row[8], 0), dr.select(bumpy, row[9], 1),
                 dr.select(bumpy, row[10], 1), row[3],
             )  # fmt: skip
-            h = [mi.Float(dr.gather(mi.Float16, self.heights, i)) for i in at]
+            h = [dr.gather(mi.Float, self.heights, i) for i in at]
             du = dr.lerp(h[1] - h[0], h[3] - h[2], fy) * row[9] / row[3]
             dv = dr.lerp(h[2] - h[0], h[3] - h[1], fx) * row[10] / row[3]
             n = mi.Vector3f(si.sh_frame.n)
