@@ -84,6 +84,8 @@ def _is_published(folder: Path, test: Any) -> bool:
     truth, pictures, rows = file_digests(folder / test.file, test.task)
     found = {"rows": rows, "truth": truth, "pictures": pictures}
     published = {"rows": test.rows, "truth": test.digest, "pictures": test.pictures}
+    if not test.pictures:  # path-traced: `scenegen verify` compares them within a tolerance
+        del found["pictures"], published["pictures"]
     print_line(f"{folder / test.file}:")
     for name, value in found.items():
         same = value == published[name]

@@ -20,7 +20,8 @@ class KnownTest:
         rows: how many images or questions it has.
         command: what makes the set, but for its place.
         purpose: what it is for.
-        pictures: digest of the images.
+        pictures: digest of the images; empty where they differ between machines by rounding, and
+            `scenegen verify` compares them.
         superseded: whether older code made it, whose bits were others.
     """
 
@@ -56,6 +57,12 @@ _ROOMS = {  # purpose, rows, command
         1500,
         f"{_RENDER} --seed 1000 --size 64 --preset shapenet --object-split test",
     ),
+    "interiors-512-1": (
+        "furnished rooms, for networks that were trained on photographs",
+        400,
+        "scenegen render --preset interiors --n 100 --views 0,10,20,30 --seed 1000 --size 512"
+        " --object-split test --spp 16 --denoise",
+    ),
 }
 # Digests of truth and pictures. `bench sets make NAME` prints those of the files that it makes.
 _DIGESTS = {
@@ -78,6 +85,10 @@ _DIGESTS = {
     "objects-1": (
         "d8a28d7e6ef90885a4f649b51adcbb30096547b5ab00df71931ba87834788101",
         "1382577a054c986325744e6dc76009e5a68743c9279e064b66b2bc85a32f7101",
+    ),
+    "interiors-512-1": (
+        "00d9d398ca0a5d0879b5f25a2ce3e1b6510bf4351bb34273062f021456fe884e",
+        "",
     ),
     "rotation-1/matched": (
         "bb5a820ba6286741333664ea534ef90cacd2dad68928459b643c66c0172711d8",

@@ -34,14 +34,26 @@ def upload_rows(parts: Sequence[NDArray[Any]], kind: type = np.float32) -> tuple
     padded = -(-width // PACKET) * PACKET
     ends = np.cumsum([len(part) for part in parts], dtype=np.int64)
     count = max(1, int(ends[-1]) if parts else 0)
-    memory = np.zeros(4 * count * padded + ALIGNMENT, np.uint8)
-    start = -memory.ctypes.data % ALIGNMENT
-    table: NDArray[Any] = memory[start : start + 4 * count * padded].view(kind)
+    table = _aligned_zeros(count * padded, kind)
     rows = table.reshape(count, padded)
     for part, end in zip(parts, ends.tolist(), strict=True):
         rows[end - len(part) : end, :width] = part
     starts = ends - np.array([len(part) for part in parts], np.int64)
     return (mi.Float if kind is np.float32 else mi.UInt32)(table), starts
+
+
+def aligned(values: NDArray[Any], kind: Any = np.float32) -> NDArray[Any]:
+    """Return a flat copy where Dr.Jit gathers packets from it, wherever numpy had the values."""
+    copy = _aligned_zeros(values.size, kind)
+    copy[:] = values.ravel()
+    return copy
+
+
+def _aligned_zeros(count: int, kind: Any) -> NDArray[Any]:
+    size = count * np.dtype(kind).itemsize
+    memory = np.zeros(size + ALIGNMENT, np.uint8)
+    start = -memory.ctypes.data % ALIGNMENT
+    return memory[start : start + size].view(kind)
 
 
 def gather_packet(table: Any, index: Any) -> Any:

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.rendering.pictures.sky import Outside
+from scenegen.rendering.tables import aligned
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -42,7 +43,7 @@ def _daylight_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
         def __init__(self, outside: Outside, windows: Array) -> None:
             mi.Emitter.__init__(self, mi.Properties())
             rows, columns = outside.radiance.shape[:2]
-            self.map = mi.Float(np.ascontiguousarray(outside.radiance, np.float32).ravel())
+            self.map = mi.Float(aligned(outside.radiance))
             shines = outside.sunlight.max() > 0
             sun = [*outside.toward_sun, SUN_SHARE * shines, *outside.sunlight]
             self.sun = [dr.opaque(mi.Float, float(value)) for value in sun]
@@ -57,7 +58,7 @@ def _daylight_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
             table[len(windows) :, 12] = 2.0
             table[: len(windows), 13] = 1 / (windows[:, 1] ** 2).sum(axis=1)
             table[: len(windows), 14] = 1 / (windows[:, 2] ** 2).sum(axis=1)
-            self.windows = mi.Float(table.ravel())
+            self.windows = mi.Float(aligned(table))
             self.area = dr.opaque(mi.Float, float(max(area.sum(), 1e-9)))
             self.m_flags = +mi.EmitterFlags.Infinite
 

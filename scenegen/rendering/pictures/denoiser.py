@@ -1,6 +1,9 @@
 """Intel's Open Image Denoise, where its wheel `pyoidn` is installed (extra `denoise`)."""
 
 import importlib.util
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -23,6 +26,19 @@ def check_denoiser() -> None:
         raise BackendError("denoise", "no denoiser", hint=HOW_TO_GET)
 
 
+@contextmanager
+def _without_torch() -> Iterator[None]:
+    """Hide torch while pyoidn is imported: it would load it, which arrays of numpy do not need."""
+    hidden = "torch" not in sys.modules
+    if hidden:
+        sys.modules["torch"] = None  # type: ignore[assignment]
+    try:
+        yield
+    finally:
+        if hidden:
+            del sys.modules["torch"]
+
+
 def denoised(radiance: Array, albedo: Array, normal: Array) -> Array:
     """Return radiance, (H, W, 3), without the noise of few samples.
 
@@ -32,7 +48,8 @@ def denoised(radiance: Array, albedo: Array, normal: Array) -> Array:
     Raises BackendError where the denoiser is not installed.
     """
     check_denoiser()
-    import pyoidn
+    with _without_torch():
+        import pyoidn
 
     images = [np.ascontiguousarray(x, np.float32) for x in (radiance, albedo, normal)]
     found: Array = np.asarray(pyoidn.denoise(*images, hdr=True))

@@ -15,11 +15,11 @@ from scenegen.rendering.ground_truth import encode_image
 Array = NDArray[Any]
 # What `develop` finds out: factor of radiance, further factors of red, green and blue, and w.
 EXPOSURE = ("exposure", "red", "green", "blue", "white")
-KEY = 0.42  # exposed radiance of the middle of a picture
+KEY = 0.4  # exposed radiance of the middle of a picture
 BALANCE = 0.65  # how far white balance goes towards grey light
 BRIGHT = 99.5  # percentile of the radiance that becomes white
 LEAST_WHITE = 3.0
-CONTRAST = 0.35  # share of a smooth step in the tone curve
+CONTRAST = 0.5  # share of a smooth step in the tone curve
 
 
 def develop(radiance: Array, albedo: Array, inside: Array, dtype: str, noise: Array | None) -> Any:

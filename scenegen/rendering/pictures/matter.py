@@ -23,11 +23,12 @@ Folder = Mapping[str, tuple[MapFiles, ...]] | None
 TEXEL_RANGE = 255.0
 GLOW = "glow"
 ACCENT_SHARE = 0.35  # of rooms in which one wall has another colour
-LAMP_FLUX = 0.03  # of a lamp, in the units of the sky's radiance times square metres
-CEILING_FLUX = 0.1
+LAMP_FLUX = 0.018  # of a lamp, in the units of the sky's radiance times square metres
+CEILING_FLUX = 0.13
 WARM = (1.0, 0.72, 0.44)  # linear RGB of lamps, of some 3000 K
-OUT_OF_SIGHT = -50.0  # metres, where dark triangles are that stand for lamps
+OUT_OF_SIGHT = -50.0  # height in metres of triangles that only fill tables
 LEAST_SHINING = 4096
+FULL = 64  # triangles, of which the number of those that reflect is a multiple
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +41,7 @@ class Tables:
             of a repeat; metallic, specular, two unused; first value, width and height of its bumps,
             which are 0 for smooth ones; one unused.
         texels: square roots of linear RGB, and roughness, 8 bits each, uint32.
-        heights: of bumps, metres, float16.
+        heights: of bumps, metres, float32.
     """
 
     of_face: Array
@@ -147,27 +148,30 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -
         collected.add(corners[dark], normals[dark], thing.corner_uv[dark], rows[thing.part[dark]])
         if glows.any():
             collected.shine(corners[glows], normals[glows], thing.corner_uv[glows], LAMP_FLUX)
-    corners, normals, uv, of_face = (np.concatenate(x) for x in zip(*collected.parts, strict=True))
-    # A kernel counts the triangles that shine by powers of two: so all have about as many.
-    count = sum(len(part[0]) for part in collected.glowing)
-    more = max(LEAST_SHINING, 1 << count.bit_length()) - count
-    triangle = np.array([[[0, 0, 0], [1e-3, 0, 0], [0, 0, 1e-3]]])
-    triangle[..., 1] = OUT_OF_SIGHT
-    up, nowhere = np.tile([0.0, 1.0, 0.0], (1, 3, 1)), np.zeros((1, 3, 2))
-    unseen = (np.repeat(x, more, axis=0) for x in (triangle, up, nowhere, np.zeros((1, 3))))
-    collected.glowing.append(tuple(unseen))  # type: ignore[arg-type]
-    shining, shining_normals, shining_uv, radiance = (
-        np.concatenate(x) for x in zip(*collected.glowing, strict=True)
-    )
-    tables = _tables(collected.materials, of_face)
-    lights = Soup(shining, shining_normals, shining_uv)
-    return Matter(Soup(corners, normals, uv), tables, lights, radiance)
+    # Dr.Jit reads several values at once where a table's length allows it, and searches the lights
+    # in as many steps as their number needs: with full tables, all rooms share a kernel.
+    triangles = sum(len(part[0]) for part in collected.parts)
+    collected.add(*_unseen(-triangles % FULL), np.zeros(-triangles % FULL, int))
+    shining = sum(len(part[0]) for part in collected.glowing)
+    more = max(LEAST_SHINING, 1 << shining.bit_length()) - shining
+    collected.glowing.append((*_unseen(more), np.zeros((more, 3))))
+    *soup, of_face = (np.concatenate(x) for x in zip(*collected.parts, strict=True))
+    *lights, radiance = (np.concatenate(x) for x in zip(*collected.glowing, strict=True))
+    return Matter(Soup(*soup), _tables(collected.materials, of_face), Soup(*lights), radiance)
+
+
+def _unseen(count: int) -> tuple[Array, Array, Array]:
+    """Return corners, normals and texture coordinates of triangles far below the room."""
+    triangle = np.array([[0, OUT_OF_SIGHT, 0], [1e-3, OUT_OF_SIGHT, 0], [0, OUT_OF_SIGHT, 1e-3]])
+    up, nowhere = np.tile([0.0, 1.0, 0.0], (3, 1)), np.zeros((3, 2))
+    corners, normals, uv = (np.repeat(x[None], count, axis=0) for x in (triangle, up, nowhere))
+    return corners, normals, uv
 
 
 def _tables(materials: list[Material], of_face: Array) -> Tables:
     rows = np.zeros((len(materials), 12), np.float32)
     texels: list[Array] = []
-    heights: list[Array] = [np.zeros(1, np.float16)]
+    heights: list[Array] = [np.zeros(1, np.float32)]
     first_texel, first_height = 0, 1
     for row, one in zip(rows, materials, strict=True):
         packed = _packed(one)
@@ -177,7 +181,7 @@ def _tables(materials: list[Material], of_face: Array) -> Tables:
         first_texel += packed.size
         if one.height is not None:
             row[8:11] = first_height, one.height.shape[1], one.height.shape[0]
-            heights.append(one.height.astype(np.float16).ravel())
+            heights.append(one.height.ravel())
             first_height += one.height.size
     return Tables(of_face.astype(np.uint32), rows, np.concatenate(texels), np.concatenate(heights))
 

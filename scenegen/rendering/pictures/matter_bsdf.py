@@ -10,8 +10,10 @@ from typing import Any
 
 import drjit
 import mitsuba
+import numpy as np
 
 from scenegen.rendering.pictures.matter import TEXEL_RANGE, Tables
+from scenegen.rendering.tables import aligned
 
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
@@ -32,9 +34,9 @@ def _matter_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
 
         def __init__(self, tables: Tables) -> None:
             mi.BSDF.__init__(self, mi.Properties())
-            self.of_face = mi.UInt32(tables.of_face)
-            self.rows = mi.Float(tables.rows.ravel())
-            self.texels, self.heights = mi.UInt32(tables.texels), mi.Float16(tables.heights)
+            self.of_face = mi.UInt32(aligned(tables.of_face, np.uint32))
+            self.rows = mi.Float(aligned(tables.rows))
+            self.texels, self.heights = mi.UInt32(tables.texels), mi.Float(tables.heights)
             sides = mi.BSDFFlags.FrontSide | mi.BSDFFlags.BackSide
             diffuse, glossy = mi.BSDFFlags.DiffuseReflection, mi.BSDFFlags.GlossyReflection
             self.m_components = [diffuse | sides, glossy | sides]
@@ -80,7 +82,7 @@ def _matter_class(variant: str) -> Any:  # noqa: ARG001 - the key of the cache
                 si.uv, dr.select(bumpy, row[8], 0), dr.select(bumpy, row[9], 1),
                 dr.select(bumpy, row[10], 1), row[3],
             )  # fmt: skip
-            h = [mi.Float(dr.gather(mi.Float16, self.heights, i)) for i in at]
+            h = [dr.gather(mi.Float, self.heights, i) for i in at]
             du = dr.lerp(h[1] - h[0], h[3] - h[2], fy) * row[9] / row[3]
             dv = dr.lerp(h[2] - h[0], h[3] - h[1], fx) * row[10] / row[3]
             n = mi.Vector3f(si.sh_frame.n)

@@ -26,16 +26,16 @@ from scenegen.rendering.pictures.denoiser import denoised
 from scenegen.rendering.pictures.development import develop
 from scenegen.rendering.pictures.matter import Matter, Soup, gather_matter
 from scenegen.rendering.pictures.matter_bsdf import matter_bsdf
-from scenegen.rendering.pictures.sky import Outside, outside
-from scenegen.rendering.tables import unit
+from scenegen.rendering.pictures.sky import SUNLESS, Outside, outside, sun_height
+from scenegen.rendering.tables import aligned, unit
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
 MAX_DEPTH = 12  # segments of a path; in closed rooms light bounces often
 ROULETTE_DEPTH = 5  # segments after which a path may end at random
+DAY_WEIGHT, NIGHT_WEIGHT = 0.7, 12.0  # of samples of lamps that are on; that of daylight is 1
 BRIGHTEST = 60.0  # radiance of one sample, in units of the mean of its picture
-MATTER_BSDF = "matter"
 
 
 def trace_pictures(batch: SceneBatch, names: Sequence[str], variant: str) -> dict[str, Array]:
@@ -120,10 +120,12 @@ def _albedo(batch: SceneBatch, scene: Any, camera: Any) -> Array:
 
 def _scene(interior: Interior, matter: Matter, lights: Outside) -> Any:
     """Return the scene, of the same form for all rooms."""
+    night = sun_height(interior.hour) < SUNLESS
+    weight = (NIGHT_WEIGHT if night else DAY_WEIGHT) if interior.lit else 1e-3
     contents: dict[str, Any] = {
         "type": "scene",
         "matter": _mesh("matter", matter.soup, bsdf=matter_bsdf(matter.tables)),
-        "glow": _mesh("glow", matter.glowing, radiance=matter.radiance, lit=interior.lit),
+        "glow": _mesh("glow", matter.glowing, radiance=matter.radiance, weight=weight),
         "day": daylight(lights, windows_of(interior)),
     }
     return mi.load_dict(contents)
@@ -147,7 +149,7 @@ def windows_of(interior: Interior) -> Array:
 
 
 def _mesh(
-    name: str, soup: Soup, bsdf: Any = None, radiance: Array | None = None, lit: bool = False
+    name: str, soup: Soup, bsdf: Any = None, radiance: Array | None = None, weight: float = 1.0
 ) -> Any:
     count = len(soup.corners)
     properties = mi.Properties()
@@ -157,18 +159,18 @@ def _mesh(
         shines = {
             "type": "area",
             "radiance": {"type": "mesh_attribute", "name": "face_radiance"},
-            "sampling_weight": 0.7 if lit else 1e-3,  # that of daylight is 1
+            "sampling_weight": weight,  # that of daylight is 1
         }
         properties["emitter"] = mi.load_dict(shines)
     mesh = mi.Mesh(
         name, 3 * count, count, properties, has_vertex_normals=True, has_vertex_texcoords=True
     )
     if radiance is not None:
-        mesh.add_attribute("face_radiance", 3, radiance.astype(np.float32).ravel())
+        mesh.add_attribute("face_radiance", 3, aligned(radiance))
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = soup.corners.astype(np.float32).ravel()
-    parameters["vertex_normals"] = soup.normals.astype(np.float32).ravel()
-    parameters["vertex_texcoords"] = soup.uv.astype(np.float32).ravel()
-    parameters["faces"] = np.arange(3 * count, dtype=np.uint32)
+    parameters["vertex_positions"] = aligned(soup.corners)
+    parameters["vertex_normals"] = aligned(soup.normals)
+    parameters["vertex_texcoords"] = aligned(soup.uv)
+    parameters["faces"] = aligned(np.arange(3 * count), np.uint32)
     parameters.update()
     return mesh

@@ -29,6 +29,7 @@ TRIES = 12  # places that are tried for one thing
 TURNS = {"west": 0.25, "east": 0.75, "north": 0.0, "south": 0.5}  # of fronts that face inwards
 BEHIND = 0.03  # metres between a wall and what stands along it
 DOOR_CLEAR, FRONT_CLEAR = 0.85, 0.55  # metres that stay free before doors and before furniture
+RUG_TOP = 0.03  # metres, above all rugs
 SILL_DEPTH = 0.14  # of a window's sill, inside the wall's plane
 TOP = 1.0  # least height of a wall's free part for a picture's lower edge
 FILL_TRIES = 400
@@ -55,6 +56,7 @@ ON_TOP: dict[str, dict[str, float]] = {
 SEATS = ("chair", "sofa", "armchair", "bed", "stool")
 INSIDE = ("shelf",)  # families on all of whose surfaces things stand; others have a top
 HIGHEST = 1.5  # metres of a top on which small things stand
+MOST_LAMPS = 2  # on tables and the like; more of them burn a picture
 MOST_ON_FLOOR = 5  # small things on the floor
 UPRIGHT_FRONT = ("books", "screen", "cushion", "lamp")  # look to the front
 
@@ -80,6 +82,12 @@ class Arranger:
     def piece(self, family: str, most_kinds: int = 3) -> Piece | None:
         """Return a member of a family: one that the room has, or another one."""
         known = self.kinds.setdefault(family, [])
+        if family == "picture":  # no two alike
+            new = self.member(family)
+            if new is None or any(new.name == other.name for other in known):
+                return None
+            known.append(new)
+            return new
         if len(known) < most_kinds and (not known or self.draws.chance(0.6)):
             new = self.member(family)
             if new is not None:
@@ -144,9 +152,9 @@ class Arranger:
             if not self.fits_wall(wall, along, piece.half[0], 0.0, piece.height):
                 continue
             box = self.wall_box(piece, wall, along, 0.0, BEHIND)
-            if number := self.stand(piece, box):
-                x, z = self.wall_place(wall, along, 2 * piece.half[1] + BEHIND + front / 2)
-                strip = Box(x, z, (piece.half[0], front / 2), 0.0, 2.0, TURNS[wall])
+            x, z = self.wall_place(wall, along, 2 * piece.half[1] + BEHIND + front / 2)
+            strip = Box(x, z, (piece.half[0], front / 2), RUG_TOP, 2.0, TURNS[wall])
+            if self.space.free(strip) and (number := self.stand(piece, box)):
                 self.space.kept.append(strip)
                 return number
         return 0
@@ -187,14 +195,16 @@ class Arranger:
             top = min(hole.top + 0.16, self.space.size[1] - 0.05)
             if top - piece.height < 0.01:
                 continue
-            length = wall_length(self.space.size, hole.wall)
+            length, pair = wall_length(self.space.size, hole.wall), []
             for side in (-1, 1):
                 edge = hole.left if side < 0 else hole.right
                 along = edge + side * (piece.half[0] - 0.08)
-                if not piece.half[0] < along < length - piece.half[0] or self.space.full:
-                    continue
                 box = self.wall_box(piece, hole.wall, along, top - piece.height, 0.17)
-                if self.space.within(box, 0.0) and self.space.free(box):
+                if piece.half[0] < along < length - piece.half[0] and self.space.within(box, 0.0):
+                    pair.append(box)
+            room = len(pair) == 2 and len(self.space.placed) + 2 <= self.space.most
+            if room and apart(pair[0], pair[1]) and all(map(self.space.free, pair)):
+                for box in pair:
                     self.space.put(piece, box, 0)
 
     # On the floor
@@ -442,6 +452,9 @@ class Arranger:
         return found
 
     def _small(self, family: str, parent: int, y: float, sides: Sequence[float]) -> int:
+        lamps = sum(thing.piece.family == "lamp" for thing in self.space.placed)
+        if family == "lamp" and lamps >= MOST_LAMPS:
+            return 0
         piece = self.piece(family)
         if piece is None or self._many(family, parent):
             return 0
@@ -468,7 +481,7 @@ class Arranger:
 
     def _many(self, family: str, parent: int) -> bool:
         """Return whether an object carries enough of a family."""
-        most = {"screen": 1, "lamp": 2, "bag": 1, "cap": 1, "box": 3, "cushion": 4, "vase": 3,
+        most = {"screen": 1, "lamp": 1, "bag": 1, "cap": 1, "box": 3, "cushion": 4, "vase": 3,
                 "basket": 2, "books": 12}  # fmt: skip
         same = sum(
             thing.stands_on == parent and thing.piece.family == family
@@ -526,14 +539,14 @@ def furnish(arranger: Arranger) -> None:
         elif step == "clock" and draws.chance(0.5):
             arranger.on_wall(step, 1.7, 2.0)
         elif step in ("shelf", "cabinet"):
-            arranger.against_wall(step)
+            arranger.against_wall(step, front=0.75)
         elif step == "floor":
             arranger.on_floor(draws.pick(("box", "bag", "basket", "stool")))
         elif step in ("tall_plant", "floor_lamp"):
             arranger.on_floor(step, corner=True)
         elif step == "armchair" and draws.chance(0.3):
             arranger.in_corner(step)
-        elif step == "rug" and draws.chance(0.5):
+        elif step == "rug" and not arranger.kinds.get("rug") and draws.chance(0.5):
             width, _, depth = space.size
             x, z = draws.span(0.3, 0.7) * width, draws.span(0.3, 0.7) * depth
             arranger.rug(x, z, draws.pick((0.0, 0.25)))
@@ -598,7 +611,7 @@ def _bedroom(arranger: Arranger) -> None:
 def _study(arranger: Arranger) -> None:
     """Put a desk with a chair along a wall, a shelf, and perhaps a sofa."""
     _desk(arranger)
-    arranger.against_wall("shelf")
+    arranger.against_wall("shelf", front=0.75)
     if arranger.draws.chance(0.4):
         arranger.against_wall("sofa", front=0.6)
 

@@ -16,7 +16,8 @@ Array = NDArray[Any]
 TRIES = 60
 HEIGHT = (0.8, 1.8)  # metres above the floor
 CLEAR = 0.3  # metres from everything
-STEEPEST = 0.25  # tangent of the steepest view up or down, below that of 15 degrees
+STEEPEST = 0.14  # tangent of the steepest view up or down: 8 degrees keep walls upright
+CHOICES = 4  # free viewpoints, of which the one is taken that has most objects before it
 NEAREST = 0.7  # metres to what the camera may look at anywhere in the picture
 SHARE_NEAR = 0.12  # of the picture that may be nearer than NEAR
 NEAR = 1.1
@@ -36,7 +37,10 @@ def draw_cameras(
     floor = [t.box for t in space.placed if t.piece.surfaces] or [t.box for t in space.placed]
     fov_y = Camera.fov_y_from_square(fov_degrees, spec.height, spec.width)
     cosine, sine = cos_sin(np.array(spec.views) / 360)
+    found: list[tuple[int, list[Place], Place]] = []
     for _ in range(TRIES):
+        if len(found) == CHOICES:
+            break
         focus = draws.pick(floor)
         x, z = draws.span(CLEAR, width - CLEAR), draws.span(CLEAR, depth - CLEAR)
         y = draws.span(*HEIGHT)
@@ -56,8 +60,19 @@ def draw_cameras(
             for c, s in zip(cosine.tolist(), sine.tolist(), strict=True)
         ]
         if all(_free(place, target, space, boxes, fov_y, spec) for place in places):
-            return places, target
-    return None
+            found.append((_before(places[0], target, boxes, fov_y), places, target))
+    return max(found, key=lambda one: one[0])[1:] if found else None
+
+
+def _before(place: Place, target: Place, boxes: Array, fov_y: float) -> int:
+    """Return how many boxes have their middle between the picture's left and right edge."""
+    ahead = np.array([target[0] - place[0], target[2] - place[2]])
+    ahead /= np.sqrt((ahead * ahead).sum())
+    toward = boxes[:, :2] - [place[0], place[2]]
+    along = toward[:, 0] * ahead[0] + toward[:, 1] * ahead[1]
+    across = np.abs(toward[:, 0] * ahead[1] - toward[:, 1] * ahead[0])
+    cosine, sine = half_angle(fov_y)
+    return int(((along > NEAREST) & (across * cosine < along * sine)).sum())
 
 
 def _table(boxes: list[Box]) -> Array:
