@@ -98,7 +98,10 @@ _PLAIN: list[tuple[re.Pattern[str], str | Callable[[re.Match[str]], str]]] = [
     (re.compile(r"\\n(?![a-z])"), "\n"),  # an escaped end of a line
     (re.compile(r"(?<=[A-Za-z])_(?=[A-J]\b)|\[[xX]\](?=\s*\W?[A-J]\b)"), " "),
     # "A 40%, B 60%" names both; "A ❌ B ✅" has an entry for each.
-    (re.compile(rf"^(\W*{L}){_SHARE}\s*(?:[,;/]|or\b|and\b)\s*(?={L}{_SHARE})", re.MULTILINE), r"\1 or "),
+    (
+        re.compile(rf"^(\W*{L}){_SHARE}\s*(?:[,;/]|or\b|and\b)\s*(?={L}{_SHARE})", re.MULTILINE),
+        r"\1 or ",
+    ),
     (
         re.compile(rf"^(?:[A-J][^\w\n]*?[{_MARKS}][^\w\n]*){{2,}}$", re.MULTILINE),
         lambda match: re.sub(f"(?<=[{_MARKS}])", "\n", match[0]),
