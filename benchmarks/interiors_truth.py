@@ -1,8 +1,6 @@
 """`python -m benchmarks.interiors_truth FOLDER` prints the digest of the truth of interiors-512-1.
 
 It is made without pictures, which take long.
-
-python -m benchmarks.interiors_truth FOLDER
 """
 
 import sys
