@@ -7,6 +7,7 @@
     machine.py      where and how long a run trains
     fit.py          the training loop; start reading here
     data.py         files to learn from
+    streams.py      rooms and questions to learn from that are rendered meanwhile
     images.py       images as networks take them, and batches of them
     rooms.py        images and cameras of rooms
     questions.py    images and answers of questions
