@@ -118,7 +118,7 @@ def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
     """Return the reference of a true view; `first` is None where it is the first one itself."""
     mask, fov = truth.mask, truth.fov_y_degrees
     height, width = truth.depth.shape
-    empty, _ = empty_room(truth.world_from_camera, fov, height, width, truth.room_size)
+    empty, facing = empty_room(truth.world_from_camera, fov, height, width, truth.room_size)
     pitch = pixel_size(len(mask), fov)
     points = back_project(truth.depth, fov)[mask]
     surface = surface_of(points, truth.normal[mask].astype(np.float64), pitch, mask)
@@ -136,10 +136,15 @@ def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
         guess + BEHIND: behind_scores(np.abs(depth - truth.depth)[hidden])[BEHIND]
         for guess, depth in guesses.items()
     }
-    floors = {EMPTY_ROOM + name: scores[name] for name in OF_EMPTY_ROOM if name in scores} | behind
     normals, smooth = normals_from_points(_image(points, mask), fov, mask)
     inside = inside_objects(truth.object_id)
     at, derived_at = inside > 0, _smooth_pixels(inside, smooth)
+    scores |= {
+        "shape_error": flat_error((empty - truth.depth)[at], inside[at]),
+        "shape_normal_degrees": _mean_angle(facing, truth.normal, at),
+        "derived_shape_normal_degrees": _mean_angle(walls, normals, derived_at),
+    }
+    floors = {EMPTY_ROOM + name: scores[name] for name in OF_EMPTY_ROOM if name in scores} | behind
     floors |= {
         f"{CUT_OUT}shape_error": flat_error(truth.depth[at].astype(np.float64), inside[at]),
         f"{CUT_OUT}shape_normal_degrees": one_normal_degrees(truth.normal[at], inside[at]),
@@ -389,6 +394,11 @@ def _single_objects(depth: Array, truth: TrueView, nearest: NearestDistances) ->
     mask = truth.mask
     error = np.abs(depth[mask] - truth.depth[mask].astype(np.float64))
     return single_objects(truth.object_id[mask], error, nearest.reverse)
+
+
+def _mean_angle(a: Array, b: Array, at: Array) -> float:
+    """Return the mean angle of normals (H, W, 3) at some pixels, degrees; NaN without any."""
+    return float(angular_errors_degrees(a, b, at).mean()) if at.any() else np.nan
 
 
 def _mean(angles: Array) -> float:

@@ -38,7 +38,7 @@ OF_TRUTH = (
 OTHER_SCENE = "other_scene_"  # begins the names of scores against another scene's relief
 OF_EMPTY_ROOM = (
     "chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness",
-    "behind_depth_error",
+    "behind_depth_error", "shape_error", "shape_normal_degrees", "derived_shape_normal_degrees",
 )  # fmt: skip
 OF_CUT_OUT = {
     "behind_depth_error": "of flat cut-outs, each at its object's median depth",
@@ -53,7 +53,8 @@ BEHIND = "behind_depth_error"
 SKILLED: dict[str, tuple[str, ...]] = (
     dict.fromkeys(RELIEF, (OTHER_SCENE,))
     | dict.fromkeys(OF_EMPTY_ROOM, (EMPTY_ROOM,))
-    | dict.fromkeys(OF_CUT_OUT, (CUT_OUT,))
+    # Tops and fronts of furniture are parallel to floor and walls.
+    | dict.fromkeys(OF_CUT_OUT, (CUT_OUT, EMPTY_ROOM))
     | {BEHIND: (EMPTY_ROOM, CUT_OUT, BALLS, BLOCKS)}
 )
 # The floors of BEHIND that were shown no more than the method.

@@ -480,8 +480,13 @@ def empty_room_scores(view) -> dict[str, float]:
     Z = view.Z[view.mask]
     scores = geometry(view, Z, Z[:, None] * view.rays, "depth")
     names = {"chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness"}
-    names = {*names, "behind_depth_error"} & scores.keys()
-    return {f"empty_room_{name}": scores[name] for name in names}
+    names |= {"behind_depth_error", "shape_error", "derived_shape_normal_degrees"}
+    found = {f"empty_room_{name}": scores[name] for name in names & scores.keys()}
+    # The plane that a pixel sees is that on which its world point lies.
+    world = Z[:, None] * (view.rays @ view.R.T) + view.o
+    facing = np.eye(3)[np.abs(world).argmin(-1)] @ view.R
+    angles = angle(facing, view.n)
+    return found | part("empty_room_shape_normal_degrees", angles, view.inside > 0)
 
 
 def predicted_relief(view, z: Array, P: Array, kind: str) -> Array:
@@ -642,16 +647,10 @@ def means(columns: dict[str, Array]) -> dict[str, float]:
 def skills(columns: dict[str, Array]) -> dict[str, float]:
     """Return the skills of a submission that was shown the scored view."""
     found = {}
-    behind = [
-        f"{guess}_behind_depth_error" for guess in ("empty_room", "cut_out", "balls", "blocks")
-    ]
-    behind = sorted(
-        (name for name in behind if name in columns), key=lambda n: np.nanmean(columns[n])
-    )
+    kinds = ("empty_room", "cut_out", "balls", "blocks", "other_scene")
     for name, values in columns.items():
-        floors = [f"{kind}_{name}" for kind in ("empty_room", "cut_out", "other_scene")]
-        floor = next((f for f in floors if f in columns), None)
-        floor = behind[0] if name == "behind_depth_error" else floor
+        floors = [f"{kind}_{name}" for kind in kinds if f"{kind}_{name}" in columns]
+        floor = min(floors, key=lambda f: scene_means(columns, columns[f]).mean(), default=None)
         if floor is None:
             continue
         missing = np.isnan(values) | np.isnan(columns[floor])
