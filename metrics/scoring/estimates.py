@@ -206,7 +206,7 @@ def floor_column(
 ) -> str | None:
     """Return which column of items is the floor of a score's skill; None where there is none.
 
-    Of several that were shown as much as the method, it is that of the lowest mean over scenes,
+    Of several that were shown as much as the method, it is that of the best mean over scenes,
     (N,).
     """
     begins = [
@@ -220,34 +220,53 @@ def floor_column(
         there = np.isfinite(items[column])
         return float(cluster_means(items[column][there], scene[there]).mean())
 
-    return min(columns, key=mean, default=None)
+    if len(columns) < 2:
+        return columns[0] if columns else None
+    return (max if metric(name).higher_is_better else min)(columns, key=mean)
 
 
 def skills(
-    items: Mapping[str, Array], scene: Array, bootstrap: Bootstrap, shown: Shown = "scored_view"
+    items: Mapping[str, Array],
+    scene: Array,
+    bootstrap: Bootstrap,
+    shown: Shown = "scored_view",
+    weights: Array | None = None,
 ) -> dict[str, Skill]:
-    """Return the skills of rooms from columns of items, (N,) each, those of floors among them.
+    """Return the skills of pictures from columns of items, (N,) each, those of floors among them.
 
     There is none where no image shows an object that counts: the empty room is then the truth. A
     floor below 0, that of relief which goes against other scenes, counts as 0, the score of the
     empty room: so a bad floor wins nothing, and the skill of a relief never exceeds its score.
+
+    Args:
+        weights: of the items in a mean over all, (N,); by default each scene weighs the same.
     """
     column_of = {name: floor_column(items, scene, name, shown) for name in SKILLED if name in items}
     names = [name for name, column in column_of.items() if column is not None]
     of_objects = [name for name in names if name in OBJECT_SCORES]
-    if not any(np.isfinite(items[name]).any() for name in of_objects):
+    if weights is None and not any(np.isfinite(items[name]).any() for name in of_objects):
         return {}
     skill_of: dict[str, Skill] = {}
     pairs = {name: np.stack([items[name], items[str(column_of[name])]]) for name in names}
     for group, there in by_presence(pairs):
-        errors, floors = (
-            cluster_means(np.stack([pairs[name][i, there] for name in group], -1), scene[there])
-            for i in (0, 1)
-        )
+        each = [np.stack([pairs[name][i, there] for name in group], -1) for i in (0, 1)]
+        perfect: Any = 1.0
+        if weights is None:
+            errors, floors = (cluster_means(values, scene[there]) for values in each)
+        else:  # their means over clusters are those over all
+            at = scene[there], weights[there]
+            errors, floors = (
+                np.stack(
+                    [pooled_means_of(name, x, *at) for name, x in zip(group, v.T, strict=True)], -1
+                )
+                for v in each
+            )
+            perfect = pooled_means(np.ones(len(at[0])), *at, False)[:, None]
         floors[:, floors.mean(axis=0) < 0.0] = 0.0
         score, floor = errors.mean(axis=0), floors.mean(axis=0)
         higher = np.array([metric(name).higher_is_better for name in group])
-        errors[:, higher], floors[:, higher] = 1.0 - errors[:, higher], 1.0 - floors[:, higher]
+        for table in (errors, floors):
+            table[:, higher] = perfect - table[:, higher]
         values = [skill(*row) for row in zip(score.tolist(), floor.tolist(), higher, strict=True)]
         kept = [k for k, value in enumerate(values) if value is not None]
         if not kept:
@@ -258,7 +277,9 @@ def skills(
             assert value is not None
             # The ends belong to the value but for rounding; min and max keep what is not a number.
             if value == 1.0 and higher[k]:
-                low, high = with_width(1.0 - errors[:, k], low, high, metric(name).unit)
+                low, high = with_width(
+                    (perfect - errors[:, [k]])[:, 0], low, high, metric(name).unit
+                )
                 low = (low - float(floor[k])) / (1.0 - float(floor[k]))
             span = finite(min(low, value)), finite(max(high, value))
             if all(abs(end) <= ROUNDING for end in (value, *span) if end is not None):

@@ -8,7 +8,7 @@ from metrics.measured.protocols import BY_NAME, DECLARED, PROTOCOLS, ProtocolErr
 from metrics.measured.reader import MeasuredFile
 from metrics.scoring.geometry import scored_alignment
 from metrics.scoring.measured_rows import PIXELS, require_suited, suits
-from metrics.scoring.metric_names import metric
+from metrics.scoring.metric_names import OF_TRUTH, metric
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import require_one_kind, require_scored
 from metrics.scoring.rows import score_measured_rows
@@ -67,7 +67,7 @@ def score_measured(
         scores = {
             name: values
             for name, values in ours.items()
-            if metric(name).lacking or not np.isnan(values).any()
+            if name.startswith(OF_TRUTH) or metric(name).lacking or not np.isnan(values).any()
         }
         items = {"row": rows, "group": truth.groups[rows], "pixels": pixels, **scores}
         alignment = protocol.alignment or scored_alignment(kind, declared)

@@ -1,6 +1,7 @@
 """Scores of one image whose truth was measured, under each of some protocols."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,13 +21,14 @@ from metrics.measures.depth import DepthPair, depth_scores
 from metrics.measures.surfaces.normals import angular_errors_degrees, normal_scores
 from metrics.measures.surfaces.points import point_map_scores
 from metrics.scoring.geometry import alignments_scored, scored_alignment
-from metrics.scoring.metric_names import metric
+from metrics.scoring.metric_names import FLAT, HEADLINE, RAMP, metric
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import Against, broken_rules, refuse_pixels
 
 Array = NDArray[Any]
 _DEPTH_SCORES = tuple(depth_scores(DepthPair(np.ones(1), np.ones(1))))
+_OF_GUESSES = [guess + name for guess in (FLAT, RAMP) for name in HEADLINE["measured"]]
 PIXELS = "pixels"  # how many pixels of an image a protocol scores
 
 
@@ -73,7 +75,7 @@ def scores_of_view(
         except ProtocolError as error:
             if len(protocols) == 1:
                 raise error.inside(f"protocol {protocol.name}") from error
-            found |= {(protocol.name, name): np.nan for name in _DEPTH_SCORES}
+            found |= {(protocol.name, name): np.nan for name in (*_DEPTH_SCORES, *_OF_GUESSES)}
             found[protocol.name, PIXELS] = 0
             continue
         true = truth.depth[mask].astype(np.float64)
@@ -92,9 +94,30 @@ def scores_of_view(
             scores |= _further(predicted, normal, truth, pair, dense)
         if broken:
             scores = {name: metric(name).worst for name in scores}
+        alignment = protocol.alignment or scored_alignment(predicted.kind, predicted.alignment)
+        scores |= _guesses(replace(protocol, alignment=alignment), mask, true)
         found |= {(protocol.name, name): value for name, value in scores.items()}
         found[protocol.name, PIXELS] = len(true)
     return found
+
+
+def _guesses(protocol: Protocol, mask: Array, true: Array) -> dict[str, float]:
+    """Return the headline of guesses that see no picture, under a protocol with its alignment.
+
+    One has the same depth everywhere, the other comes nearer evenly from the upper to the lower
+    edge, to half its depth. Where nothing is fitted to the truth, they are, by scale and shift.
+    """
+    if protocol.alignment == "none":
+        protocol = replace(protocol, alignment="scale_shift")
+    disparity = protocol.alignment == "disparity_scale_shift"
+    down = (np.nonzero(mask)[0] + 0.5) / len(mask)
+    ramp = 1.0 + down if disparity else 2.0 - down
+    scores = dict[str, float]()
+    for guess, values in ((FLAT, np.ones_like(down)), (RAMP, ramp)):
+        kind = "disparity" if disparity else "depth"
+        fitted = depth_scores(depth_under(protocol, kind, "none", values, true))
+        scores |= {guess + name: fitted[name] for name in HEADLINE["measured"]}
+    return scores
 
 
 def depth_as_declared(predicted: PredictedView, truth: MeasuredView) -> Array:

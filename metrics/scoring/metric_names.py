@@ -29,11 +29,15 @@ EMPTY_ROOM = "empty_room_"  # begins the names of the empty room's own scores
 CUT_OUT = "cut_out_"  # begins the names of the scores of flat cut-outs
 # Begin the names of the scores of guesses at what the first view does not show.
 BALLS, BLOCKS = "balls_", "blocks_"
+# Begin the names of the scores of guesses at measured depth, which see no picture.
+FLAT, RAMP = "flat_", "ramp_"
 OF_TRUTH = (
     EMPTY_ROOM,
     CUT_OUT,
     BALLS,
     BLOCKS,
+    FLAT,
+    RAMP,
 )  # begin names of scores that no submission has a part in
 OTHER_SCENE = "other_scene_"  # begins the names of scores against another scene's relief
 OF_EMPTY_ROOM = (
@@ -49,14 +53,15 @@ OF_CUT_OUT = {
 RELIEF = ("relief_correlation", "relief_iou")
 BEHIND = "behind_depth_error"
 # Scores that have a skill: what begins the names of the columns that may be the floor, by name.
-# The lowest one is.
-SKILLED: dict[str, tuple[str, ...]] = (
-    dict.fromkeys(RELIEF, (OTHER_SCENE,))
-    | dict.fromkeys(OF_EMPTY_ROOM, (EMPTY_ROOM,))
+# The best one is.
+SKILLED: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(RELIEF, (OTHER_SCENE,)),
+    **dict.fromkeys(OF_EMPTY_ROOM, (EMPTY_ROOM,)),
     # Tops and fronts of furniture are parallel to floor and walls.
-    | dict.fromkeys(OF_CUT_OUT, (CUT_OUT, EMPTY_ROOM))
-    | {BEHIND: (EMPTY_ROOM, CUT_OUT, BALLS, BLOCKS)}
-)
+    **dict.fromkeys(OF_CUT_OUT, (CUT_OUT, EMPTY_ROOM)),
+    BEHIND: (EMPTY_ROOM, CUT_OUT, BALLS, BLOCKS),
+    **dict.fromkeys(HEADLINE["measured"], (FLAT, RAMP)),
+}
 # The floors of BEHIND that were shown no more than the method.
 SHOWN_AS_MUCH = {
     "scored_view": OF_TRUTH,
@@ -74,6 +79,8 @@ WHOSE = {
     CUT_OUT: "flat cut-out",
     BALLS: "balls",
     BLOCKS: "blocks",
+    FLAT: "one depth",
+    RAMP: "nearer to the lower edge",
     OTHER_SCENE: "against another scene",
 }
 F_SCORE = "f_score_<threshold>"
@@ -429,6 +436,18 @@ ALL |= {
     for name, whose in OF_CUT_OUT.items()
 }
 ALL |= {
+    guess + name: replace(
+        ALL[name],
+        name=guess + name,
+        task="measured",
+        title=f"{ALL[name].title}, {WHOSE[guess]}",
+        definition=f"`{name}` of a guess that sees no picture ({WHOSE[guess]}), fitted as"
+        " predictions are, by scale and shift where nothing is fitted.",
+    )
+    for guess in (FLAT, RAMP)
+    for name in HEADLINE["measured"]
+}
+ALL |= {
     guess + BEHIND: replace(
         ALL[BEHIND],
         name=guess + BEHIND,
@@ -508,6 +527,7 @@ def markdown_table() -> str:
     flat = "; ".join(f"`{name}` {whose}" for name, whose in OF_CUT_OUT.items())
     other = "the same of the prediction with the relief of another scene, seen in the same view."
     guesses = f"`{BEHIND}` of {BALLS[:-1]} and {BLOCKS[:-1]}; in `items` alone."
+    blind = "the same of guesses that see no picture, of measured truth; in `items` alone."
     derived = "the same of normals derived from the predicted and from the true points."
     rows = [
         *map(_cells, (*_SHAPE, *_BEHIND, *_RELIEF, *_OBJECTS, *_POINTS, *_DEPTH)),
@@ -520,6 +540,7 @@ def markdown_table() -> str:
         (f"{EMPTY_ROOM}<score>", *same, floor),
         (f"{CUT_OUT}<score>", *same, f"{flat}; in `items` alone."),
         (f"{BALLS}{BEHIND}`, `{BLOCKS}{BEHIND}", *same, guesses),
+        (f"{FLAT}<score>`, `{RAMP}<score>", *same, blind),
         _cells(_ACCURACY),
     ]
     lines = [f"| `{name}` | {' | '.join(cells)} |" for name, *cells in rows]

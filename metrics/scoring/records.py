@@ -325,7 +325,7 @@ class ScoreFile:
     def skills(self) -> Mapping[str, Skill]:
         """The skills of some of the scores, by name."""
         if self.task != "iqtt":
-            return skills(self.items, self.clusters, self._bootstrap, self.shown)
+            return skills(self.items, self.clusters, self._bootstrap, self.shown, self.weights)
         kinds = {
             kind: group.n for kind, group in self.answer_groups.get("by_distractor", {}).items()
         }

@@ -9,7 +9,7 @@ from metrics.measured.protocols import BY_NAME, PROTOCOLS, Crop
 from metrics.scoring.metric_names import HEADLINE
 from metrics.scoring.records import ScoreFile
 from metrics.views.figures import COLUMN, draw_scores
-from metrics.views.score_tables import INTERVAL, score_cell, title_of
+from metrics.views.score_tables import INTERVAL, floor_cell, score_cell, title_of
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
 from scenegen.common.text_table import piped
 
@@ -37,17 +37,13 @@ def protocols_table(scores: Sequence[ScoreFile]) -> Table:
     for file in scores:
         protocol = BY_NAME[file.protocol]
         share = f"{file.columns['pixels'].sum() / scores[0].columns['pixels'].sum():.0%}"
-        cells = [score_cell(file.metrics[name]) for name in names]
-        rows.append(
-            [
-                protocol.name,
-                file.alignment,
-                range_text(protocol.least, protocol.largest),
-                share,
-                *cells,
-            ]
-        )
-    return make_table("", ("protocol", "alignment", "metres", "pixels", *names), rows)
+        limits = range_text(protocol.least, protocol.largest)
+        scored = [score_cell(file.metrics[name]) for name in names]
+        # Its floor beside the first score; that of the others is in the tables of one protocol.
+        scored.insert(1, floor_cell(file, names[0]))
+        rows.append([protocol.name, file.alignment, limits, share, *scored])
+    head = ("protocol", "alignment", "metres", "pixels", names[0], "its floor", *names[1:])
+    return make_table("", head, rows)
 
 
 def draw_protocols(path: str | Path, scores: Sequence[ScoreFile], overwrite: bool = False) -> None:

@@ -98,7 +98,7 @@ def headline_rows(scores: ScoreFile) -> Table:
 
 def floor_text(scores: ScoreFile, name: str) -> str:
     """Return the name of the floor of a score that has a skill."""
-    if scores.task == "rooms":
+    if scores.task != "iqtt":
         return WHOSE[scores.skills[name].floor_name[: -len(name)]]
     return scores.skills[name].floor_name
 
@@ -351,6 +351,12 @@ def what_the_floor_is(scores: ScoreFile) -> str:
             " is the same prediction, held against the relief of another scene. Of what is behind"
             " it is the best guess that was shown as much. Else it is the empty room: walls and"
             " floor from the true camera, no objects."
+        )
+    if scores.task == "measured":
+        return (
+            "The floor is the better of two guesses that see no picture: one depth everywhere, or"
+            " nearer evenly to the lower edge. They are fitted as predictions are, by scale and"
+            " shift where nothing is fitted."
         )
     return (
         "The floor is the best method without 3D on questions of the same settings, by kind of"

@@ -203,7 +203,7 @@ WRONG_ROOMS = [
     ("format", GONE, "", "to be there"),
     ("format", "pix2shape-bench/rooms", "", "'pix2shape-bench/scores'"),
     ("format_version", "3.0", "", "'2.0'"),
-    ("task", "room", "", "'rooms' or 'iqtt'"),
+    ("task", "room", "", "'rooms', 'iqtt' or 'measured'"),
     ("method", 3, "", "text"),
     ("method", "m" * 201, "", "at most 200"),
     ("method", "\ud800", "", "unicode"),

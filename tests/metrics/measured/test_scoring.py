@@ -56,6 +56,33 @@ def test_scores_are_means_over_images_at_the_measured_pixels(measured, predicted
     assert not validate(path, truth)
 
 
+def test_floors_are_guesses_that_see_no_picture(measured, predicted):
+    """Under a scale and a shift: the mean depth, and the best line over rows that comes nearer."""
+    truth = measured()
+    found = score([predicted(truth, noisy)], truth, Settings(protocol="affine-depth"))
+    with h5py.File(truth) as file:
+        for row, (height, width) in enumerate(file["size"][()]):
+            t = file["depth"][row, :height, :width].astype(float)
+            down, _ = np.nonzero(np.isfinite(t))
+            t = t[np.isfinite(t)]
+            slope, middle = np.polyfit(down, t, 1)
+            line = middle + slope * down if slope < 0 else t.mean()
+            for guess, fitted in (("flat", t.mean()), ("ramp", line)):
+                expected = np.sqrt(np.mean((fitted - t) ** 2))
+                assert found.items[f"{guess}_rmse"][row] == pytest.approx(expected, rel=1e-9)
+    perfect = score([predicted(truth, lambda d, _: d, "perfect")], truth)
+    assert {s.value for s in perfect.skills.values()} == {1.0}
+    flat = score(
+        [predicted(truth, lambda d, _: np.ones_like(d), "flat", alignment="scale_shift")], truth
+    )
+    for name, skill in flat.skills.items():
+        best = max if name == "delta_1" else min
+        floor = best(flat.items[f"{guess}_{name}"].mean() for guess in ("flat", "ramp"))
+        assert skill.floor == pytest.approx(floor, rel=1e-12)
+        assert skill.value <= 0
+    assert flat.skills.keys() == {"abs_rel", "delta_1", "rmse", "silog"}
+
+
 def test_processes_change_no_bit(measured, predicted):
     truth = measured(count=40)
     path = predicted(truth, noisy)

@@ -82,7 +82,10 @@ def nothing_left():
     """No process, no open file and no shared memory more than before."""
     before = held()
     yield
-    assert held() == before
+    processes, files, *memory = held()
+    assert processes <= before[0]  # what other tests left may end meanwhile
+    assert files <= before[1]
+    assert memory == [*before[2:]]
 
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -176,9 +179,9 @@ def test_what_goes_wrong_in_a_process_ends_the_loop(nothing_left):
         with pytest.raises(LostWorkerError) as lost:
             found(counted(killed=41, workers=1))
         assert lost.value.found == "signal 9, SIGKILL"
-    batches = iter(counted(workers=1))
+    batches, others = iter(counted(workers=1)), children()
     next(batches)
-    os.kill(int(*children()), signal.SIGKILL)
+    os.kill(int(*(children() - others)), signal.SIGKILL)
     with pytest.raises(LostWorkerError):
         list(zip(batches, range(10)))
 

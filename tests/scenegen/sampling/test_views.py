@@ -180,9 +180,9 @@ def test_no_wavefront_has_more_images_than_the_batch_or_one_scene(batch, monkeyp
     sizes = []
     launch = dataset.launch_fields
 
-    def counted(images, names, device):
+    def counted(images, *more):
         sizes.append(len(images))
-        return launch(images, names, device)
+        return launch(images, *more)
 
     monkeypatch.setattr(dataset, "launch_fields", counted)
     spec = DatasetSpec(**{**TINY, "height": 16, "width": 16, "min_visible_pixels": 0})
