@@ -106,13 +106,13 @@ check: $(VENV)/.dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
 
 bench: $(VENV)/.test
-	$(BIN)/python -m benchmarks.render
-	$(BIN)/python -m benchmarks.shapes
-	$(BIN)/python -m benchmarks.questions
-	$(BIN)/python -m benchmarks.stream
-	$(BIN)/python -m benchmarks.nearest
+	$(BIN)/python -m benchmarks.rendering.render
+	$(BIN)/python -m benchmarks.rendering.shapes
+	$(BIN)/python -m benchmarks.rendering.questions
+	$(BIN)/python -m benchmarks.rendering.stream
+	$(BIN)/python -m benchmarks.scoring.nearest
 	$(BIN)/python -m benchmarks.surfels
-	$(BIN)/python -m benchmarks.score_rows
+	$(BIN)/python -m benchmarks.scoring.score_rows
 
 # Nine minutes on a machine with an NVIDIA GPU, without network; gpu/result/tables.md shows it.
 gpu: $(VENV)/.test

@@ -1,7 +1,7 @@
 """A faster ray caster, in Dr.Jit, for images of equal cubes of one orientation: polycubes.
 
 In the cubes' common frame they are all aligned with the axes, so that a ray needs a few operations
-for each, and no acceleration structure. `benchmarks/questions.py` measures the gain over
+for each, and no acceleration structure. `benchmarks/rendering/questions.py` measures the gain over
 `rays.closest_hit`.
 """
 

@@ -1,8 +1,8 @@
 """CPU time to render each basic shape, as an exact surface and as a mesh: one Markdown table.
 
-`python -m benchmarks.shapes [--quick]`, from the repository's root. Each row renders the same
-scenes, with shadows off, 64 images at a time. The two ways take turns in one process, and CPU time
-of all threads is counted, so that a busy machine does not favour either.
+`python -m benchmarks.rendering.shapes [--quick]`, from the repository's root. Each row renders the
+same scenes, with shadows off, 64 images at a time. The two ways take turns in one process, and CPU
+time of all threads is counted, so that a busy machine does not favour either.
 """
 
 import argparse

@@ -1,6 +1,6 @@
 """How fast rooms are rendered, beside plain Mitsuba and the bare ray cast: Markdown tables.
 
-    python -m benchmarks.render [--quick]
+    python -m benchmarks.rendering.render [--quick]
 
 The first is of basic shapes, the second of the built-in objects, the third of a folder of meshes
 of 20,480 faces, all at 128x128 pixels with depth and normals. (a) is plain Mitsuba, see
@@ -201,21 +201,25 @@ def basic_shapes(folder: str, quick: bool) -> Iterator[Row]:
     first, second, largest = (500, 1000, 2000) if quick else (1000, 5000, 20000)
     scenes, few, repeats = (256, 8, 2) if quick else (1000, 40, 3)
     whole = {"rooms": rooms, "repeats": repeats}
-    yield f"(b) end to end, N = {first:,}", "render:end_to_end", {**whole, "count": first}
+    yield f"(b) end to end, N = {first:,}", "rendering.render:end_to_end", {**whole, "count": first}
     shared = {"rooms": rooms, "count": scenes, "repeats": repeats}
-    yield "(b) rendering stage alone", "render:stage", shared
-    yield "(b) proposing scenes alone", "render:proposing", {"count": second, "repeats": repeats}
-    yield "(c) bare cast", "render:bare_cast", {**shared, "size": 256}
+    yield "(b) rendering stage alone", "rendering.render:stage", shared
+    yield (
+        "(b) proposing scenes alone",
+        "rendering.render:proposing",
+        {"count": second, "repeats": repeats},
+    )
+    yield "(c) bare cast", "rendering.render:bare_cast", {**shared, "size": 256}
     plain = {"path": rooms, "count": few, "repeats": repeats}
     for coarse, meshes in ((False, "the same"), (True, "coarse")):
         for variant in VARIANTS:
             how = {**plain, "variant": variant, "coarse": coarse}
-            yield f"(a) {meshes} meshes, {variant}", "plain_mitsuba:rooms", how
+            yield f"(a) {meshes} meshes, {variant}", "rendering.plain_mitsuba:rooms", how
     name, how = f"(b) end to end, N = {second:,}", {**whole, "count": second}
-    yield f"{name}, --workers 1", "render:end_to_end", {**how, "workers": 1}
-    yield name, "render:end_to_end", how
+    yield f"{name}, --workers 1", "rendering.render:end_to_end", {**how, "workers": 1}
+    yield name, "rendering.render:end_to_end", how
     how = {**whole, "count": largest, "repeats": 1}
-    yield f"(b) end to end, N = {largest:,}", "render:end_to_end", how
+    yield f"(b) end to end, N = {largest:,}", "rendering.render:end_to_end", how
 
 
 def built_in_objects(folder: str, quick: bool) -> Iterator[Row]:
@@ -225,19 +229,19 @@ def built_in_objects(folder: str, quick: bool) -> Iterator[Row]:
     # Two workers, as what one process keeps in memory would be neither empty nor on disk.
     whole = {"rooms": rooms, "preset": "shapenet", "cache": f"{folder}/cache", "workers": 2}
     name, how = f"(b) end to end, N = {count:,}", {**whole, "count": count, "repeats": repeats}
-    yield f"{name}, empty cache", "render:end_to_end", {**how, "empty": True}
-    yield f"{name}, warm cache", "render:end_to_end", how
+    yield f"{name}, empty cache", "rendering.render:end_to_end", {**how, "empty": True}
+    yield f"{name}, warm cache", "rendering.render:end_to_end", how
     how = {**whole, "count": largest, "repeats": 1}
-    yield f"(b) end to end, N = {largest:,}, warm cache", "render:end_to_end", how
+    yield f"(b) end to end, N = {largest:,}, warm cache", "rendering.render:end_to_end", how
     stage = {"rooms": rooms, "count": 128 if quick else 512, "repeats": repeats}
-    yield "(b) rendering stage alone", "render:stage", stage
+    yield "(b) rendering stage alone", "rendering.render:stage", stage
     plain = {"path": rooms, "count": 8 if quick else 60, "repeats": repeats, "coarse": False}
     for variant in VARIANTS:
-        yield f"(a) {variant}", "plain_mitsuba:rooms", {**plain, "variant": variant}
+        yield f"(a) {variant}", "rendering.plain_mitsuba:rooms", {**plain, "variant": variant}
     few = {"rooms": rooms, "count": 16 if quick else 64, "repeats": 1, "workers": 1}
     for shading in ("paper", "path"):
         name = f"basic shapes, --shading {shading}"
-        yield name, "render:end_to_end", {**few, "shading": shading}
+        yield name, "rendering.render:end_to_end", {**few, "shading": shading}
 
 
 def folder_of_meshes(folder: str, quick: bool) -> Iterator[Row]:
@@ -246,11 +250,11 @@ def folder_of_meshes(folder: str, quick: bool) -> Iterator[Row]:
     count, models, repeats = (200, 10, 2) if quick else (2000, 100, 3)
     mesh_folder(Path(root), models)
     whole = {"rooms": rooms, "count": count, "repeats": repeats, "root": root}
-    yield f"(b) end to end, N = {count:,}", "render:end_to_end", whole
+    yield f"(b) end to end, N = {count:,}", "rendering.render:end_to_end", whole
     plain = {"path": rooms, "count": 8 if quick else 20, "repeats": repeats, "coarse": False}
     for variant in VARIANTS:
         how = {**plain, "variant": variant, "objects_root": root}
-        yield f"(a) {variant}", "plain_mitsuba:rooms", how
+        yield f"(a) {variant}", "rendering.plain_mitsuba:rooms", how
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 """Seconds, processor time and memory that `bench score` takes on measured truth.
 
-    python -m benchmarks.measured_truth [--images 654]
+    python -m benchmarks.scoring.measured_truth [--images 654]
 
 Images are of 640x480 pixels, of which 90% or 5% have a depth. The predictions are the truth with
 5% of noise. Each is scored by the command itself, in a process of its own, by two processes, with

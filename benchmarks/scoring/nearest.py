@@ -1,6 +1,6 @@
 """Milliseconds a pair of the scorer's nearest neighbours both ways, on rooms and predictions.
 
-    python -m benchmarks.nearest [--sizes 128 256] [--rounds 5]
+    python -m benchmarks.scoring.nearest [--sizes 128 256] [--rounds 5]
 
 Ours starts from the depth images; the others are given the points. "error" is the largest
 difference of any method from scipy in double precision.
@@ -8,11 +8,10 @@ difference of any method from scipy in double precision.
 
 import argparse
 import importlib.util
-import runpy
 import statistics
 from collections.abc import Callable, Iterator
 from functools import partial
-from pathlib import Path
+from itertools import count
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,11 +20,22 @@ from benchmarks.timing import repeat
 from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, nearest_distances
 from metrics.measures.surfaces.image_search import nearest_distances_on_image
 from scenegen.camera import back_project
+from scenegen.description.presets import preset_spec
+from scenegen.rendering.packing import pack
+from scenegen.rendering.renderer import render
+from scenegen.sampling.scenes import sample_scene
 
 Array = NDArray[np.float64]
 Method = Callable[[Array, Array], NearestDistances]
-FOV = 20.0
-ROOMS = Path(__file__).resolve().parents[1] / "tests" / "metrics" / "conftest.py"
+FOV = 28.0  # of the preset
+
+
+def room_depth(size: int) -> Array:
+    """Return the planar depth (size, size) of a room of basic shapes."""
+    spec = preset_spec("shapes", height=size, width=size)
+    found = (sample_scene(spec, i) for i in count())
+    scene = next(scene for scene in found if scene is not None)
+    return render(pack(spec, [scene])).depth[0].astype(np.float64)
 
 
 def predictions(truth: Array, seed: int) -> Iterator[tuple[str, Array]]:
@@ -91,11 +101,10 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="+", default=[128, 256])
     parser.add_argument("--rounds", type=int, default=5)
     arguments = parser.parse_args()
-    make_room = runpy.run_path(str(ROOMS))["make_room_depth"]
     names = ["ours", *installed_methods()]
     print(f"{'size  prediction':40s}", *(f"{name:>9s}" for name in names), "    error")
     for size in arguments.sizes:
-        truth = make_room(1, size)
+        truth = room_depth(size)
         for name, predicted in predictions(truth, seed=1):
             times, error = bench_pair(predicted, truth, arguments.rounds)
             cells = " ".join(f"{value:9.2f}" for value in times)

@@ -1,6 +1,6 @@
 """Where the processor time of an image goes: one Markdown table, a column for each preset.
 
-    python -m benchmarks.stages [PRESET ...]
+    python -m benchmarks.rendering.stages [PRESET ...]
 
 The stages of `rooms.render` run one after another, in batches of 64, on one thread. The models of
 families are on disk before, and read from there.

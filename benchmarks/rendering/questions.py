@@ -1,6 +1,6 @@
 """How fast questions are made, beside one Mitsuba render an image: one Markdown table.
 
-    python -m benchmarks.questions [--quick]
+    python -m benchmarks.rendering.questions [--quick]
 
 Images have 128x128 pixels, colour only. Plain Mitsuba has its meshes and lights made beforehand,
 writes no file and refuses no view; its light has no ambient part.
@@ -62,13 +62,13 @@ def rows(folder: str, quick: bool) -> Iterator[Row]:
     few, repeats = (10, 2) if quick else (50, 3)
     for count in (1000,) if quick else (5000,):
         how = {"count": count, "repeats": repeats, "folder": folder}
-        yield f"iqtt make-split, {count:,} questions", "questions:end_to_end", how
+        yield f"iqtt make-split, {count:,} questions", "rendering.questions:end_to_end", how
     for name, cubes in (("cubes'", True), ("general", False)):
         how = {"count": 64, "repeats": 10 * repeats, "cubes": cubes}
-        yield f"pixels alone, the {name} kernel", "questions:pixels", how
+        yield f"pixels alone, the {name} kernel", "rendering.questions:pixels", how
     for variant in ("scalar_rgb", "llvm_ad_rgb"):
         how = {"count": few, "repeats": repeats, "variant": variant}
-        yield f"plain Mitsuba, {variant}", "plain_mitsuba:questions", how
+        yield f"plain Mitsuba, {variant}", "rendering.plain_mitsuba:questions", how
 
 
 def main() -> None:

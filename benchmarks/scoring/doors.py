@@ -1,6 +1,6 @@
 """Seconds of `bench run hf:FOLDER` beside a bare loop over the same network.
 
-    python -m benchmarks.doors [--images 24] [--size 512] [--batch 8] [--rounds 3]
+    python -m benchmarks.scoring.doors [--images 24] [--size 512] [--batch 8] [--rounds 3]
 
 The network has the form of Depth Anything V2 Small and random weights. Times begin when it is
 loaded. The loop keeps its predictions in memory; `bench run` checks and writes them. Goal: 5%.
@@ -60,7 +60,7 @@ def bare_loop(network: Any, path: Path, batch: int) -> float:
 
 def main() -> None:
     """Print one line for each round, and the ratio of the medians."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.doors", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.scoring.doors", description=__doc__)
     parser.add_argument("--images", type=int, default=24)
     parser.add_argument("--size", type=int, default=512)
     parser.add_argument("--batch", type=int, default=8)

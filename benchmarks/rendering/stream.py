@@ -1,6 +1,6 @@
 """Streams beside files of the same rows, once both are running: a Markdown table, and what follows.
 
-    python -m benchmarks.stream [--quick] [--device cuda]
+    python -m benchmarks.rendering.stream [--quick] [--device cuda]
 
 With --device, a stream is measured whose pixels stay on the device, beside one of numpy arrays.
 Images have 128x128 pixels, with depth and normals; questions have four images each, colour only.
@@ -69,7 +69,11 @@ def rows(folder: str, quick: bool) -> Iterator[Row]:
         ("questions stream", "mixed", 2_000),
     ):
         how = {"what": what, "preset": preset, "count": count // (5 if quick else 1)}
-        yield f"{what}, {preset}", "stream:running", {**how, "workers": 2, "folder": folder}
+        yield (
+            f"{what}, {preset}",
+            "rendering.stream:running",
+            {**how, "workers": 2, "folder": folder},
+        )
 
 
 def rows_on_device(folder: str, device: str, count: int) -> Iterator[Row]:
@@ -79,7 +83,7 @@ def rows_on_device(folder: str, device: str, count: int) -> Iterator[Row]:
         for on_device in (False, True):
             where = "stays there" if on_device else "to numpy"
             more = {"preset": preset, "device": device, "on_device": on_device}
-            yield f"{preset}, {device}, {where}", "stream:running", {**how, **more}
+            yield f"{preset}, {device}, {where}", "rendering.stream:running", {**how, **more}
 
 
 def waiting(steps: int) -> float:

@@ -1,6 +1,6 @@
 """Milliseconds that `bench score` takes for one row, in test sets of more and more rows.
 
-    python -m benchmarks.score_rows [--rows 1000 10000 50000]
+    python -m benchmarks.scoring.score_rows [--rows 1000 10000 50000]
 
 The cost of a row should not depend on how many other rows the test set has. Images are as small as
 the format allows, so that the work around the measures shows beside the measures themselves. The

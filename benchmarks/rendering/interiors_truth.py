@@ -1,6 +1,7 @@
-"""`python -m benchmarks.interiors_truth FOLDER` prints the digest of the truth of interiors-512-1.
+"""Print the digest of the truth of interiors-512-1.
 
-It is made without pictures, which take long.
+`python -m benchmarks.rendering.interiors_truth FOLDER` makes that truth in a
+folder, without pictures, which take long.
 """
 
 import sys

@@ -1,6 +1,6 @@
 """What pictures of interiors are like, beside photographs and the preset `shapes`.
 
-    python -m benchmarks.interiors interiors.h5 [shapes.h5]
+    python -m benchmarks.rendering.interiors interiors.h5 [shapes.h5]
 
 It prints, over all images: shares of saturated and black values; the slope of the power spectrum
 and the kurtosis of gradients, which are about -2 and 10 or more in photographs (D. Ruderman and

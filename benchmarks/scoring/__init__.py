@@ -1,0 +1,1 @@
+"""Times and memory of scoring, and of the models that are scored."""
