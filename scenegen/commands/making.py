@@ -256,9 +256,10 @@ def _print_exposure(out: str) -> None:
         return
     with RoomsFile(place) as rooms:
         shares = clipped_shares(rooms, spread_rows(len(rooms), SAMPLED))
+        interior = rooms.spec is not None and rooms.spec.interior
     if shares is not None:
         print_line(f"{out}: {exposure_text(shares)}")
-        for text in exposure_warnings(shares):
+        for text in exposure_warnings(shares, interior):
             print_line(f"warning: {out}: {text}", err=True)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from scenegen.rooms.reader import RoomsFile
 
 MANY = 0.05  # share of values that calls for a warning
-ADVICE = "change --light-level, or store all radiance with --image-dtype float16"
+STORE_ALL = "store all radiance with --image-dtype float16"
 Shares = tuple[float, float]  # of values that are saturated, and black
 
 
@@ -33,10 +33,11 @@ def exposure_text(shares: Shares) -> str:
     return f"{shares[0]:.1%} of values saturated (255), {shares[1]:.1%} black (0)"
 
 
-def exposure_warnings(shares: Shares) -> list[str]:
+def exposure_warnings(shares: Shares, interior: bool = False) -> list[str]:
     """Return a sentence if many values are saturated, and one if many are black."""
+    advice = STORE_ALL if interior else f"change --light-level, or {STORE_ALL}"  # they expose alone
     return [
-        f"{share:.0%} of the values of 8-bit images are {what}; {ADVICE}"
+        f"{share:.0%} of the values of 8-bit images are {what}; {advice}"
         for share, what in zip(shares, ("saturated", "black"), strict=True)
         if share >= MANY
     ]

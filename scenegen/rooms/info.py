@@ -49,7 +49,7 @@ def describe(path: str | Path) -> str:
         lines = [f"{path}: {len(rooms)} images of {spec.height}x{spec.width}, {size}"]
         for part in parts:
             lines += ["", *(f"  {line}" for line in part)]
-        warnings = exposure_warnings(shares or (0.0, 0.0))
+        warnings = exposure_warnings(shares or (0.0, 0.0), spec.interior)
         lines += ["", *(f"warning: {text}" for text in warnings)] if warnings else []
     return "\n".join(map(printable, lines))
 

@@ -1,6 +1,6 @@
 """A data set of BOP: images, depth, poses, masks, and models as PLY files.
 
-Lengths are millimetres; one scene unit, the edge of the room, is one metre. Models have z up and
+Lengths are millimetres; one scene unit counts as one metre. Models have z up and
 the middle of their bounding box as origin. They are rigid: an object of another size is another
 model. Cameras are x right, y down, looking along +z; the centre of the first pixel is (0, 0).
 
@@ -81,7 +81,7 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
     _write_models(folder / "models", models, objects)
     return {
         "world": "right-handed, z up: our (x, y, z) is (x, -z, y) here",
-        "unit": "millimetre; a scene unit, the edge of the room, is 1000",
+        "unit": f"millimetre; 1000 are 1 {source.unit}",
         "camera": "x right, y down, looks along +z",
         "pixel_centers": "0: the centre of the first pixel is (0, 0)",
         "models": {str(i): {"shape": shape, "scale": s} for (shape, s), i in models.items()},

@@ -21,7 +21,7 @@ from scenegen.rooms.reader import Room
 Array = NDArray[Any]
 FLIP = np.diag([1.0, -1.0, -1.0])  # from y up, looking along -z, to y down, looking along z
 MOST_POINTS = 10_000  # of one view
-HEADER = "# pix2shape-bench: the world has y up, lengths are scene units (the edge of the room)"
+HEADER = "# pix2shape-bench: the world has y up, conventions.json names the unit"
 
 
 def write(source: Any, folder: Path) -> dict[str, Any]:
@@ -30,7 +30,7 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
         _write_scene(views, folder / f"scene-{scene:06d}", source.encoding)
     return {
         "world": "right-handed, y up",
-        "unit": "scene unit: the edge of the room",
+        "unit": source.unit,
         "camera": "images.txt is camera from world; x right, y down, looks along +z",
         "pixel_centers": "+0.5",
         "pictures": {"image": source.encoding.pictures()["image"]},

@@ -42,6 +42,12 @@ class Source:
     device: str
     progress: Callable[[int], Any]
 
+    @property
+    def unit(self) -> str:
+        """The unit of lengths, in words."""
+        interior = self.rooms.spec is not None and self.rooms.spec.interior
+        return "metre" if interior else "scene unit: the edge of the room"
+
     def views(self) -> Iterator[tuple[int, list[Room]]]:
         """Yield the number of each scene and its rows."""
         for scene, rows in self.scenes.items():

@@ -43,11 +43,15 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
             height, width = room.depth.shape
             matrix = intrinsics(height, width, room.fov_y_degrees, pixel_centers="half")
             normalized = matrix / np.array([[width], [height], [1]])
-            about = {"intrinsics": normalized.tolist(), "unit": "scene unit", "row": room.index}
+            about = {
+                "intrinsics": normalized.tolist(),
+                "unit": source.unit.partition(":")[0],
+                "row": room.index,
+            }
             write_json(folder / name / "meta.json", about)
     (folder / ".index.txt").write_text("\n".join([*names, ""]), encoding="utf-8")
     return {
-        "unit": "scene unit: the edge of the room",
+        "unit": source.unit,
         "camera": "intrinsics are divided by width and height; x right, y down, looks along +z",
         "pixel_centers": "+0.5, so that the middle of an image is 0.5",
         "depth": "planar; near (far / near)^((code - 1) / 65533), 65535 for nothing",

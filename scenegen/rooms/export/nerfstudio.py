@@ -24,7 +24,7 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
         _write_scene(views, folder / f"scene-{scene:06d}", source.encoding)
     return {
         "world": "right-handed, z up: our (x, y, z) is (x, -z, y) here, as applied_transform says",
-        "unit": "scene unit: the edge of the room",
+        "unit": source.unit,
         "camera": "transform_matrix is world from camera; x right, y up, looks along -z",
         "pixel_centers": "+0.5",
         "pictures": source.encoding.pictures(),
