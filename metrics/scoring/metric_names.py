@@ -442,7 +442,7 @@ ALL |= {
         task="measured",
         title=f"{ALL[name].title}, {WHOSE[guess]}",
         definition=f"`{name}` of a guess that sees no picture ({WHOSE[guess]}), fitted as"
-        " predictions are, by scale and shift where nothing is fitted.",
+        " predictions are, in least squares for L1, and by scale and shift where nothing is.",
     )
     for guess in (FLAT, RAMP)
     for name in HEADLINE["measured"]
