@@ -68,6 +68,7 @@ class Predictions:
         `identity` is that of content that lies in no file.
         """
         assert content.ids is not None, "only usable files are opened"
+        self.task = content.task or self.task
         texts = content.texts
         self.path, self.rows = path, content.ids
         self.method, self.run = texts.get("method", ""), texts.get("run", "")
@@ -149,17 +150,6 @@ class RoomPredictions(Predictions):
     """
 
     task = "rooms"
-
-    def __init__(
-        self,
-        path: Path,
-        content: Inspection,
-        file: h5py.File | None,
-        identity: Identity | None = None,
-    ) -> None:
-        """Take over as `Predictions`."""
-        super().__init__(path, content, file, identity)
-        self.task = content.task or self.task
 
     @property
     def height(self) -> int:
