@@ -84,3 +84,18 @@ def test_the_floor_is_the_lowest_over_scenes_not_over_images():
     }
     name = "behind_depth_error"
     assert floor_column(items, scene, name, "first_view") == "blocks_behind_depth_error"
+
+
+@pytest.mark.parametrize(
+    ("name", "floors", "best"),
+    [
+        ("shape_error", {"cut_out_": 0.4, "empty_room_": 0.2}, "empty_room_"),  # as in interiors
+        ("shape_error", {"cut_out_": 0.2, "empty_room_": 0.4}, "cut_out_"),
+        ("abs_rel", {"flat_": 0.2, "ramp_": 0.1}, "ramp_"),
+        ("delta_1", {"flat_": 0.5, "ramp_": 0.7}, "ramp_"),  # higher is better
+        ("delta_1", {"flat_": 0.5, "ramp_": 0.3}, "flat_"),
+    ],
+)
+def test_the_floor_is_the_best_guess(name, floors, best):
+    items = {begin + name: np.full(SCENES, value) for begin, value in floors.items()}
+    assert floor_column(items, np.arange(SCENES), name) == best + name
