@@ -63,7 +63,7 @@ PRESETS = {
             "shapes": FAMILY_NAMES + FURNITURE_NAMES,
             "objects": (12, 60),
             "shading": "path",
-            "spp": 16,
+            "spp": 8,
             "fov_degrees": 45.0,
             "fov_spread_degrees": 30.0,
             "height": 256,

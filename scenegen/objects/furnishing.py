@@ -292,6 +292,8 @@ def supports(thing: Furnishing) -> list[Rectangle]:
     for patch, y in sorted({*zip(patches.tolist(), heights.tolist(), strict=True)}):
         points = corners[level][(patches == patch) & (heights == y)].reshape(-1, 3)
         low, high = points.min(axis=0), points.max(axis=0)
+        if (high - low)[::2].min() <= LEAST_SIDE:
+            continue
         middle, half, top = (low + high)[::2] / 2, (high - low)[::2] / 2, float(points[0, 1])
         for share in (0.97, 0.85, 0.7, 0.55):
             if not _is_on(corners, middle + share * half * _GRID, top):

@@ -27,7 +27,7 @@ class Piece:
     """What placing needs of a piece of furniture, in its own frame: centred, on y = 0, front +z.
 
     Attributes:
-        name: family/number.
+        name, family: family/number, and the family.
         half: half its width along x and half its depth along z, metres.
         height: metres.
         radius: of the sphere about the middle of its box.
@@ -36,16 +36,12 @@ class Piece:
     """
 
     name: str
+    family: str
     half: tuple[float, float]
     height: float
     radius: float
     surfaces: tuple[tuple[float, ...], ...]
     boxes: Array
-
-    @property
-    def family(self) -> str:
-        """The family's name."""
-        return self.name.partition("/")[0]
 
 
 def family_of(name: str) -> tuple[str, int]:
@@ -89,7 +85,7 @@ def piece(name: str) -> Piece:
         np.stack([corners.min(axis=1), corners.max(axis=1)]) if surfaces else np.zeros((2, 0, 3))
     )
     across, up, along = half.tolist()
-    return Piece(name, (across, along), 2 * up, radius, surfaces, boxes)
+    return Piece(name, thing.family, (across, along), 2 * up, radius, surfaces, boxes)
 
 
 def furniture_shape(name: str) -> UnitShape:

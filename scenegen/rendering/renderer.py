@@ -29,14 +29,14 @@ MOST_DRAWN = 8_000_000  # faces that the images of one launch show; it takes som
 MOST_MODELS = 2000  # in one Mitsuba scene; must not exceed `model_scene.MOST_MODELS`
 
 
-def useful_workers(images: int, variant: str) -> int:
+def useful_workers(images: int, variant: str, worthwhile: int = WORTHWHILE) -> int:
     """Return how many processes should render so many images.
 
-    One for each processor, as far as each has enough to do. Several share a GPU, which waits for
-    one.
+    One for each processor, as far as each has enough to do, `worthwhile` images. Several share a
+    GPU, which waits for one.
     """
     most = MOST_ON_GPU if variant == "cuda_ad_rgb" else MOST_WORKERS
-    return max(1, min(processors(), most, images // WORTHWHILE))
+    return max(1, min(processors(), most, images // worthwhile))
 
 
 def share_processors(workers: int, device: str = "auto") -> None:

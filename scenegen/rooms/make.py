@@ -88,7 +88,7 @@ def make_dataset(
                      (ASSETS.materials, ASSETS.environment))  # fmt: skip
     make_set(
         manifest_path(place), plan, work, shard_size,
-        workers=workers or useful_workers(count * views, variant),
+        workers=workers or useful_workers(count * views, variant, work.worthwhile),
         cluster=cluster, overwrite=overwrite, progress=progress, note=objects.problems.update,
     )  # fmt: skip
 

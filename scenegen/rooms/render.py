@@ -25,6 +25,7 @@ from scenegen.rendering.ground_truth import visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack_arrays
 from scenegen.rendering.pictures.places import ASSETS
 from scenegen.rendering.renderer import (
+    WORTHWHILE,
     launch_fields,
     picture_fields,
     share_processors,
@@ -37,6 +38,7 @@ from scenegen.sampling.proposals import ProposalQueue
 
 Array = NDArray[Any]
 BLOCK = 512  # images that a worker process makes in one go
+INTERIORS = 16  # of their images, in place of BLOCK and of a batch: they take long, and much memory
 PACKED = 16  # scenes that a thread packs in one go
 WINDOW = 8  # batches that may be begun while the oldest item is still being proposed again
 
@@ -67,7 +69,13 @@ class RoomsWork:
     @property
     def block(self) -> int:
         """Scenes that a worker process makes in one go."""
-        return max(1, BLOCK // len(self.spec.views))
+        images = INTERIORS if self.spec.interior else BLOCK
+        return max(1, images // len(self.spec.views))
+
+    @property
+    def worthwhile(self) -> int:
+        """Images for which another worker process is worth while."""
+        return INTERIORS if self.spec.interior else WORTHWHILE
 
     def packed_rows(self, block: Block, workers: int) -> Generator[Packed, None, dict[str, str]]:
         """Render scenes in order, and meanwhile pack their rows in threads.
@@ -120,7 +128,8 @@ def render_items(
     if fields is not None and not spec.truth:
         needed = [name for name in needed if name in fields or name == "object_id"]
     names = needed + ([] if traced else pictures)
-    batch = max(1, batch // len(views))  # scenes
+    most = INTERIORS if spec.interior else batch
+    batch = max(1, min(batch, most) // len(views))  # scenes
     proposals = ProposalQueue(spec, indices, objects)
     finished: dict[int, RenderedScene] = {}
     next_out = 0

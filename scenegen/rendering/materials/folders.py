@@ -12,7 +12,7 @@ import OpenEXR
 from PIL import Image
 
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.rendering.materials.material import Array, Material, uneven
+from scenegen.rendering.materials.material import Array, Material, slopes_of
 
 Result = TypeVar("Result")
 MOST_PIXELS = 8192  # of a map's side
@@ -149,8 +149,9 @@ def read_maps(maps: MapFiles) -> Material:
     height = _height(fields["normal"], maps.metres) if "normal" in fields else None
     metallic = float(fields["metallic"].mean()) if "metallic" in fields else 0.0
     return Material(
-        np.asarray(linear, np.float32), rough, height, metallic=round(metallic), metres=maps.metres
-    )
+        np.asarray(linear, np.float32), rough, None, None if height is None else slopes_of(height),
+        metallic=round(metallic), metres=maps.metres,
+    )  # fmt: skip
 
 
 def _pixels(path: Path) -> Array:
@@ -187,4 +188,4 @@ def _height(normal: Array, metres: float) -> Array:
     square = np.abs(u) ** 2 + np.abs(v) ** 2
     square[0, 0] = 1.0
     slopes[0, 0] = 0.0
-    return uneven(np.fft.irfft2(slopes / square, z.shape))
+    return np.fft.irfft2(slopes / square, z.shape)

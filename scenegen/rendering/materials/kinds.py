@@ -11,9 +11,9 @@ from scenegen.common.names import check_choice
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.rendering.materials import patterns, pictures
 from scenegen.rendering.materials.folders import MapFiles, read_maps
-from scenegen.rendering.materials.material import Array, Material, lerp, uneven
+from scenegen.rendering.materials.material import Array, Material, lerp
 from scenegen.rendering.materials.palettes import Color, Palette, linear
-from scenegen.rendering.materials.patterns import Pattern
+from scenegen.rendering.materials.patterns import SEAMS, Pattern
 
 VARIANTS = 6  # of each pattern; colours make more of them
 
@@ -161,18 +161,19 @@ def _shaded(
     palette: Palette,
 ) -> Material:  # fmt: skip
     """Colour a pattern from dark to light, and its seams in their own colour."""
-    share, bumps, joint = (
-        field[:: recipe.every, :: recipe.every]
-        for field in (pattern.share, pattern.height, pattern.seam)
-    )
+    share, joint = patterns.levels()
     color, roughness = lerp(dark, light, share), rough + recipe.rougher * (1.0 - share)
     if recipe.seam:
         seam = np.asarray(pick(rng, _options(recipe.seam, palette)), np.float32)
-        color += joint[..., None] * (seam - color)
+        color += joint[:, None] * (seam - color)
         roughness = roughness + joint * (recipe.rough_seam - roughness)
-    height = uneven(recipe.bumps * bumps) if bumps.any() else None
-    roughness = np.clip(roughness, 0.05, 1.0).astype(np.float32)
-    return Material(color, roughness, height, specular=recipe.specular, metres=recipe.metres)
+    index, slopes = (
+        None if values is None else values[:: recipe.every, :: recipe.every] for values in pattern
+    )
+    return Material(
+        color, np.clip(roughness, 0.05, 1.0), index, slopes, recipe.bumps,
+        specular=recipe.specular, metres=recipe.metres,
+    )  # fmt: skip
 
 
 def _options(names: str, palette: Palette) -> tuple[Color, ...]:
@@ -231,7 +232,8 @@ def _wall(name: str) -> Callable[[Generator, Palette], Material]:
         figure = patterns.figure(kind, pick(rng, (4, 5)), _seed(rng))
         color = np.array(_options(name, palette)[0])
         other = np.minimum(pick(rng, (0.82, 0.9, 1.08)) * color, 0.88)
-        return Material(lerp(color, other, figure), 0.75, specular=0.3, metres=0.75)
+        shades = lerp(color, other, patterns.levels()[1])
+        return Material(shades, 0.75, figure, specular=0.3, metres=0.75)
 
     styles = (*4 * [_recipes(paint)], _recipes(plaster), paper)
     return lambda rng, palette: pick(rng, styles)(rng, palette)
@@ -246,16 +248,22 @@ def _sill(rng: Generator, palette: Palette) -> Material:
 
 
 def _wood(rng: Generator, palette: Palette) -> Material:
-    share = np.roll(patterns.grain(_seed(rng)), int(rng.random() * patterns.SIZE), axis=1)
-    dark, light = palette.woods[1]
-    roughness = (span(rng, 0.28, 0.5) + 0.14 * (1.0 - share)).astype(np.float32)
-    return Material(lerp(dark, light, share), roughness, uneven(0.00006 * share), metres=0.6)
+    index, slopes = (
+        np.roll(values, shift, axis=1)
+        for shift in [int(rng.random() * patterns.SIZE)]
+        for values in patterns.board(_seed(rng))
+        if values is not None
+    )
+    share, _ = patterns.levels()
+    rough = span(rng, 0.28, 0.5) + 0.14 * (1.0 - share)
+    return Material(lerp(*palette.woods[1], share), rough, index, slopes, metres=0.6)
 
 
 def _metal(rng: Generator, palette: Palette) -> Material:
-    brushed = patterns.weave(0, 64, "plain").share[::2, ::2]  # any fine field does
-    rough = (span(rng, 0.12, 0.4) + 0.05 * (brushed - 0.5)).astype(np.float32)
-    return Material(np.array(palette.metal), rough, metallic=1.0, metres=0.1)
+    brushed = patterns.weave(0, 64, "plain").shades[::2, ::2]  # any fine field does
+    share, _ = patterns.levels()
+    color, rough = np.tile(palette.metal, (len(share), 1)), span(rng, 0.12, 0.4)
+    return Material(color, rough + 0.05 * (share - 0.5), brushed, metallic=1.0, metres=0.1)
 
 
 def _wicker(rng: Generator, palette: Palette) -> Material:
@@ -275,13 +283,16 @@ def _cloth(
 ) -> Material:  # fmt: skip
     """Weave a cloth of one colour, or print or weave a figure of another colour into it."""
     pattern = patterns.weave(_seed(rng), threads, style)
-    base = np.asarray(color, np.float32)
+    index = pattern.shades
+    share, shown = patterns.levels()
+    base = np.asarray(color, np.float32)[None]
     if other is not None:
         kind = pick(rng, kinds)
         count = pick(rng, (6, 8, 10)) if kind == "dots" else pick(rng, (3, 4, 5))
-        base = lerp(color, other, patterns.figure(kind, count, _seed(rng)))
-    light = np.minimum((0.45 + 0.75 * pattern.share)[..., None] * base, 0.88)
-    return Material(light, 0.95, uneven(pattern.height), specular=0.1, metres=metres)
+        base = lerp(color, other, shown)
+        index = index // SEAMS * SEAMS + patterns.figure(kind, count, _seed(rng))
+    light = np.minimum((0.45 + 0.75 * share)[:, None] * base, 0.88)
+    return Material(light, 0.95, index, pattern.slopes, specular=0.1, metres=metres)
 
 
 def _fabric(rng: Generator, palette: Palette) -> Material:

@@ -16,22 +16,36 @@ from scenegen.rendering.materials.fields import (
     sampled,
     smoothstep,
 )
+from scenegen.rendering.materials.material import slopes_of
 
 SIZE = 512  # pixels of a map's side
+
+
+SHARES, SEAMS = 256, 16  # levels that are told apart
 
 
 class Pattern(NamedTuple):
     """A pattern of one repeat.
 
     Attributes:
-        share: 0 to 1, from the darker to the lighter colour, (n, n).
-        height: in metres, (n, n).
-        seam: 1 in joints, grout and the ground of a print, 0 elsewhere, (n, n).
+        shades: SEAMS times the level of the share, plus that of the seam, (n, n) uint16. The share
+            goes from the darker to the lighter colour; the seam is 1 in joints, grout and the
+            ground of a print, 0 elsewhere.
+        slopes: of its bumps, as from `material.slopes_of`, (n, n); None if it is flat.
     """
 
-    share: Field
-    height: Field
-    seam: Field
+    shades: Field
+    slopes: Field | None
+
+    def share(self) -> Field:
+        """Return the share, 0 to 1, (n, n)."""
+        return np.asarray((self.shades // SEAMS) / np.float32(SHARES - 1), np.float32)
+
+
+def levels() -> tuple[Field, Field]:
+    """Return share and seam, 0 to 1, of each number of `Pattern.shades`, (SHARES SEAMS,) each."""
+    index = np.arange(SHARES * SEAMS, dtype=np.float32)
+    return index // SEAMS / np.float32(SHARES - 1), index % SEAMS / np.float32(SEAMS - 1)
 
 
 @lru_cache(maxsize=12)
@@ -45,6 +59,13 @@ def grain(seed: int) -> Field:
     rings = wave**2.2 * smoothstep(0.0, 0.12, 1.0 - wave)
     share = 0.78 - 0.42 * rings + 0.1 * fibre + 0.06 * bend - 0.3 * smoothstep(1.2, 2.6, pores)
     return np.clip(share, 0.0, 1.0).astype(np.float32)
+
+
+@lru_cache(maxsize=6)
+def board(seed: int) -> Pattern:
+    """Return a piece of wood, 0.6 m a repeat."""
+    share = grain(seed)
+    return _kept(share, 0.00006 * share, 0 * share)
 
 
 @lru_cache(maxsize=6)
@@ -140,7 +161,7 @@ def hide(seed: int) -> Pattern:
     return _kept(share, -0.00022 * crease, crease)
 
 
-@lru_cache(maxsize=12)
+@lru_cache(maxsize=32)
 def weave(seed: int, threads: int, style: str) -> Pattern:
     """Return woven cloth of uneven threads: "plain", "twill" or "basket"."""
     u, v = grid(SIZE)
@@ -193,7 +214,7 @@ def trowel(seed: int) -> Pattern:
 
 @lru_cache(maxsize=16)
 def figure(kind: str, count: int, seed: int) -> Field:
-    """Return the ground (0) and the figure (1) of a print or of coloured threads."""
+    """Return levels of seams: the ground (0) and the figure of a print or of coloured threads."""
     u, v = grid(SIZE)
     x, y = u * count + 0 * v, v * count + 0 * u
     a, b = x % 1 - 0.5, y % 1 - 0.5
@@ -227,9 +248,7 @@ def figure(kind: str, count: int, seed: int) -> Field:
         rise = q - nearest - 0.4 * np.abs(p)
         leaf = smoothstep(-0.2, 0.2, 1 - (away / 0.1) ** 2 - (rise / 0.035) ** 2)
         shape = np.maximum(stalk, leaf)
-    shape = np.asarray(shape, np.float32)
-    shape.flags.writeable = False
-    return shape
+    return _level(np.asarray(shape, np.float32), SEAMS)
 
 
 @lru_cache(maxsize=3)
@@ -249,5 +268,10 @@ def wickerwork(seed: int) -> Pattern:
     return _kept(share, 0.002 * body * (0.6 + 0.4 * wave), 1.0 - body)
 
 
+def _level(values: Field, count: int) -> Field:
+    return np.asarray(np.rint(values.clip(0, 1) * np.float32(count - 1)), np.uint16)
+
+
 def _kept(share: Field, height: Field, seam: Field) -> Pattern:
-    return Pattern(*(np.ascontiguousarray(field, np.float32) for field in (share, height, seam)))
+    index = _level(share, SHARES) * np.uint16(SEAMS) + _level(seam, SEAMS)
+    return Pattern(index, slopes_of(height) if height.any() else None)

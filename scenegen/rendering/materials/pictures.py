@@ -10,7 +10,7 @@ from numpy.random import Generator
 
 from scenegen.objects.families.parts.draws import chance, pick, span
 from scenegen.rendering.materials.fields import Field, grid, noise, smoothstep
-from scenegen.rendering.materials.material import Array, Material, lerp, uneven
+from scenegen.rendering.materials.material import Array, Material, lerp
 from scenegen.rendering.materials.palettes import Color, Palette, linear
 from scenegen.rendering.materials.patterns import Pattern
 
@@ -18,7 +18,9 @@ SIZE = 256
 
 
 def _over(canvas: Array, color: Array | Color, share: Field) -> None:
-    canvas += share[..., None] * (np.asarray(color, np.float32) - canvas)
+    rows = np.flatnonzero(share.any(axis=1))
+    part = slice(rows[0], rows[-1] + 1) if len(rows) else slice(0)
+    canvas[part] += share[part, :, None] * (np.asarray(color, np.float32) - canvas[part])
 
 
 def picture(rng: Generator, palette: Palette) -> Material:
@@ -159,7 +161,7 @@ def dial(rng: Generator, palette: Palette) -> Material:
 
 def rug(rng: Generator, ground: Color, colors: Colors, pile: Pattern) -> Material:
     """Draw a rug with a border and a field of figures, or in one colour."""
-    size = len(pile.share)
+    size = len(pile.shades)
     u, v = grid(size)
     canvas = np.empty((size, size, 3), np.float32)
     canvas[:] = ground
@@ -196,9 +198,9 @@ def rug(rng: Generator, ground: Color, colors: Colors, pile: Pattern) -> Materia
                 color,
                 smoothstep(-soft, soft, edge - low) * smoothstep(-soft, soft, high - edge),
             )
-    canvas *= (0.62 + 0.55 * pile.share)[..., None]
-    height = uneven(pile.height / 2)  # the map spans metres, not half a metre
-    return Material(np.minimum(canvas, 0.85), 0.98, height, specular=0.05)
+    canvas *= (0.62 + 0.55 * pile.share())[..., None]
+    bumps = 0.5  # the map spans metres, not half a metre
+    return Material(np.minimum(canvas, 0.85), 0.98, None, pile.slopes, bumps, specular=0.05)
 
 
 def leaf(rng: Generator, palette: Palette) -> Material:

@@ -93,22 +93,23 @@ def outside(interior: Interior) -> Outside:
 def _with_ground(radiance: Array, light: Array, seed: float) -> Array:
     """Return a map of the sky with a meadow and trees in this light, (H, W, 3) float32."""
     rows, columns = radiance.shape[:2]
-    height = directions(rows, columns)[..., 1]
+    height = np.cos((np.arange(rows) + 0.5) / rows * np.pi)
     turn = (np.arange(columns) + 0.5) / columns * 2 * np.pi
     tops, shade = np.full(columns, 0.055), np.ones(columns)
     for waves, size in ((2, 0.03), (5, 0.025), (13, 0.02), (31, 0.012), (67, 0.007), (131, 0.004)):
         tops += size * np.sin(waves * turn + waves * seed)
         shade += 4 * size * np.sin(1.7 * waves + 2 * waves * turn + seed)
-    meadow = height < 0
-    trees = ~meadow & (height < tops)
     haze = radiance[rows // 2 - 4].mean(axis=0)
     # Distant things take on the colour of the air.
-    far = np.exp(height.clip(-1, 0) * 14)[..., None] * 0.25
-    ground = (1 - far) * np.array(GROUND) * light + far * 0.5 * haze
-    lit = (0.55 + 0.45 * height / np.maximum(tops, 1e-3)).clip(0, 1) * shade
+    meadow = height < 0
+    far = np.exp(height[meadow, None] * 14) * 0.25
+    radiance[meadow] = ((1 - far) * np.array(GROUND) * light + far * 0.5 * haze)[:, None]
+    grown = ~meadow & (height < tops.max())
+    lit = (0.55 + 0.45 * height[grown, None] / np.maximum(tops, 1e-3)).clip(0, 1) * shade
     crowns = 0.8 * np.array(TREES) * light * lit[..., None] + 0.2 * 0.5 * haze
-    shown = np.where(meadow[..., None], ground, np.where(trees[..., None], crowns, radiance))
-    return np.asarray(shown, np.float32)
+    trees = (height[grown, None] < tops)[..., None]
+    radiance[grown] = np.where(trees, crowns, radiance[grown])
+    return radiance
 
 
 def _direction_key(direction: Array) -> tuple[float, float, float]:

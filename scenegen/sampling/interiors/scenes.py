@@ -4,14 +4,16 @@ The room, its light, the number of objects and the field of view are drawn once 
 Another attempt draws the furniture and the cameras again.
 """
 
+import zlib
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import Camera
-from scenegen.common.random.seeding import Purpose
+from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.common.records import to_json
 from scenegen.description.interiors import Interior
 from scenegen.description.scene_arrays import SceneArrays
@@ -25,6 +27,9 @@ from scenegen.sampling.interiors.spaces import Placed, Space, turn
 from scenegen.sampling.interiors.viewpoints import draw_cameras
 
 Array = NDArray[Any]
+FITS = 15, 2.2  # objects that a room holds, and more for each square metre
+STREET = 32  # rooms beside each other that are furnished from the same stock
+STOCK = 10  # models of each family in it: models take longer to make than rooms to furnish
 _Drawn = tuple[Room, list[Placed], list[tuple[float, float, float]], tuple[float, float, float]]
 
 
@@ -32,7 +37,9 @@ def item_room(spec: DatasetSpec, index: int) -> tuple[Room, int, float]:
     """Return the room of an item, its number of objects, and its field of view in degrees."""
     draws = Draws(spec.seed, index, Purpose.ROOM)
     room = draw_room(draws, spec.hours)
-    count = draws.count(*spec.objects)
+    least, most = spec.objects
+    fits = int(FITS[0] + FITS[1] * room.size[0] * room.size[2])
+    count = draws.count(least, max(least, min(most, fits)))
     return room, count, spec.fov_degrees + spec.fov_spread_degrees * draws.unit()
 
 
@@ -43,7 +50,10 @@ def draw_interior(spec: DatasetSpec, index: int, attempt: int, objects: Objects)
 
     def member(family: str) -> Piece | None:
         models = objects.models.get(family)
-        return piece(draws.pick(models)) if models else None
+        if not models:
+            return None
+        share = draws.pick(_stock(spec.seed, index // STREET, family))
+        return piece(models[int(share * len(models))])
 
     space = Space(room.size, count)
     if count:
@@ -52,6 +62,13 @@ def draw_interior(spec: DatasetSpec, index: int, attempt: int, objects: Objects)
         return None
     found = draw_cameras(spec, space, Draws(spec.seed, index, Purpose.VIEWPOINT, attempt), fov)
     return None if found is None else (room, space.placed, *found)
+
+
+@lru_cache(maxsize=256)
+def _stock(seed: int, street: int, family: str) -> tuple[float, ...]:
+    """Return where among a family's models, 0 to 1, those are that furnish a street's rooms."""
+    stream = zlib.crc32(family.encode()) % 2**24
+    return tuple(item_numbers(seed, street, Purpose.MODELS, stream, count=STOCK).tolist())
 
 
 def sample_interiors(

@@ -9,6 +9,7 @@ from scenegen.description.interiors import Interior, Opening
 from scenegen.description.presets import preset_spec
 from scenegen.objects.catalogue import objects_of
 from scenegen.rendering.backend import point_to_llvm
+from scenegen.rendering.materials.material import Material
 from scenegen.rendering.packing import pack_arrays
 from scenegen.rendering.pictures import denoiser
 from scenegen.rendering.pictures.development import develop, tone
@@ -113,6 +114,75 @@ def test_windows_are_where_their_openings_are():
     from scenegen.rendering.pictures.tracer import windows_of
 
     opening = Opening("window", "east", 1.0, 2.5, 0.9, 2.0)
-    ((corner, along, up),) = windows_of(Interior((4.0, 2.5, 3.0), (opening,), (), 12.0, 0.0, True))
-    assert corner[0] > 4.0
-    np.testing.assert_allclose(corner[1:] + along[1:] + up[1:], (2.0, 2.5))
+    (window,) = windows_of(Interior((4.0, 2.5, 3.0), (opening,), (), 12.0, 0.0, True))
+    assert window.along_z
+    assert window.at > 4.0
+    assert window[2:] == (1.0, 2.5, 0.9, 2.0)
+
+
+REFLECTANCE = 0.5
+
+
+def radiance_of_floor(lamp=None, sky=0.0, sun=(0.0, 0.0), windows=(), share=0.0, spp=4096):
+    """Radiance of a floor at (0.5, 0, 0), seen from above; the sun has a height and irradiance."""
+    import drjit as dr
+    import mitsuba as mi
+
+    from scenegen.rendering.pictures.lights import lights_of
+    from scenegen.rendering.pictures.matter import Matter, Soup, tables_of
+    from scenegen.rendering.pictures.paths import Camera, trace_paths
+    from scenegen.rendering.pictures.sky import Outside
+    from scenegen.rendering.pictures.surfaces import surfaces_of
+
+    mi.set_variant("llvm_ad_rgb")
+    corners = [[[-9, 0, -9], [-9, 0, 9], [9, 0, 9]], [[-9, 0, -9], [9, 0, 9], [9, 0, -9]]]
+    materials = [Material(np.full(3, REFLECTANCE), 1.0, specular=0.0)]
+    if lamp is not None:
+        height, half, shine = lamp  # a square that faces down
+        a, b, c, d = ([x * half, height, z * half] for x, z in ((-1, -1), (1, -1), (1, 1), (-1, 1)))
+        corners += [[a, b, c], [a, c, d]]
+        materials.append(Material(np.ones(3), 1.0, radiance=(shine,) * 3))
+    corners = np.array(corners, float)
+    of_face = np.arange(len(corners)) // 2
+    normals = np.tile([0.0, 1.0, 0.0], (len(corners), 3, 1))
+    matter = Matter(
+        Soup(corners, normals, np.zeros((len(corners), 3, 2))), tables_of(materials, of_face)
+    )
+    radiance = matter.tables.rows[of_face, 12:15]
+    up = np.array([np.cos(sun[0]), np.sin(sun[0]), 0.0])
+    around = Outside(np.full((8, 16, 3), sky, np.float32), up, np.full(3, sun[1]))
+    lights = lights_of(around, windows, corners, radiance, share)
+    axes = (mi.Vector3f(*map(float, v)) for v in ((1, 0, 0), (0, 0, -1), (0, 1, 0), (0.5, 1, 0)))
+    camera = Camera(*axes, *map(mi.Float, (1e-4, 4, 4)))
+    lanes, each = dr.arange(mi.UInt32, 256), spp // 256
+    sums = trace_paths(
+        surfaces_of(matter, lights.by_area), lights, camera, mi.Float(lanes % 4), mi.Float(1),
+        mi.Float(np.full(2 * spp, 0.5, np.float32)), dr.zeros(mi.UInt32, 256), mi.UInt32(each),
+        mi.UInt64(3), mi.Float(np.inf),
+    )  # fmt: skip
+    return float(np.mean(np.asarray(sums.radiance.x))) / each
+
+
+def test_lamps_light_by_the_square_of_their_distance():
+    height, half, shine = 1.5, 0.01, 1000.0
+    square = height**2 + 0.5**2
+    expected = REFLECTANCE / np.pi * shine * (2 * half) ** 2 * height**2 / square**2
+    found = radiance_of_floor(lamp=(height, half, shine), share=1.0)
+    assert found == pytest.approx(expected, rel=0.01)
+    # A large lamp is found by directions of the floor, too.
+    near = radiance_of_floor(lamp=(1.5, 40.0, 1.0), share=1.0, spp=2**16)
+    assert near == pytest.approx(REFLECTANCE, rel=0.03)
+
+
+def test_an_even_sky_lights_alike_with_and_without_windows():
+    from scenegen.rendering.pictures.lights import Window
+
+    windows = (Window(True, 2.0, -1.0, 1.5, 0.2, 2.0), Window(False, -3.0, -1.0, 1.0, 0.5, 1.5))
+    for some in ((), windows[:1], windows):
+        found = radiance_of_floor(sky=2.0, windows=some, spp=2**16)
+        assert found == pytest.approx(2.0 * REFLECTANCE, rel=0.02)
+
+
+def test_the_sun_lights_by_the_cosine():
+    found = radiance_of_floor(sun=(np.radians(40), 3.0), spp=2**16)
+    assert found == pytest.approx(REFLECTANCE / np.pi * 3.0 * np.sin(np.radians(40)), rel=0.02)

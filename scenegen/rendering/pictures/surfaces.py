@@ -1,0 +1,202 @@
+"""What the paths of a room meet: triangles and their materials, looked up in tables.
+
+All rooms share one compiled kernel, as each triangle finds its own material in a table. The model
+is a diffuse lobe below a microfacet lobe (GGX, Walter et al. 2007) with Schlick's Fresnel term;
+metals have the latter alone. Slopes tilt the shading normal (J. Blinn, "Simulation of wrinkled
+surfaces", 1978).
+"""
+
+from typing import Any, NamedTuple
+
+import drjit
+import mitsuba
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.rendering.pictures.matter import Matter
+from scenegen.rendering.tables import aligned, gather_row, unit, upload_table
+
+Array = NDArray[Any]
+dr: Any = drjit  # typed Any, as its stubs are not exact enough
+mi: Any = mitsuba
+ROUGHEST = 0.03  # least roughness squared, so that highlights are not infinitely bright
+GRAZING = 0.02  # least cosine between a tilted normal and the viewer
+FACE = 32  # floats of a triangle
+ROW = 16  # floats of a material
+
+
+class Surfaces(NamedTuple):
+    """Triangles and materials on the device.
+
+    Attributes:
+        scene: Mitsuba's, for rays alone.
+        faces: of each triangle its corner and two edges; the normal of its corner and the changes
+            along the edges; so, too, texture coordinates, metres; the gradients of these; its row;
+            and the probability by area that a sample of lights takes a point of it.
+        rows, texels, slopes: as of `matter.Tables`.
+    """
+
+    scene: Any
+    faces: Any
+    rows: Any
+    texels: Any
+    slopes: Any
+
+
+class Hit(NamedTuple):
+    """Where rays meet a surface: position, normals on the ray's side, texture and material."""
+
+    p: Any
+    front: Any  # whether it is the side of the triangle that its corners go round anticlockwise
+    flat: Any
+    normal: Any
+    uv: Any
+    gradients: tuple[Any, Any]
+    row: list[Any]
+    by_area: Any
+
+
+def surfaces_of(matter: Matter, by_area: Array) -> Surfaces:
+    """Return a room's surfaces on the device of the current Mitsuba variant.
+
+    `by_area` is the probability that a light's sample takes a point of a triangle, by area, (F,).
+    """
+    corners, normals, uv, tables = *matter.soup, matter.tables
+    faces = np.zeros((len(corners), FACE), np.float32)
+    a, b = faces[:, 3:6], faces[:, 6:9]
+    _put_changes(faces[:, :9], corners)
+    _put_changes(faces[:, 9:18], normals)
+    _put_changes(faces[:, 18:24], uv)
+    across = _cross(a, b)
+    size = np.maximum((across * across).sum(axis=1, keepdims=True), 1e-30)
+    duals = _cross(b, across) / size, _cross(across, a) / size
+    for axis in (0, 1):
+        first, second = faces[:, 20 + axis, None], faces[:, 22 + axis, None]
+        faces[:, 24 + 3 * axis : 27 + 3 * axis] = first * duals[0] + second * duals[1]
+    faces[:, 30], faces[:, 31] = tables.of_face, by_area
+    mesh = mi.Mesh("room", 3 * len(corners), len(corners))
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = aligned(corners)
+    parameters["faces"] = aligned(np.arange(3 * len(corners)), np.uint32)
+    parameters.update()
+    scene = mi.load_dict({"type": "scene", "room": mesh})
+    texels, slopes = (mi.UInt32(x) for x in (tables.texels, tables.slopes))
+    return Surfaces(scene, upload_table(faces), upload_table(tables.rows), texels, slopes)
+
+
+def _put_changes(columns: Array, values: Array) -> None:
+    """Write values at the first corner, and their changes along both edges, (F, 3 k)."""
+    size = values.shape[2]
+    columns[:, :size] = values[:, 0]
+    for k in (1, 2):
+        columns[:, k * size : (k + 1) * size] = values[:, k] - values[:, 0]
+
+
+def _cross(a: Array, b: Array) -> Array:
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
+
+
+def meet(surfaces: Surfaces, o: Any, d: Any, active: Any) -> tuple[Any, Hit]:
+    """Return whether rays meet a surface, and where."""
+    found = surfaces.scene.ray_intersect_preliminary(mi.Ray3f(o, d), False, active)
+    valid = active & found.is_valid()
+    face = gather_row(surfaces.faces, dr.select(valid, found.prim_index, 0), FACE)
+    corner, a, b = (mi.Vector3f(*face[i : i + 3]) for i in (0, 3, 6))
+    u, v = found.prim_uv.x, found.prim_uv.y
+    flat = unit(dr.cross(a, b))
+    front = dr.dot(flat, d) < 0
+    normal, along_a, along_b = (mi.Vector3f(*face[i : i + 3]) for i in (9, 12, 15))
+    normal = unit(normal + u * along_a + v * along_b)
+    uv = mi.Vector2f(face[18] + u * face[20] + v * face[22], face[19] + u * face[21] + v * face[23])
+    gradients = mi.Vector3f(*face[24:27]), mi.Vector3f(*face[27:30])
+    row = gather_row(surfaces.rows, mi.UInt32(face[30]), ROW)
+    flat = dr.select(front, flat, -flat)
+    normal = dr.select(front, normal, -normal)
+    gradients = tuple(dr.select(front, g, -g) for g in gradients)
+    return valid, Hit(corner + u * a + v * b, front, flat, normal, uv, gradients, row, face[31])
+
+
+def _texel(values: Any, uv: Any, first: Any, width: Any, height: Any, metres: Any) -> Any:
+    """Return the value of a map at a point, of the nearest pixel.
+
+    Those are mostly smaller than a picture's: its samples average them.
+    """
+    u, v = uv.x / metres, uv.y / metres
+    x = mi.UInt32(dr.minimum((u - dr.floor(u)) * width, width - 1))
+    y = mi.UInt32(dr.minimum((v - dr.floor(v)) * height, height - 1))
+    return dr.gather(mi.UInt32, values, mi.UInt32(first) + y * mi.UInt32(width) + x)
+
+
+class Lobes(NamedTuple):
+    """What a surface does with light: its frame, and the parameters of its lobes."""
+
+    frame: Any
+    flat: Any
+    wi: Any
+    color: Any
+    facets: Any
+    mirrored: Any
+    diffuse: Any
+    share: Any
+
+
+def lobes_at(surfaces: Surfaces, hit: Hit, d: Any) -> Lobes:
+    """Return what a surface does with light from where rays along `d` meet it."""
+    row = hit.row
+    texel = _texel(surfaces.texels, hit.uv, *row[:4])
+    red, green, blue, rough = (mi.Float((texel >> (8 * k)) & 255) / 255 for k in range(4))
+    color = mi.Color3f(red * red, green * green, blue * blue)
+    bumpy = row[9] > 0
+    both = _texel(
+        surfaces.slopes, hit.uv, row[8], dr.maximum(row[9], 1), dr.maximum(row[10], 1), row[3]
+    )
+    du, dv = (mi.Float(mi.Int32(both << shift) >> 16) * row[11] for shift in (16, 0))
+    tilted = unit(hit.normal - du * hit.gradients[0] - dv * hit.gradients[1])
+    tilted = dr.select(bumpy, tilted, hit.normal)
+    tilted = dr.select(dr.dot(tilted, d) < -GRAZING, tilted, hit.flat)
+    metallic, specular = row[4], row[5]
+    facets = mi.MicrofacetDistribution(
+        mi.MicrofacetType.GGX, dr.maximum(rough * rough, ROUGHEST), True
+    )
+    frame = mi.Frame3f(mi.Normal3f(tilted))
+    return Lobes(
+        frame, hit.flat, frame.to_local(-d), color, facets,
+        dr.lerp(mi.Color3f(0.08 * specular), color, metallic), color * (1 - metallic),
+        dr.lerp(dr.select(specular > 0, 0.2, 0.0), 0.95, metallic),
+    )  # fmt: skip
+
+
+def reflected(lobes: Lobes, wo: Any) -> tuple[Any, Any]:
+    """Return f cos(theta) for light from `wo`, world, and the density of `sampled`."""
+    out = lobes.frame.to_local(wo)
+    value, density = _value(lobes, out)
+    shown = dr.dot(lobes.flat, wo) > 0
+    return dr.select(shown, value, 0), dr.select(shown, density, 0)
+
+
+def sampled(lobes: Lobes, one: Any, two: Any) -> tuple[Any, Any, Any]:
+    """Draw directions from one of the lobes, weighted by the density of both.
+
+    Returns directions, world, f cos(theta) over density, and the density, which may be 0.
+    """
+    facet, _ = lobes.facets.sample(lobes.wi, two)
+    mirrored = 2 * dr.dot(lobes.wi, facet) * mi.Vector3f(facet) - lobes.wi
+    matte = mi.warp.square_to_cosine_hemisphere(two)
+    out = dr.select(one < lobes.share, mirrored, matte)
+    value, density = _value(lobes, out)
+    wo = unit(lobes.frame.to_world(out))
+    shown = (density > 0) & (dr.dot(lobes.flat, wo) > 0)
+    return wo, dr.select(shown, value / density, 0), dr.select(shown, density, 0)
+
+
+def _value(lobes: Lobes, wo: Any) -> tuple[Any, Any]:
+    wi, facets = lobes.wi, lobes.facets
+    h = unit(wi + wo)
+    toward = dr.maximum(dr.dot(wi, h), 1e-4)
+    fresnel = lobes.mirrored + (1 - lobes.mirrored) * dr.power(1 - dr.minimum(toward, 1), 5)
+    glossy = fresnel * facets.eval(h) * facets.G(wi, wo, h) / (4 * dr.maximum(wi.z, 1e-4))
+    matte = lobes.diffuse * (1 - fresnel) * wo.z / dr.pi
+    density = lobes.share * facets.pdf(wi, h) / (4 * toward) + (1 - lobes.share) * wo.z / dr.pi
+    shown = (wi.z > 0) & (wo.z > 0)
+    return dr.select(shown, glossy + matte, 0), dr.select(shown, density, 0)
