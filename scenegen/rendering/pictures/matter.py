@@ -25,6 +25,7 @@ GLOW = "glow"
 ACCENT_SHARE = 0.35  # of rooms in which one wall has another colour
 LAMP_FLUX = 0.018  # of a lamp, in the units of the sky's radiance times square metres
 CEILING_FLUX = 0.13
+LEAST_GLOW = 0.06  # square metres; what is smaller shines less, not more brightly
 WARM = (1.0, 0.72, 0.44)  # linear RGB of lamps, of some 3000 K
 OUT_OF_SIGHT = -50.0  # height in metres of triangles that only fill tables
 LEAST_SHINING = 4096
@@ -103,7 +104,7 @@ class _Collector:
         """Add triangles that together shine with a flux."""
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         area = 0.5 * float(np.sqrt((across**2).sum(axis=1)).sum())
-        radiance = np.array(WARM) * flux / max(np.pi * area, 1e-4)
+        radiance = np.array(WARM) * flux / (np.pi * max(area, LEAST_GLOW))
         self.glowing.append((corners, normals, uv, np.tile(radiance, (len(corners), 1))))
 
 
