@@ -4,7 +4,8 @@
 
 It prints, over all images: shares of saturated and black values; the slope of the power spectrum
 and the kurtosis of gradients, which are about -2 and 10 or more in photographs (D. Ruderman and
-W. Bialek, "Statistics of natural images", 1994); objects, classes and depths of a picture. The
+W. Bialek, "Statistics of natural images", 1994); objects, classes and depths of a picture; the
+share of scenes that were drawn again, since there was no room or too little was seen. The
 photographs are those that scikit-learn ships, and those of scikit-image where it is installed.
 """
 
@@ -17,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.markdown import table
+from scenegen.objects.catalogue import objects_of
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import RoomsFile
+from scenegen.sampling.scenes import sample_scene
 
 Array = NDArray[Any]
 SIDE = 128  # pixels to which pictures are reduced
@@ -76,8 +79,11 @@ def row(name: str, pictures: list[Array], more: list[str]) -> list[str]:
 def of_rooms(path: str) -> list[str]:
     """Return the row of a file of rooms."""
     pictures, counts, classes, depths = [], [], [], []
+    again = []
     with RoomsFile(path) as rooms:
+        objects = objects_of(rooms.spec)
         for room in rooms:
+            again.append(sample_scene(rooms.spec, room.scene.index, 0, objects) != room.scene)
             pictures.append(srgb_bytes(room.radiance))
             shown = np.unique(room.object_id[room.object_id > 0])
             counts.append(len(shown))
@@ -85,12 +91,13 @@ def of_rooms(path: str) -> list[str]:
             depths.append(np.nanpercentile(room.depth, (5, 95)))
     near, far = np.mean(depths, axis=0)
     more = [f"{np.mean(counts):.1f}", f"{np.mean(classes):.1f}", f"{near:.2f} to {far:.2f}"]
+    more.append(f"{np.mean(again):.0%}")
     return row(path, pictures, more)
 
 
 if __name__ == "__main__":
     rows = [of_rooms(path) for path in sys.argv[1:]]
-    rows.append(row("photographs", list(photographs()), ["-"] * 3))
+    rows.append(row("photographs", list(photographs()), ["-"] * 4))
     titles = [
         "",
         "pictures",
@@ -100,5 +107,6 @@ if __name__ == "__main__":
         "objects",
         "classes",
         "depths",
+        "drawn again",
     ]
     print(table(titles, rows))

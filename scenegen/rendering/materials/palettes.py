@@ -46,9 +46,9 @@ _SCHEMES = (
     ("f0eeea 39505a", "36505c d8d2c6 a4743f 8c979a", "c9963f d4cdbd 7a3f34 52707a"),
     ("efeae6 c9b7c4", "8c7590 ddd3da 5a4a60 b7a9a0", "c79a5a 6a7a5f a8506a e6ddd2"),
     ("e8e3da 7d6a5a", "6a5546 d8ccb9 3f3630 a38c70", "b98a4a 7f3a2e 52614a e0d4bd"),
-    ("f5f4f2 dadada", "9a9a98 3a3a3c e4e2de 6e6e70", "c8102e f0b323 1f5fa8 e8e8e6"),
+    ("f5f4f2 dadada", "9a9a98 3a3a3c e4e2de 6e6e70", "a8434a d0a655 46698f e8e8e6"),
     ("f2eee8 bcd0cc", "6fa09a e5e0d6 3c6a68 d8a58c", "e07a5f 3d5a6c f2cc8f 81b29a"),
-    ("ebe6dd b8864f", "a8663a e0d4bf 5b3f2c c2b49a", "2f5d50 d9a441 8c3b2a ded6c4"),
+    ("ebe6dd cbb094", "a8663a e0d4bf 5b3f2c c2b49a", "2f5d50 d9a441 8c3b2a ded6c4"),
 )
 # dark and light ends of the grain: oak, walnut, ash, cherry, pine, smoked oak, bleached oak
 _WOODS = (

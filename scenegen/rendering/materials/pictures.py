@@ -127,18 +127,18 @@ def _twig(rng: Generator, canvas: Array, colors: Colors) -> None:
 
 
 def screen(rng: Generator, palette: Palette) -> Material:
-    """Draw a screen that is off, or shows a page of text and pictures."""
+    """Draw a screen that is off, or shows a page of text and pictures in quiet colours."""
     u, v = grid(SIZE)
     canvas = np.full((SIZE, SIZE, 3), 0.012, np.float32)
     if chance(rng, 0.35):
-        canvas[:] = palette.neutrals[0] if chance(rng, 0.5) else linear("1d2430")
-        _over(canvas, palette.accents[1], (v > 0.94) * (u >= 0))
+        canvas[:] = palette.neutrals[2] if chance(rng, 0.5) else linear("1d2430")
+        _over(canvas, linear("3a4250"), (v > 0.94) * (u >= 0))
         x, lines = span(rng, 0.2, 0.4), np.random.default_rng(int(9 * rng.random())).random(40)
         row = np.minimum((v * 30).astype(int), 39)
         text = (v * 30 % 1 < 0.45) & (u > x) & (u < x + 0.55 * lines[row]) & (v > 0.35) & (v < 0.88)
-        _over(canvas, palette.neutrals[2], text.astype(np.float32))
+        _over(canvas, palette.neutrals[3], text.astype(np.float32))
         box = (u > x) & (u < 0.95) & (v > 0.06) & (v < 0.3)
-        _over(canvas, pick(rng, palette.accents), box.astype(np.float32))
+        _over(canvas, pick(rng, palette.fabrics), 0.6 * box.astype(np.float32))
     return Material(canvas, 0.08)
 
 

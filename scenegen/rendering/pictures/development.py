@@ -1,8 +1,9 @@
 """From radiance to a picture, as cameras do: exposure, white balance, a tone curve, sRGB.
 
-The tone curve is y = x (1 + x / w^2) / (1 + x), extended Reinhard (2002), of each channel, where w
-is the exposed radiance that becomes white. After sRGB's curve, c y^2 (3 - 2 y) + (1 - c) y adds
-contrast.
+Bright and dark parts of a picture are brought nearer to its middle, as phones do: by a share of
+their luminance, smoothed by a guided filter (He, Sun and Tang, 2013). The tone curve is
+y = x (1 + x / w^2) / (1 + x), extended Reinhard (2002), of each channel, where w is the exposed
+radiance that becomes white. After sRGB's curve, c y^2 (3 - 2 y) + (1 - c) y adds contrast.
 """
 
 from typing import Any
@@ -16,9 +17,14 @@ Array = NDArray[Any]
 # What `develop` finds out: factor of radiance, further factors of red, green and blue, and w.
 EXPOSURE = ("exposure", "red", "green", "blue", "white")
 KEY = 0.4  # exposed radiance of the middle of a picture
-BALANCE = 0.65  # how far white balance goes towards grey light
-BRIGHT = 99.5  # percentile of the radiance that becomes white
-LEAST_WHITE = 3.0
+BALANCE = 0.8  # how far white balance goes towards grey light
+BRIGHT = 99.5  # percentile of the radiance, WHITER times which becomes white
+WHITER = 1.15
+LEAST_WHITE = 2.5
+HIGHLIGHTS, SHADOWS = 0.45, 0.15  # shares that are taken off above and below KEY
+SMOOTH = 10  # windows of the guided filter along a picture's shorter side
+EDGE = 1.0  # variance of log2 luminance in such a window that is kept as an edge
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 CONTRAST = 0.5  # share of a smooth step in the tone curve
 
 
@@ -34,19 +40,35 @@ def develop(radiance: Array, albedo: Array, inside: Array, dtype: str, noise: Ar
         noise: added to the developed picture, (H, W, 3), 1 being white; None for none.
     """
     shown = inside if inside.any() else np.ones_like(inside)
-    luminance = radiance @ np.array([0.2126, 0.7152, 0.0722])
+    luminance = radiance @ LUMINANCE
     middle = np.exp(np.log(luminance[shown] + 1e-9).mean())
     light = radiance[shown] / np.maximum(albedo[shown], 0.05)
     mean = np.maximum(np.median(light, axis=0), 1e-9)
     gains = (mean.mean() / mean) ** BALANCE
-    gains /= gains @ np.array([0.2126, 0.7152, 0.0722])
+    gains /= gains @ LUMINANCE
     exposure = KEY / max(float(middle), 1e-9)
-    exposed = radiance * (gains * exposure)
-    white = max(float(np.percentile(exposed.max(axis=-1), BRIGHT)), LEAST_WHITE)
+    exposed = evened(radiance * (gains * exposure))
+    white = max(WHITER * float(np.percentile(exposed.max(axis=-1), BRIGHT)), LEAST_WHITE)
     found = np.array([exposure, *gains, white])
     if dtype != "uint8":
         return encode_image(radiance, dtype), found
     return encode_image(tone(exposed, white, noise), dtype), found
+
+
+def evened(exposed: Array) -> Array:
+    """Return exposed radiance whose bright and dark parts are nearer to KEY; edges stay sharp."""
+    from scipy.ndimage import uniform_filter  # takes a while, and is seldom needed
+
+    def mean(values: Array) -> Array:
+        return np.asarray(uniform_filter(values, 2 * (min(values.shape) // SMOOTH) + 1))
+
+    level = np.log2(np.maximum(exposed @ LUMINANCE, 1e-4) / KEY)
+    middle = mean(level)
+    variance = mean(level * level) - middle * middle
+    kept = variance / (variance + EDGE)
+    smooth = mean(kept) * level + mean((1 - kept) * middle)
+    stops = np.where(smooth > 0, HIGHLIGHTS, SHADOWS) * smooth
+    return np.asarray(exposed * np.exp2(-stops)[..., None])
 
 
 def tone(exposed: Array, white: float, noise: Array | None = None) -> Array:

@@ -24,6 +24,7 @@ GLOW = "glow"
 ACCENT_SHARE = 0.35  # of rooms in which one wall has another colour
 LAMP_FLUX = 0.018  # of a lamp, in the units of the sky's radiance times square metres
 CEILING_FLUX = 0.13
+LEAST_GLOW = 0.06  # square metres; what is smaller shines less, not more brightly
 WARM = (1.0, 0.72, 0.44)  # linear RGB of lamps, of some 3000 K
 
 
@@ -88,7 +89,7 @@ class _Collector:
         """Add triangles that together shine with a flux, and reflect nothing."""
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         area = 0.5 * float(np.sqrt((across**2).sum(axis=1)).sum())
-        radiance = np.array(WARM) * flux / max(np.pi * area, 1e-4)
+        radiance = np.array(WARM) * flux / (np.pi * max(area, LEAST_GLOW))
         rows = np.full(len(corners), len(self.materials))
         self.materials.append(Material(np.ones(3), 1.0, radiance=tuple(radiance.tolist())))
         self.add(corners, normals, uv, rows)

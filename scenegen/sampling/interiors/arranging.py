@@ -181,6 +181,8 @@ class Arranger:
             near = Box(box.x, box.z, (piece.half[0] + 0.08, piece.half[1] + 0.05),
                        bottom - 0.05, top + 0.05, box.turns)  # fmt: skip
             if self.space.free(near):
+                before = self.wall_box(piece, wall, along, bottom, BEHIND)
+                self.space.kept.append(before)
                 return self.space.put(piece, box, 0)
         return 0
 
@@ -227,22 +229,23 @@ class Arranger:
         return self.space.put(piece, box, number)
 
     def on_floor(self, family: str, corner: bool = False, kinds: int = 2) -> int:
-        """Put something anywhere on the floor, near walls and corners; return its number or 0."""
+        """Put something on the floor near a wall, or into a corner; return its number or 0."""
         piece = self.piece(family, kinds)
         if piece is None or self.space.full:
             return 0
         for _ in range(TRIES):
             turns = stepped_turn(self.draws.unit())
             reach = Box(0, 0, piece.half, 0, 1, turns).reach()
-            x = self._toward_wall(self.space.size[0], reach[0] + 0.04, corner)
-            z = self._toward_wall(self.space.size[2], reach[1] + 0.04, corner or None)
+            near = self.draws.shuffled((True, corner))
+            x = self._toward_wall(self.space.size[0], reach[0] + 0.04, near[0])
+            z = self._toward_wall(self.space.size[2], reach[1] + 0.04, near[1])
             if number := self.stand(piece, box_at(piece, x, z, 0.0, turns)):
                 return number
         return 0
 
-    def _toward_wall(self, length: float, margin: float, near: bool | None) -> float:
+    def _toward_wall(self, length: float, margin: float, near: bool) -> float:
         share = self.draws.unit()
-        if near or (near is None and self.draws.chance(0.6)):
+        if near:
             share = 0.15 * share if self.draws.chance(0.5) else 1 - 0.15 * share
         return margin + share * max(length - 2 * margin, 0.0)
 
@@ -273,18 +276,21 @@ class Arranger:
             around = Box(x, z, (table.half[0] + 0.5, table.half[1] + 0.5), 0.0, 0.8, turns)
             if not self.space.within(around, -0.2) or not self.space.free(around, floor=True):
                 continue
+            before = len(self.space.placed)
             if self.draws.chance(0.35):
                 self.rug(x, z, turns)
             number = self.stand(table, box_at(table, x, z, 0.0, turns))
-            if number:
-                self._chairs(number)
+            if number and self._chairs(number):
                 return number
+            del self.space.placed[before:]
         return 0
 
-    def _chairs(self, table: int) -> None:
+    def _chairs(self, table: int) -> bool:
+        """Put chairs and settings at a table; return whether two found room, if there are any."""
         place, chair = self.space.placed[table - 1].box, self.piece("chair", 1)
         if chair is None:
-            return
+            return True
+        seated = 0
         a, b = place.half
         seats: list[tuple[float, float, float, float]] = []
         for side in (-1.0, 1.0):
@@ -294,16 +300,17 @@ class Arranger:
                 seats.append((side * a, 0.0, side, 0.0))
         wanted = self.draws.count(2, max(2, len(seats)))
         for x, z, out_x, out_z in self.draws.shuffled(seats)[:wanted]:
-            if self.space.full:
-                return
             away = chair.half[1] + self.draws.span(0.02, 0.14)
             at = place.point(x + out_x * away, z + out_z * away)
             c, s = place.axes
             toward = facing(-(c * out_x + s * out_z), s * out_x - c * out_z)
             toward += stepped_turn(self.draws.span(-0.035, 0.035))
-            self.stand(chair, box_at(chair, *at, 0.0, toward), keep=False)
+            if self.space.full or not self.stand(chair, box_at(chair, *at, 0.0, toward), False):
+                continue
+            seated += 1
             if self.draws.chance(0.6):
                 self._setting(table, x, z)
+        return seated > 1
 
     def _setting(self, table: int, x: float, z: float) -> None:
         """Lay a plate, and a cup or a mug beside it, before a chair."""

@@ -43,7 +43,7 @@ def draw_room(draws: Draws, hours: tuple[float, float]) -> Room:
         openings += _windows(draws, walls[2], wall_length(size, walls[2]), bottom, top)[:1]  # type: ignore[arg-type]
     hour = draws.span(*hours)
     dark = not 6.5 < hour < 17.5
-    lit = draws.chance(0.97 if dark else 0.35)
+    lit = draws.chance(1.0 if dark else 0.35)
     facing = draws.span(0.0, 360.0)
     return Room(size, tuple(openings), hour, facing, lit, kind)  # type: ignore[arg-type]
 

@@ -13,15 +13,20 @@ from scenegen.sampling.interiors.draws import Draws
 from scenegen.sampling.interiors.spaces import Box, Space
 
 Array = NDArray[Any]
-TRIES = 60
+TRIES = 200
 HEIGHT = (0.8, 1.8)  # metres above the floor
 CLEAR = 0.3  # metres from everything
 STEEPEST = 0.14  # tangent of the steepest view up or down: 8 degrees keep walls upright
-CHOICES = 4  # free viewpoints, of which the one is taken that has most objects before it
+CHOICES = 32  # free viewpoints, of which the best is taken
 NEAREST = 0.7  # metres to what the camera may look at anywhere in the picture
 SHARE_NEAR = 0.12  # of the picture that may be nearer than NEAR
 NEAR = 1.1
-COLUMNS, ROWS = 9, 7  # of the rays that look for what stands in the way
+COLUMNS, ROWS = 11, 9  # of the rays that look for what stands in the way
+FURNISHED = 0.5  # of these rays, more of which need not meet objects
+LARGEST = 0.3  # of these rays, which one object may take
+SEVERAL = 10  # objects that count as much as all objects of the room
+LEAST_SHOWN = 1e-3
+BEYOND = 1e3  # metres
 Place = tuple[float, float, float]
 
 
@@ -37,7 +42,7 @@ def draw_cameras(
     floor = [t.box for t in space.placed if t.piece.surfaces] or [t.box for t in space.placed]
     fov_y = Camera.fov_y_from_square(fov_degrees, spec.height, spec.width)
     cosine, sine = cos_sin(np.array(spec.views) / 360)
-    found: list[tuple[int, list[Place], Place]] = []
+    found: list[tuple[float, list[Place], Place]] = []
     for _ in range(TRIES):
         if len(found) == CHOICES:
             break
@@ -59,9 +64,46 @@ def draw_cameras(
             (tx + c * dx + s * dz, y, tz - s * dx + c * dz)
             for c, s in zip(cosine.tolist(), sine.tolist(), strict=True)
         ]
-        if all(_free(place, target, space, boxes, fov_y, spec) for place in places):
-            found.append((_before(places[0], target, boxes, fov_y), places, target))
+        shown = [_shown(place, target, space, boxes, fov_y, spec) for place in places]
+        if all(shown):
+            found.append((min(shown), places, target))
     return max(found, key=lambda one: one[0])[1:] if found else None
+
+
+def _table(boxes: list[Box]) -> Array:
+    """Return middle, half sides, heights, cosine and sine of each box, (N, 8)."""
+    return np.array(
+        [(b.x, b.z, *b.half, b.bottom, b.top, *b.axes) for b in boxes] or np.zeros((0, 8))
+    )
+
+
+def _shown(
+    place: Place, target: Place, space: Space, boxes: Array, fov_y: float, spec: DatasetSpec
+) -> float:
+    """Return how much a camera shows; 0 where it is not free, or something stands right before it.
+
+    It is more where more objects are seen, and less where one of them fills the picture.
+    """
+    x, y, z = place
+    if not (CLEAR <= x <= space.size[0] - CLEAR and CLEAR <= z <= space.size[2] - CLEAR):
+        return 0.0
+    c, s = boxes[:, 6], boxes[:, 7]
+    dx, dz = x - boxes[:, 0], z - boxes[:, 1]
+    start = np.stack([c * dx - s * dz, y - (boxes[:, 4] + boxes[:, 5]) / 2, s * dx + c * dz])
+    half = np.stack([boxes[:, 2], (boxes[:, 5] - boxes[:, 4]) / 2, boxes[:, 3]])
+    outside = np.maximum(np.abs(start) - half, 0.0)
+    if (np.sqrt((outside * outside).sum(axis=0)) < CLEAR).any():
+        return 0.0
+    hit = _met(place, target, start, half, c, s, fov_y, spec.width / spec.height)
+    near = hit.min(axis=1)
+    if (near <= NEAREST).any() or (near < NEAR).mean() > SHARE_NEAR:
+        return 0.0
+    first = np.bincount(hit.argmin(axis=1), minlength=len(boxes) + 1) / len(hit)
+    rays, empty = first[:-1], float(first[-1])
+    several = np.count_nonzero(rays) / SEVERAL
+    too_large = max(float(rays.max(initial=0.0)) - LARGEST, 0.0)
+    before = _before(place, target, boxes, fov_y) / max(len(boxes), 1)
+    return max(several + before + 2 * min(1 - empty, FURNISHED) - 3 * too_large, LEAST_SHOWN)
 
 
 def _before(place: Place, target: Place, boxes: Array, fov_y: float) -> int:
@@ -75,36 +117,14 @@ def _before(place: Place, target: Place, boxes: Array, fov_y: float) -> int:
     return int(((along > NEAREST) & (across * cosine < along * sine)).sum())
 
 
-def _table(boxes: list[Box]) -> Array:
-    """Return middle, half sides, heights, cosine and sine of each box, (N, 8)."""
-    return np.array(
-        [(b.x, b.z, *b.half, b.bottom, b.top, *b.axes) for b in boxes] or np.zeros((0, 8))
-    )
-
-
-def _free(
-    place: Place, target: Place, space: Space, boxes: Array, fov_y: float, spec: DatasetSpec
-) -> bool:
-    """Return whether a camera is free, and nothing large stands right before it."""
-    x, y, z = place
-    if not (CLEAR <= x <= space.size[0] - CLEAR and CLEAR <= z <= space.size[2] - CLEAR):
-        return False
-    c, s = boxes[:, 6], boxes[:, 7]
-    dx, dz = x - boxes[:, 0], z - boxes[:, 1]
-    start = np.stack([c * dx - s * dz, y - (boxes[:, 4] + boxes[:, 5]) / 2, s * dx + c * dz])
-    half = np.stack([boxes[:, 2], (boxes[:, 5] - boxes[:, 4]) / 2, boxes[:, 3]])
-    outside = np.maximum(np.abs(start) - half, 0.0)
-    if (np.sqrt((outside * outside).sum(axis=0)) < CLEAR).any():
-        return False
-    near = _nearest(place, target, start, half, c, s, fov_y, spec.width / spec.height)
-    return bool((near > NEAREST).all() and (near < NEAR).mean() <= SHARE_NEAR)
-
-
-def _nearest(
+def _met(
     place: Place, target: Place, start: Array, half: Array, c: Array, s: Array, fov_y: float,
     aspect: float,
 ) -> Array:  # fmt: skip
-    """Return the distance along some rays of the picture to the nearest box, (R,), inf for none."""
+    """Return the distance along some rays of the picture to each box, inf for none, (R, N + 1).
+
+    The last box is what is behind all others, at BEYOND.
+    """
     back = np.array(place) - target
     back /= np.sqrt((back * back).sum())
     right = np.array([back[2], 0.0, -back[0]])
@@ -121,5 +141,5 @@ def _nearest(
     along = np.where(np.abs(along) < 1e-9, 1e-9, along)
     ends = (np.stack([-half, half])[:, :, None] - start[:, None]) / along
     enter, leave = ends.min(axis=0).max(axis=0), ends.max(axis=0).min(axis=0)
-    hit = np.where((enter <= leave) & (enter > 0), enter, np.inf)
-    return np.asarray(hit.min(axis=1, initial=np.inf))
+    met = np.where((enter <= leave) & (enter > 0), enter, np.inf)
+    return np.concatenate([met, np.full((len(met), 1), BEYOND)], axis=1)
