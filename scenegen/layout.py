@@ -131,6 +131,12 @@ FIELDS = (
            "pixels that show the object"),
     _column("scene", (), "text", "-", "-", "full description of the scene, JSON"),
 )
+# What `image` holds in closed rooms, where 8 bits are developed.
+DEVELOPED = {
+    "unit": "sRGB, times `scale`",
+    "meaning": "RGB of path tracing, developed as by a camera (`exposure`); stored value times"
+    " `scale` is sRGB, 0 to 1, ready to look at",
+}
 INTERIOR = (  # columns of closed rooms
     _column("object/stands_on", ("object_slot",), "int8", "1", "object ids",
            "what an object stands on: 0 the room (floor, wall, ceiling or sill), k the k-th object;"
@@ -194,10 +200,12 @@ def columns(spec: DatasetSpec) -> list[Column]:
         numbers = [NYU40.get(name, OTHER_PROPERTY) for name in spec.shapes]
         more["object/shape"]["nyu40"] = numbers
     unit = "metre" if spec.interior else "scene unit"
+    developed = spec.interior and spec.image_dtype == "uint8"
+    words: dict[str, dict[str, Any]] = {"image": DEVELOPED} if developed else {}
     return [
         replace(
             field,
-            unit=field.unit.replace("scene unit", unit),
+            **{"unit": field.unit.replace("scene unit", unit), **words.get(field.name, {})},
             shape=tuple(sizes[axis] for axis in field.axes or ()),
             dtype=spec.image_dtype if field.dtype == "image" else field.dtype,
             more=more.get(field.name, {}),

@@ -62,6 +62,11 @@ class Room:
         return undeveloped(self.image) if developed else decode_image(self.image)
 
     @property
+    def unit(self) -> str:
+        """The unit of lengths: "metre" in closed rooms, else "scene unit"."""
+        return "metre" if self.scene.interior is not None else "scene unit"
+
+    @property
     def points(self) -> Array:
         """Surfel positions in the camera frame, (H, W, 3), scene units; NaN where nothing."""
         return back_project(self.depth, self.fov_y_degrees)
