@@ -177,8 +177,15 @@ FURTHER = {  # columns of `DatasetSpec.truth`, by its names
 
 def fields(spec: DatasetSpec) -> list[Column]:
     """Return the columns of a file that answers that spec, without the sizes of their axes."""
-    interior = INTERIOR if spec.interior else ()
-    return [*FIELDS, *interior, *(column for name in spec.truth for column in FURTHER[name])]
+    further = [column for name in spec.truth for column in FURTHER[name]]
+    if not spec.interior:
+        return [*FIELDS, *further]
+    image = {"image": DEVELOPED} if spec.image_dtype == "uint8" else {}
+    found = []
+    for field in (*FIELDS, *INTERIOR, *further):
+        words: dict[str, Any] = {"unit": field.unit.replace("scene unit", "metre")}
+        found.append(replace(field, **{**words, **image.get(field.name, {})}))
+    return found
 
 
 def conventions(spec: DatasetSpec) -> str:
@@ -199,13 +206,9 @@ def columns(spec: DatasetSpec) -> list[Column]:
         more["image"]["encoding"] = "sRGB" if spec.image_dtype == "uint8" else "linear radiance"
         numbers = [NYU40.get(name, OTHER_PROPERTY) for name in spec.shapes]
         more["object/shape"]["nyu40"] = numbers
-    unit = "metre" if spec.interior else "scene unit"
-    developed = spec.interior and spec.image_dtype == "uint8"
-    words: dict[str, dict[str, Any]] = {"image": DEVELOPED} if developed else {}
     return [
         replace(
             field,
-            **{"unit": field.unit.replace("scene unit", unit), **words.get(field.name, {})},
             shape=tuple(sizes[axis] for axis in field.axes or ()),
             dtype=spec.image_dtype if field.dtype == "image" else field.dtype,
             more=more.get(field.name, {}),

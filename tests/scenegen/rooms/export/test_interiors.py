@@ -9,28 +9,18 @@ import trimesh
 from PIL import Image
 
 from scenegen import open_rooms
-from scenegen.description.presets import preset_spec
 from scenegen.objects.catalogue import objects_of
 from scenegen.rooms.export.encoding import Encoding
 from scenegen.rooms.export.folder import export_folder
 from scenegen.rooms.export.single import export_paths, export_room
-from scenegen.rooms.make import make_dataset
 
 DIAGONAL = 8.37  # metres, of the largest room
 
 
 @pytest.fixture(scope="module")
-def path(tmp_path_factory):
-    """A file of one small closed room."""
-    made = tmp_path_factory.mktemp("interiors") / "x.h5"
-    make_dataset(made, preset_spec("interiors", height=24, width=32, spp=1, objects=(4, 4)), 1)
-    return made
-
-
-@pytest.fixture(scope="module")
-def deep(path):
+def deep(interior_path):
     """The room, of which one pixel is as deep as any can be, and one shows the sky."""
-    with open_rooms(path) as file:
+    with open_rooms(interior_path) as file:
         room = file[0]
     depth = room.depth.copy()
     depth[0, :2] = DIAGONAL, np.nan
@@ -60,8 +50,8 @@ def test_the_unit_of_depth_can_be_told(tmp_path, deep):
     [("nerfstudio", "scene-000000/depth", "scene-000000/transforms.json"),
      ("bop", "test/000000/depth", "camera.json")],
 )  # fmt: skip
-def test_folders_tell_the_step_of_depth(tmp_path, path, form, depth, files):
-    with open_rooms(path) as rooms:
+def test_folders_tell_the_step_of_depth(tmp_path, interior_path, form, depth, files):
+    with open_rooms(interior_path) as rooms:
         folder = export_folder(rooms, form, tmp_path / form)
         room = rooms[0]
     about = json.loads((folder / files).read_text())
@@ -71,8 +61,8 @@ def test_folders_tell_the_step_of_depth(tmp_path, path, form, depth, files):
     np.testing.assert_allclose(steps[known] * metres, room.depth[known], rtol=0, atol=0.501e-3)
 
 
-def test_meshes_are_those_of_furniture(tmp_path, path):
-    with open_rooms(path) as rooms:
+def test_meshes_are_those_of_furniture(tmp_path, interior_path):
+    with open_rooms(interior_path) as rooms:
         room, objects = rooms[0], objects_of(rooms.spec)
     paths = export_paths(0, tmp_path, "a", "obj")
     export_room(room, paths, "obj")  # without being told the objects
