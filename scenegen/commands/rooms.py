@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,6 +20,9 @@ from scenegen.command_line.paths import (
     OutputPath,
     refuse_command_inputs,
 )
+
+if TYPE_CHECKING:
+    from scenegen.description.specs import DatasetSpec
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 NEEDED = 'pip install "pix2shape-bench[denoise]", or use --items 0: nothing is rendered again'
@@ -97,12 +100,10 @@ def verify(
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
     """
-    from scenegen.common.errors import BackendError
     from scenegen.files.sets.manifest import Manifest, manifests_in
     from scenegen.files.verify import Check
     from scenegen.layout import FORMAT_NAME
     from scenegen.objects.sources import file_objects
-    from scenegen.rendering.pictures.denoiser import has_denoiser
     from scenegen.rendering.pictures.places import ASSETS as PLACES
     from scenegen.rooms.reader import RoomsFile
     from scenegen.rooms.verify import verify_file, verify_set
@@ -115,13 +116,23 @@ def verify(
     checks: list[Check] = []
     for path, manifest in paths:
         with RoomsFile(path) as rooms, progress_bar(len(rooms), "image") as bar:
-            if items and rooms.spec.denoise and not has_denoiser():
-                raise BackendError(
-                    f"{path}: pictures", "denoised, and no denoiser here", hint=NEEDED
-                )
+            if items and rooms.spec.interior:
+                _check_pictures(path, rooms.spec)
             how = (items, device, file_objects(rooms.spec, **meshes), bar.update)
             checks += verify_set(rooms, manifest, *how) if manifest else verify_file(rooms, *how)
     ctx.exit(print_checks(file, checks))
+
+
+def _check_pictures(path: Path, spec: "DatasetSpec") -> None:
+    """Raise SceneGenError or OSError where pictures of interiors cannot be made again here."""
+    from scenegen.common.errors import BackendError
+    from scenegen.rendering.pictures.assets import environment_of, materials_of
+    from scenegen.rendering.pictures.denoiser import has_denoiser
+
+    if spec.denoise and not has_denoiser():
+        raise BackendError(f"{path}: pictures", "denoised, and no denoiser here", hint=NEEDED)
+    materials_of(spec)
+    environment_of(spec)
 
 
 @click.command(

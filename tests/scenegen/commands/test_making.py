@@ -1,14 +1,17 @@
 """Options of `scenegen render` for closed rooms: what is told, and when."""
 
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
 import pytest
+from PIL import Image
 
 from scenegen.commands.making import NOISY_SPP
-from scenegen.description.specs import PAPER_ONLY
+from scenegen.description.specs import PAPER_ONLY, DatasetSpec
 from scenegen.rendering.pictures import denoiser
+from scenegen.rendering.pictures.assets import digest_of
 
 RENDER = (
     "render",
@@ -59,6 +62,34 @@ def test_without_a_denoiser_more_paths_are_traced_and_that_is_told_first(run):
     with h5py.File("o.h5") as file:
         assert json.loads(file.attrs["spec"])["spp"] == NOISY_SPP
         assert np.isfinite(file["image"][0]).all()
+
+
+@pytest.fixture
+def own_wood(run, tmp_path):
+    """A folder of a material, with which o.h5 was made."""
+    (tmp_path / "mats").mkdir()
+    Image.new("RGB", (8, 8), (200, 10, 10)).save(tmp_path / "mats" / "Wood01_1K_Color.png")
+    made = run(*RENDER, "--spp", 1, "--no-denoise", "--materials", "mats")
+    assert made.exit_code == 0, made.output
+    return tmp_path / "mats"
+
+
+def test_verify_needs_what_the_file_was_made_with(run, refuses, own_wood):
+    refuses("verify", "o.h5", words=("--materials",))
+    assert run("verify", "o.h5", "--items", 0).exit_code == 0
+    assert run("verify", "o.h5", "--materials", own_wood).exit_code == 0
+    (own_wood / "more.txt").write_text("x")
+    digest_of.cache_clear()  # the bytes of a folder are read once in a process
+    refuses("verify", "o.h5", "--materials", own_wood, words=("mats",))
+
+
+def test_a_missing_denoiser_is_told_before_a_file_is_read(monkeypatch, refuses, interior_path):
+    with h5py.File(interior_path) as file:
+        spec = DatasetSpec.from_json(file.attrs["spec"])
+    monkeypatch.setattr(denoiser, "has_denoiser", lambda: False)
+    monkeypatch.setattr("scenegen.rooms.reader.DatasetSpec.from_json",
+                        lambda _: replace(spec, denoise=True))  # fmt: skip
+    refuses("verify", interior_path, words=("--items 0",))
 
 
 def test_info_leaves_out_settings_of_the_papers_room(run):
