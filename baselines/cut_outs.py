@@ -29,8 +29,7 @@ from scenegen.camera import pixel_directions, pixel_size, transform_points
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
 from scenegen.common.threads import one_thread
-from scenegen.rendering.ground_truth import decode_image
-from scenegen.rooms.reader import RoomsFile
+from scenegen.rooms.reader import RoomsFile, radiance_of
 
 Array = NDArray[Any]
 Progress = Callable[[int, int], Any]  # rows done since the last call, in all
@@ -86,7 +85,7 @@ def _empty(rooms: RoomsFile, row: int) -> Array:
 
 
 def _mask(rooms: RoomsFile, row: int) -> Array:
-    return outline_mask(decode_image(rooms.read("image", row)), *_camera(rooms, row))
+    return outline_mask(radiance_of(rooms, row), *_camera(rooms, row))
 
 
 def cut_out(rooms: RoomsFile, row: int) -> Array:
@@ -248,7 +247,7 @@ def _trees(features: Array, relief: Array) -> Callable[[Array], Array]:
 
 def _left_over(rooms: RoomsFile, row: int) -> Array:
     """Return the size of the picture's residual, reduced to CELLS x CELLS, as a vector."""
-    off, mask = residual(decode_image(rooms.read("image", row)), *_camera(rooms, row))
+    off, mask = residual(radiance_of(rooms, row), *_camera(rooms, row))
     size = np.linalg.norm(off, axis=-1) * mask
     rows, columns = (np.linspace(0, n, CELLS + 1).astype(int)[:-1] for n in size.shape)
     sums = np.add.reduceat(np.add.reduceat(size, rows, axis=0), columns, axis=1)

@@ -131,6 +131,12 @@ FIELDS = (
            "pixels that show the object"),
     _column("scene", (), "text", "-", "-", "full description of the scene, JSON"),
 )
+# What `image` holds in closed rooms, where 8 bits are developed.
+DEVELOPED = {
+    "unit": "sRGB, times `scale`",
+    "meaning": "RGB of path tracing, developed as by a camera (`exposure`); stored value times"
+    " `scale` is sRGB, 0 to 1, ready to look at",
+}
 INTERIOR = (  # columns of closed rooms
     _column("object/stands_on", ("object_slot",), "int8", "1", "object ids",
            "what an object stands on: 0 the room (floor, wall, ceiling or sill), k the k-th object;"
@@ -171,8 +177,15 @@ FURTHER = {  # columns of `DatasetSpec.truth`, by its names
 
 def fields(spec: DatasetSpec) -> list[Column]:
     """Return the columns of a file that answers that spec, without the sizes of their axes."""
-    interior = INTERIOR if spec.interior else ()
-    return [*FIELDS, *interior, *(column for name in spec.truth for column in FURTHER[name])]
+    further = [column for name in spec.truth for column in FURTHER[name]]
+    if not spec.interior:
+        return [*FIELDS, *further]
+    image = {"image": DEVELOPED} if spec.image_dtype == "uint8" else {}
+    found = []
+    for field in (*FIELDS, *INTERIOR, *further):
+        words: dict[str, Any] = {"unit": field.unit.replace("scene unit", "metre")}
+        found.append(replace(field, **{**words, **image.get(field.name, {})}))
+    return found
 
 
 def conventions(spec: DatasetSpec) -> str:
@@ -193,11 +206,9 @@ def columns(spec: DatasetSpec) -> list[Column]:
         more["image"]["encoding"] = "sRGB" if spec.image_dtype == "uint8" else "linear radiance"
         numbers = [NYU40.get(name, OTHER_PROPERTY) for name in spec.shapes]
         more["object/shape"]["nyu40"] = numbers
-    unit = "metre" if spec.interior else "scene unit"
     return [
         replace(
             field,
-            unit=field.unit.replace("scene unit", unit),
             shape=tuple(sizes[axis] for axis in field.axes or ()),
             dtype=spec.image_dtype if field.dtype == "image" else field.dtype,
             more=more.get(field.name, {}),

@@ -67,6 +67,17 @@ def rooms_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPat
 
 
 @pytest.fixture(scope="session")
+def interior_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a file of one small closed room, seen once."""
+    from scenegen.description.presets import preset_spec
+    from scenegen.rooms.make import make_dataset
+
+    path = tmp_path_factory.mktemp("interiors") / "x.h5"
+    make_dataset(path, preset_spec("interiors", height=32, width=32, spp=1, objects=(4, 4)), 1)
+    return path
+
+
+@pytest.fixture(scope="session")
 def float_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a file of 5 rooms with float32 images, higher than wide."""
     path = tmp_path_factory.mktemp("rooms") / "float.h5"

@@ -12,8 +12,7 @@ from torch import Tensor
 from baselines.training.images import Array, channels_first, check_reducible, reduced
 from metrics.measures.shape import inside_objects
 from scenegen.common.errors import FileFormatError
-from scenegen.rendering.ground_truth import decode_image
-from scenegen.rooms.reader import RoomsFile
+from scenegen.rooms.reader import RoomsFile, radiance_of
 
 FARTHEST = 1e4  # scene units; a camera farther away sees the whole room in less than a pixel
 WIDEST = 179.0  # degrees of a field of view
@@ -122,7 +121,7 @@ def _alone(object_id: Array, size: int) -> Array:
 def room_image(rooms: RoomsFile, row: int, size: int) -> Array:
     """Return the image of a row as the networks take it, (3, S, S). Raises as `channels_first`."""
     where = f"{rooms.path}: image, row {row}"
-    return channels_first(decode_image(rooms.read("image", row)), size, where)
+    return channels_first(radiance_of(rooms, row), size, where)
 
 
 def room_images(rooms: RoomsFile, rows: Array, size: int) -> Tensor:

@@ -21,6 +21,7 @@ from scenegen.files.new_file import check_writable
 from scenegen.files.sets.shards import OpenFile
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.preview import srgb_bytes
+from scenegen.rooms.reader import radiance_of
 
 Array = NDArray[Any]
 Begun = TypeVar("Begun")
@@ -50,9 +51,9 @@ class Call:
     key: str | None = None
     missing: Missing = "refuse"
 
-    def picture(self, image: Array, where: str) -> Array:
-        """Return a stored image (..., H, W, 3) as bytes for a network. Raises SpecError."""
-        radiance = decode_image(image) * np.float32(self.exposure)
+    def picture(self, radiance: Array, where: str) -> Array:
+        """Return linear radiance (..., H, W, 3) as bytes for a network. Raises SpecError."""
+        radiance = radiance * np.float32(self.exposure)
         brightest = float(radiance.max())
         if not brightest <= 1.0 + 1e-6:
             hint = f"say --exposure {0.9 * self.exposure / brightest:.2g}"
@@ -211,7 +212,7 @@ def _begun(
         if isinstance(rooms, MeasuredFile):
             images.append(rooms.picture(row))
         else:
-            images.append(call.picture(rooms.read("image", row), rooms.place("image", row)))
+            images.append(call.picture(radiance_of(rooms, row), rooms.place("image", row)))
         cameras += [matrix_of(rooms, row)] if call.intrinsics else []
     if not model.takes_batches:
         (row,), told = rows, cameras if call.intrinsics else []
@@ -271,7 +272,9 @@ def _run_questions(
                 arrays = kept.read(row)
                 if arrays is not None:
                     return row, arrays, lambda: None
-                images = call.picture(questions.read("questions", row), f"{data}: row {row}")
+                images = call.picture(
+                    decode_image(questions.read("questions", row)), f"{data}: row {row}"
+                )
                 return row, None, model.begin("infer", f"row {row}", images[0], images[1:])
 
             for row, arrays, wait in _one_ahead(begin, range(len(questions))):

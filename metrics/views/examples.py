@@ -20,8 +20,8 @@ from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPre
 from metrics.views.pictures import Picture, data_url, depth_pictures, view_pictures
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.common.text_table import number
-from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.preview import srgb_bytes
+from scenegen.rooms.reader import radiance_of
 
 if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
@@ -147,7 +147,7 @@ def room_pictures(
     true_depth = rooms.read("depth", row)
     fov_y_degrees = float(rooms.read("camera/fov_y_degrees", row))
     return view_pictures(
-        decode_image(rooms.read("image", row)),
+        radiance_of(rooms, row),
         true_depth,
         depth_as_scored(predictions.view(place), true_depth, fov_y_degrees),
         rooms.read("normal", row),

@@ -24,8 +24,8 @@ from metrics.views.plots import KINDS, LINE, kind_of, load_matplotlib
 from scenegen.common.errors import SceneGenError
 from scenegen.common.names import did_you_mean
 from scenegen.files.new_file import written_beside
-from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.preview import srgb_bytes
+from scenegen.rooms.reader import radiance_of
 
 Array = NDArray[Any]
 Line = tuple[Array, Array, Sequence[Array]]  # of a grid: picture, true depth, depths
@@ -176,7 +176,7 @@ def _line(rooms: Images, row: int, views: Sequence[PredictedView]) -> Line:
         depths = [depth_as_declared(view, truth) for view in views]
         return rooms.picture(row), truth.depth.astype(np.float64), depths
     true = rooms.read("depth", row).astype(np.float64)
-    picture = srgb_bytes(np.nan_to_num(decode_image(rooms.read("image", row))))
+    picture = srgb_bytes(np.nan_to_num(radiance_of(rooms, row)))
     fov = float(rooms.read("camera/fov_y_degrees", row))
     return picture, true, [depth_as_scored(view, true, fov) for view in views]
 

@@ -4,11 +4,12 @@ Each one parses its options, makes one library call, and prints. Heavy imports h
 """
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -33,8 +34,9 @@ from scenegen.command_line.options import (
 from scenegen.command_line.output import on_scheduler, print_line, progress_bar
 from scenegen.command_line.paths import InputPath, NewHdf5
 
-SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
-SHARED = ("parquet", "webdataset")  # and of files of many
+if TYPE_CHECKING:
+    from scenegen.description.specs import DatasetSpec
+
 NOISY_SPP = 256  # samples per pixel of pictures that are not denoised
 
 
@@ -164,14 +166,10 @@ def render(
         chosen["fov_degrees"], chosen["fov_spread_degrees"] = fov[0], fov[1] - fov[0]
     if size is not None:
         chosen["height"], chosen["width"] = size
-    chosen = _with_denoiser(preset, chosen)
-    assets = [chosen.pop(name, None) for name in ("materials", "environment")]
-    if any(assets):
-        from scenegen.rendering.pictures.assets import use_assets
-
-        chosen |= use_assets(*assets)
+    assets = {name: chosen.pop(name, None) for name in ("materials", "environment")}
     source = object_source(preset, **objects)
-    spec = preset_spec(preset, **chosen, **source.settings)
+    spec = _with_assets(preset_spec(preset, **chosen, **source.settings), **assets)
+    spec, notes = _with_denoiser(spec, chosen)
     images = count * len(spec.views)
     started = time.perf_counter()
     handed_out, out = out, _truth_place(out, overwrite) if withhold_truth else out
@@ -193,7 +191,7 @@ def render(
             command=creation_command("scenegen"),
             objects=source.objects,
             cluster=cluster,
-            progress=bar.update,
+            progress=_telling(notes, bar.update),
         )
     if withhold_truth:
         from scenegen.rooms.withheld import withhold_truth as withhold
@@ -202,31 +200,66 @@ def render(
         print_line(f"{handed_out}: images and cameras, to be handed out; {out} has the truth")
     seconds = time.perf_counter() - started
     megabytes = _set_bytes(out) / 1e6
-    print_line(f"{out}: {images} images, {megabytes:.1f} MB, {images / seconds:.0f} images/s")
+    speed = f"{images / seconds:.0f}" if images > 9 * seconds else f"{images / seconds:.2g}"
+    print_line(f"{out}: {images} images, {megabytes:.1f} MB, {speed} images/s")
     _print_exposure(out)
     for line in source.notes(spec.own_reflectance):
         print_line(line, err=True)
 
 
 # fmt: on
-def _with_denoiser(preset: str, chosen: dict[str, Any]) -> dict[str, Any]:
-    """Add whether interiors are denoised, and how many samples they need, where that is not told.
+def _with_assets(
+    spec: "DatasetSpec", materials: str | None, environment: str | None
+) -> "DatasetSpec":
+    """Return a spec with materials and surroundings of others, where they are told.
 
-    Raises BackendError where no denoiser is installed, and one is asked for.
+    Raises as `assets.use_assets`, and SpecError where other rooms than interiors should have them.
     """
-    from scenegen.description.presets import PRESETS
+    if materials is None and environment is None:
+        return spec
+    from scenegen.common.records import check
+    from scenegen.rendering.pictures.assets import use_assets
+
+    where = "materials" if environment is None else "environment"
+    check(spec.interior, where, "a preset without them", "--preset interiors")
+    settings: dict[str, Any] = use_assets(materials, environment)
+    return replace(spec, **settings)
+
+
+def _with_denoiser(
+    spec: "DatasetSpec", chosen: Mapping[str, Any]
+) -> "tuple[DatasetSpec, list[str]]":
+    """Return a spec with a denoiser, or with as many samples as do without, unless that is told.
+
+    The lines say that there is no denoiser, where it is missed. Raises BackendError where no
+    denoiser is installed, and one is asked for.
+    """
     from scenegen.rendering.pictures.denoiser import check_denoiser, has_denoiser
 
-    if not PRESETS.get(preset) or not PRESETS[preset].settings.get("interior"):
-        return chosen
-    if chosen.get("denoise"):
+    if not spec.interior:
+        return spec, []
+    if spec.denoise:
         check_denoiser()
     if "denoise" not in chosen and has_denoiser():
-        return {**chosen, "denoise": True}
-    if not chosen.get("denoise") and "spp" not in chosen:
-        print_line(f"no denoiser: {NOISY_SPP} samples a pixel instead; the extra `denoise` has one")
-        return {**chosen, "spp": NOISY_SPP}
-    return chosen
+        return replace(spec, denoise=True), []
+    if spec.denoise or "spp" in chosen:
+        return spec, []
+    text = f"no denoiser: {NOISY_SPP} samples a pixel instead; the extra `denoise` has one"
+    return replace(spec, spp=NOISY_SPP), [] if has_denoiser() else [text]
+
+
+def _telling(lines: list[str], progress: Callable[[int], Any]) -> Callable[[int], None]:
+    """Return `progress`, before whose first call, when all is known to be in order, lines are told.
+
+    They are gone then.
+    """
+
+    def told(done: int) -> None:
+        while lines:
+            print_line(lines.pop(0))
+        progress(done)
+
+    return told
 
 
 def _truth_place(out: str, overwrite: bool) -> str:

@@ -5,8 +5,9 @@ Each one parses its options, makes one library call, and prints. Heavy imports h
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -20,7 +21,11 @@ from scenegen.command_line.paths import (
     refuse_command_inputs,
 )
 
+if TYPE_CHECKING:
+    from scenegen.description.specs import DatasetSpec
+
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
+NEEDED = 'pip install "pix2shape-bench[denoise]", or use --items 0: nothing is rendered again'
 MOST_NAMED = 20  # exported rows whose files are listed
 SHARED = ("parquet", "webdataset")  # of files of many rows
 FOLDERS = ("nerfstudio", "colmap", "bop", "coco", "moge")  # of folders that a tool reads
@@ -111,9 +116,23 @@ def verify(
     checks: list[Check] = []
     for path, manifest in paths:
         with RoomsFile(path) as rooms, progress_bar(len(rooms), "image") as bar:
+            if items and rooms.spec.interior:
+                _check_pictures(path, rooms.spec)
             how = (items, device, file_objects(rooms.spec, **meshes), bar.update)
             checks += verify_set(rooms, manifest, *how) if manifest else verify_file(rooms, *how)
     ctx.exit(print_checks(file, checks))
+
+
+def _check_pictures(path: Path, spec: "DatasetSpec") -> None:
+    """Raise SceneGenError or OSError where pictures of interiors cannot be made again here."""
+    from scenegen.common.errors import BackendError
+    from scenegen.rendering.pictures.assets import environment_of, materials_of
+    from scenegen.rendering.pictures.denoiser import has_denoiser
+
+    if spec.denoise and not has_denoiser():
+        raise BackendError(f"{path}: pictures", "denoised, and no denoiser here", hint=NEEDED)
+    materials_of(spec)
+    environment_of(spec)
 
 
 @click.command(
@@ -151,9 +170,8 @@ def verify(
 @click.option(
     "--depth-unit",
     type=click.FloatRange(0, min_open=True),
-    default=1e-4,
-    show_default=True,
-    help="Scene units for each of the 65,535 steps of depth in PNG files; moge needs none.",
+    help="Scene units for each of the 65,535 steps of depth in PNG files; moge needs none [1e-4; of"
+    " interiors 1e-3, millimetres].",
 )
 @click.option(
     "--out",
@@ -178,7 +196,7 @@ def export(
     curve: str,
     bits: str,
     exposure: float,
-    depth_unit: float,
+    depth_unit: float | None,
     out: str | None,
     rows_per_file: int,
     overwrite: bool,
@@ -193,7 +211,8 @@ def export(
     if every and items is not None:
         raise click.UsageError("--all and --items exclude each other: use one of them")
     folder = out or f"{Path(file).stem}-{form}"
-    how = (curve, int(bits), exposure, depth_unit)
+    how = {"curve": curve, "bits": int(bits), "exposure": exposure}
+    how |= {} if depth_unit is None else {"depth_unit": depth_unit}
     if form in SHARED:
         _export_many(file, items, form, folder, curve, rows_per_file, overwrite)
     elif form in FOLDERS:
@@ -246,11 +265,11 @@ def _export_folder(
     overwrite: bool,
     device: str,
     meshes: dict[str, Any],
-    how: tuple[str, int, float, float],
+    how: dict[str, Any],
 ) -> None:
     """Write rows, or all, to the folder that a tool reads; `how` are the fields of `Encoding`."""
     from scenegen.objects.sources import file_objects
-    from scenegen.rooms.export.encoding import Encoding
+    from scenegen.rooms.export.encoding import plain
     from scenegen.rooms.export.folder import export_folder
     from scenegen.rooms.reader import RoomsFile
 
@@ -263,7 +282,7 @@ def _export_folder(
                 form,
                 out,
                 items,
-                encoding=Encoding(*how),
+                encoding=replace(plain(rooms.spec.interior), **how),
                 objects=objects,
                 device=device,
                 overwrite=overwrite,
@@ -279,7 +298,7 @@ def _export_single(
     out: str,
     overwrite: bool,
     meshes: dict[str, Any],
-    how: tuple[str, int, float, float],
+    how: dict[str, Any],
 ) -> None:
     """Write each row, or all rows, to files of their own; `how` are the fields of `Encoding`."""
     from scenegen.common.errors import SpecError
@@ -287,13 +306,14 @@ def _export_single(
     from scenegen.files.pictures import pick_rows
     from scenegen.objects.catalogue import changed_meshes
     from scenegen.objects.sources import file_objects, mesh_folder
-    from scenegen.rooms.export.encoding import Encoding
+    from scenegen.rooms.export.encoding import plain
     from scenegen.rooms.export.single import export_paths, export_room
     from scenegen.rooms.reader import RoomsFile
 
     mesh_folder(meshes["shapenet_root"], meshes["objects_root"], meshes["up"])
     with RoomsFile(file) as rooms:
         objects = file_objects(rooms.spec, **meshes) if form == "obj" else None
+        encoding = replace(plain(rooms.spec.interior), **how)
         rows = list(range(len(rooms))) if items is None else pick_rows(len(rooms), items)
         for row in rows:
             changed = changed_meshes(objects, rooms.scene(row)) if objects else []
@@ -307,7 +327,7 @@ def _export_single(
                 for path in files:
                     check_writable(path, overwrite)
             for row, files in paths.items():
-                export_room(rooms[row], files, form, overwrite, objects, Encoding(*how))
+                export_room(rooms[row], files, form, overwrite, objects, encoding)
                 bar.update(1)
     if len(rows) > MOST_NAMED:
         print_line(f"{out}: {len(rows)} images in {sum(map(len, paths.values()))} files")

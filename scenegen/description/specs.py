@@ -41,7 +41,8 @@ LIMITS: dict[str, tuple[float, float]] = {  # of settings that are a number or a
     "hours": (0.0, 24.0),
     "sensor_noise": (0.0, 1.0),
 }
-INTERIOR_LIMITS = {**LIMITS, "objects": (0, 99)}  # the shell is cast as one more object
+# Cameras look at something, and the shell is cast as one more object.
+INTERIOR_LIMITS = {**LIMITS, "objects": (1, 99)}
 # Settings of the paper's room, which closed rooms do not have.
 PAPER_ONLY = (
     "object_radius", "pose", "lights", "shadows", "allow_cropped", "camera_radius",
@@ -318,5 +319,6 @@ def _check_interior(spec: DatasetSpec) -> None:
         check(unused, name.replace("_", " "), f"{getattr(spec, name)} with {where}", "none")
     if spec.interior:
         check(spec.shading == "path", "shading", f"{spec.shading} with interiors", "path")
-        families = spec.source == "families"
-        check(families, "objects", f"{spec.source} with interiors", "the built-in families")
+        where = {"shapes": "shapes", "folder": "objects root"}.get(spec.source, "shapenet root")
+        families = "none: interiors are furnished with built-in classes (--classes)"
+        check(spec.source == "families", where, "given with interiors", families)

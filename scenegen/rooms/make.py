@@ -69,7 +69,8 @@ def make_dataset(
         objects: what the scenes are made of; None for `objects_of(spec)`.
         cluster: whose workers make the shards; `path` must then be in a folder that all of them
             see, or a URL.
-        progress: called now and then with the number of rows written since the last call.
+        progress: called now and then with the number of rows written since the last call, first
+            before anything is rendered.
 
     Raises SpecError for a setting out of range, BackendError where the device cannot render here,
     PlacementError where no scene meets the request, and others as `making.make_set`.

@@ -58,8 +58,12 @@ class Room:
     @property
     def radiance(self) -> Array:
         """Linear RGB radiance, (H, W, 3) float32; of developed pictures, that which they show."""
-        developed = self.scene.interior is not None and self.image.dtype == np.uint8
-        return undeveloped(self.image) if developed else decode_image(self.image)
+        return _linear(self.image, self.scene.interior is not None)
+
+    @property
+    def unit(self) -> str:
+        """The unit of lengths: "metre" in closed rooms, else "scene unit"."""
+        return "metre" if self.scene.interior is not None else "scene unit"
 
     @property
     def points(self) -> Array:
@@ -70,6 +74,19 @@ class Room:
     def points_world(self) -> Array:
         """Surfel positions in the world frame, (H, W, 3), scene units; NaN where nothing."""
         return transform_points(self.world_from_camera, self.points)
+
+
+def radiance_of(rooms: Any, row: int) -> Array:
+    """Return the linear RGB radiance of a row, as `Room.radiance`, of a file or of streamed rows.
+
+    Raises FileFormatError where the row is damaged.
+    """
+    return _linear(rooms.read("image", row), rooms.spec.interior)
+
+
+def _linear(image: Array, interior: bool) -> Array:
+    developed = interior and image.dtype == np.uint8
+    return undeveloped(image) if developed else decode_image(image)
 
 
 def open_rooms(path: str | Path) -> "RoomsFile":

@@ -144,6 +144,14 @@ def render_items(
             return None
         return *proposed, launch_fields(proposed[1], names, device, kept)
 
+    def complete() -> list[RenderedScene]:
+        """Return the scenes that are next in order and there."""
+        nonlocal next_out
+        first = next_out
+        while next_out < len(indices) and indices[next_out] in finished:
+            next_out += 1
+        return [finished.pop(item) for item in indices[first:next_out]]
+
     begun: _Begun | None = None
     while begun := begun or begin(propose()):
         scenes, packed, fetch = begun
@@ -158,14 +166,12 @@ def render_items(
         ):
             if shown is None:
                 proposals.refuse(item)
-            else:
-                proposals.accept(item)
-                finished[item] = shown
-        ready = []
-        while next_out < len(indices) and indices[next_out] in finished:
-            ready.append(finished.pop(indices[next_out]))
-            next_out += 1
-        if ready:
+                continue
+            proposals.accept(item)
+            finished[item] = shown
+            if traced and (ready := complete()):  # at once, as the next picture takes long
+                yield ready
+        if ready := complete():
             yield ready
 
 

@@ -134,7 +134,9 @@ def _rows(
     ASSETS.use(*places[1:])
     share_processors(processes, device)
     views = len(spec.views)
-    at_once = min(DEFAULT_BATCH, max(batch, PIXELS // (spec.height * spec.width)))
+    # Path tracing takes long, one image after the other: nobody waits for more than a batch.
+    more = 0 if spec.shading == "path" else PIXELS // (spec.height * spec.width)
+    at_once = min(DEFAULT_BATCH, max(batch, more))
     items = list(dict.fromkeys(number // views for number in numbers))
     wanted = iter((*numbers, -1))
     number = next(wanted)

@@ -43,7 +43,7 @@ from scenegen.rooms.row_rules import (
     row_problems,
     row_rules,
 )
-from scenegen.sampling.scenes import MAX_ATTEMPTS, sample_scenes
+from scenegen.sampling.scenes import most_attempts, sample_scenes
 
 Array = NDArray[Any]
 # Rows rendered again agree bit for bit where a file is of the exact kind that is rendered here.
@@ -164,8 +164,9 @@ def _sampled_again(rooms: RoomsFile, rows: Sequence[int], objects: Objects) -> C
 def _proposals(rooms: RoomsFile, index: int, objects: Objects) -> Iterator[SceneSpec]:
     """Yield what the seed proposes for an item, some at a time, as few are mostly enough."""
     step = 1 if rooms.spec.interior else TRIED_AT_ONCE  # closed rooms take long, one by one
-    for first in range(0, MAX_ATTEMPTS, step):
-        attempts = range(first, min(first + step, MAX_ATTEMPTS))
+    most = most_attempts(rooms.spec)
+    for first in range(0, most, step):
+        attempts = range(first, min(first + step, most))
         _, drawn = sample_scenes(rooms.spec, [index] * len(attempts), attempts, objects)
         yield from (drawn.scene(k) for k in range(len(drawn)))
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from scenegen.description.scene_arrays import SceneArrays, joined
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects
-from scenegen.sampling.scenes import MAX_ATTEMPTS, MAX_RENDERED, refusal, sample_scenes
+from scenegen.sampling.scenes import MAX_RENDERED, most_attempts, refusal, sample_scenes
 
 AHEAD = 512  # proposals drawn at once: with few, arrays are slow; with many, retries wait
 AHEAD_INTERIORS = 16  # closed rooms take long, one by one
@@ -22,6 +22,7 @@ class ProposalQueue:
         self._spec, self._objects, self._items = spec, objects, items
         self._ahead = AHEAD_INTERIORS if spec.interior else AHEAD
         self._retries = 1 if spec.interior else RETRIES
+        self._most = most_attempts(spec)
         self._begun = 0  # items that were proposed at least once
         self._stock: list[int] = []  # a heap of items whose next proposal is known
         self._again: list[int] = []  # a heap of items that need another attempt
@@ -32,7 +33,7 @@ class ProposalQueue:
     def take(self, count: int, end: int) -> SceneArrays | None:
         """Return the next `count` proposals of items before `end`, fewer if there are no more.
 
-        Raises PlacementError where MAX_ATTEMPTS proposals of an item were of no use.
+        Raises PlacementError where `most_attempts` proposals of an item were of no use.
         """
         if self._left() and len(self._stock) < self._ahead:
             self._draw()  # before it must be, so that items without room are tried again in time
@@ -79,9 +80,9 @@ class ProposalQueue:
         while self._again and len(tries) < self._ahead:
             item = heapq.heappop(self._again)
             first = self._attempts[item]
-            if first == MAX_ATTEMPTS:
-                raise refusal(self._spec, item, self._taken[item])
-            more = range(first, min(first + max(first, self._retries), MAX_ATTEMPTS))
+            if first == self._most:
+                raise refusal(self._spec, item, self._taken[item], first)
+            more = range(first, min(first + max(first, self._retries), self._most))
             tries += [(item, attempt) for attempt in more]
         room = min(
             self._ahead - len(tries),

@@ -36,6 +36,8 @@ Array = NDArray[Any]
 # Before a request is called impossible, so many scenes are proposed for an item, and so many of
 # these are rendered. In one of 20,000 rooms of built-in objects one proposal in forty finds room.
 MAX_ATTEMPTS, MAX_RENDERED = 1000, 100
+# Closed rooms take long. In the fullest of 10,000, one proposal in 34 found room.
+MAX_FURNISHED = 300
 POSES_PER_OBJECT = 8  # sizes and orientations tried for one object of a proposal
 DOWN = np.array([[0.0, -1.0, 0.0]])
 _TOGETHER = (0, 1, 3, POSES_PER_OBJECT)  # poses 0, 1 to 2, and 3 to 7 are tried at once
@@ -109,6 +111,11 @@ def sample_scene(
     return scenes.scene(0) if len(scenes) else None
 
 
+def most_attempts(spec: DatasetSpec) -> int:
+    """Return how many scenes are proposed for an item before a request is called impossible."""
+    return MAX_FURNISHED if spec.interior else MAX_ATTEMPTS
+
+
 def refusal(
     spec: DatasetSpec, index: int, placed_but_hidden: int, attempts: int = MAX_ATTEMPTS
 ) -> PlacementError:
@@ -125,7 +132,8 @@ def refusal(
             if not placed_but_hidden
             else f"{placed_but_hidden} proposals that show too few objects",
             f"room for all of them, and a camera that sees {LEAST_SEEN}",
-            "try fewer --objects, more --classes, or views that are less far apart",
+            "try fewer --objects, more --classes, a wider --fov, fewer --min-visible-pixels, or"
+            " --views that are less far apart",
         )
     objects = int(sample_counts(spec, np.array([index]))[0])
     if placed_but_hidden:

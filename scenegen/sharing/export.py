@@ -6,12 +6,13 @@ and networks, unless the caller asks for linear ones.
 
 import json
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from scenegen.common.names import check_choice
 from scenegen.common.records import check
@@ -19,6 +20,7 @@ from scenegen.files.new_file import folder_written_beside
 from scenegen.files.rows import RowFile
 from scenegen.files.schema import Column
 from scenegen.files.sets.shards import cut, shard_name
+from scenegen.rendering.ground_truth import undeveloped
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.sharing.formats import write_parquet, write_tar
 from scenegen.sharing.task import Task, is_picture, stored_blocks
@@ -32,7 +34,10 @@ ROWS_PER_FILE = 1000
 MOST_FILES = 100_000  # as many as their numbers of five digits can tell apart
 ABOUT = "config.json"  # a name that `datasets` never takes for data
 ROW = Column("row", (), "int64", meaning="row of the file that the rows come from")
+# Encoding, unit and meaning of pictures.
 DECODING = "value times `scale`, decoded by the sRGB curve (IEC 61966-2-1), is linear radiance"
+SRGB = "srgb", "sRGB", f"RGB; {DECODING}"
+LINEAR = "linear", "linear radiance, times `scale`", "RGB; value times `scale` is linear radiance"
 
 
 def write_export(
@@ -84,8 +89,10 @@ def write_export(
     stem = "-".join(filter(None, (file.path.stem, file.part)))
     names = [shard_name(f"{stem}{ending}", i, len(parts)) for i in range(len(parts))]
     columns = [ROW, *task.exported(file)]
-    pictures = {c.name for c in columns if is_picture(c)} if encoding == "srgb" else set()
-    columns = [_as_srgb(column) if column.name in pictures else column for column in columns]
+    changed = [c for c in columns if is_picture(c) and (encoding == "srgb" or _is_developed(c))]
+    pictures = {column.name: _codes(column, encoding) for column in changed}
+    told = {"srgb": SRGB, "linear": LINEAR}[encoding]
+    columns = [_encoded(c, *told) if c.name in pictures else c for c in columns]
     about = {
         "what": f"{what}, as {form}",
         "files": names,
@@ -102,9 +109,22 @@ def write_export(
     return [Path(folder) / name for name in (*names, ABOUT)]
 
 
-def _as_srgb(column: Column) -> Column:
-    more = {**column.more, "encoding": "srgb"}
-    return replace(column, unit="sRGB", meaning=f"RGB; {DECODING}", more=more)
+def _is_developed(column: Column) -> bool:
+    """Return whether a picture is stored as sRGB, as those of interiors are."""
+    return column.more.get("encoding") == "sRGB"
+
+
+def _codes(column: Column, encoding: str) -> NDArray[np.uint8]:
+    """Return what each of the 256 values of a picture becomes."""
+    levels = np.arange(256, dtype=np.uint8)
+    if _is_developed(column):
+        return levels if encoding == "srgb" else np.rint(255 * undeveloped(levels)).astype(np.uint8)
+    return srgb_bytes(levels / 255) if encoding == "srgb" else levels
+
+
+def _encoded(column: Column, encoding: str, unit: str, meaning: str) -> Column:
+    more = {**column.more, "encoding": encoding}
+    return replace(column, unit=unit, meaning=meaning, more=more)
 
 
 def _told(column: Column) -> dict[str, Any]:
@@ -125,15 +145,14 @@ def _blocks(
     file: RowFile,
     task: Task,
     columns: Sequence[Column],
-    pictures: set[str],
+    pictures: Mapping[str, NDArray[np.uint8]],
     rows: Sequence[int],
     progress: Callable[[int], Any],
 ) -> Iterator[dict[str, list[Any]]]:
-    """Yield the values of rows as lists, by name of the column; `pictures` become sRGB."""
-    codes = srgb_bytes(np.arange(256) / 255)
+    """Yield the values of rows as lists, by name of the column; `pictures` get these codes."""
     for block in stored_blocks(file, rows):
         exported = [{ROW.name: row, **task.values(stored)} for row, stored in block]
         for values in exported:
-            values.update({name: codes[values[name]] for name in pictures})
+            values.update({n: codes[values[n]] for n, codes in pictures.items()})
         yield {c.name: [values[c.name] for values in exported] for c in columns}
         progress(len(block))

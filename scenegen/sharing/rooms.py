@@ -79,6 +79,46 @@ RESPONSIBLE: dict[str, str | list[str]] = {
 }
 
 
+# What differs in closed rooms.
+INTERIOR_SUMMARY = (
+    "Synthetic pictures of furnished rooms, path-traced by a program, with the exact ground truth"
+    " of each pixel (depth, surface normal, object id) and of each scene (camera, size of the room,"
+    " objects, their poses and what they stand on)."
+)
+INTERIOR_READING = """The HDF5 files are read by any HDF5 library. In Python:
+
+    import h5py
+
+    with h5py.File(name) as f:
+        depth = f["depth"][row]  # (H, W) float32, planar, metres; NaN through windows
+        picture = f["image"][row]  # (H, W, 3); sRGB where it has 8 bits, else linear radiance
+
+`datasets.load_dataset(folder, "index")` reads the index, and so does `mlcroissant` by
+`croissant.json`. Lengths are in metres. World frame: right-handed, y up, the room is the box from
+the origin to `room/size`, its floor at y = 0. Camera frame: x right, y up, looks along -z."""
+INTERIOR_RESPONSIBLE: dict[str, str | list[str]] = {
+    "data_preprocessing_protocol": [
+        "Truth is stored as it was rendered. Pictures of 8 bits are developed as by a camera:"
+        " exposure, white balance and a tone curve, then sRGB. They are denoised where the settings"
+        " say so."
+    ],
+    "data_limitations": [
+        "Rooms are boxes with furniture of built-in families, and materials that a program draws"
+        " unless the settings name others. Windows have no glass, and there are no mirrors.",
+        "There is no blur and no distortion of a lens, and noise of a sensor only where the"
+        " settings say so.",
+        "Depth belongs to the ray through a pixel's centre; at silhouettes it is not the mean over"
+        " the pixel.",
+    ],
+    "data_biases": [
+        "All pictures are synthetic. What stands where follows rules that were written by hand, not"
+        " counts in homes.",
+        "Pictures that show few objects are drawn again, so views of bare walls are rare.",
+        "The built-in objects are of 35 families, in proportions that a program draws.",
+    ],
+}
+
+
 def make_rooms_card(
     rooms: Sequence[RoomsFile], folder: str | Path, publication: Publication, **how: Any
 ) -> list[Path]:
@@ -99,19 +139,25 @@ def make_rooms_card(
         manifest = manifest_path(file.path)
         if file.opened.shards and manifest.is_file():
             files.append((manifest, f"manifest of {file.path.name}"))
-    return write_card(folder, publication, ROOMS, rooms, files, _notes, **how)
+    interior = [file.spec.interior for file in rooms]
+    check(len(set(interior)) < 2, "files", "interiors and other rooms", "a card for each kind")
+    task = INTERIORS if interior[0] else ROOMS
+    return write_card(folder, publication, task, rooms, files, _notes, **how)
 
 
 def default_license(rooms: Sequence[RoomsFile]) -> str:
     """Return the licence of data in which nobody else has rights: CC-BY-4.0.
 
-    Raises SpecError where rooms show meshes that somebody made: on what terms their pictures may be
-    handed on, only the publisher can know.
+    Raises SpecError where rooms show meshes, materials or surroundings that somebody made: on what
+    terms their pictures may be handed on, only the publisher can know.
     """
     for file in rooms:
         what, source = "none, and meshes that somebody made", file.spec.source
         expected = f"the licence under which pictures of {source} may be handed on"
         check(source in BUILT_IN, "license", what, expected)
+        assets = " and ".join(n for n in ("materials", "environment") if getattr(file.spec, n))
+        what, expected = f"none, and {assets} of others", "the licence of their pictures"
+        check(not assets, "license", what, expected)
     return "CC-BY-4.0"
 
 
@@ -222,3 +268,19 @@ ROOMS = Task(
     layout=_layout,
 )
 # fmt: on
+LIGHTS = ("light_count", "light_position", "light_color")  # which closed rooms do not have
+INTERIORS = replace(
+    ROOMS,
+    summary=INTERIOR_SUMMARY,
+    reading=INTERIOR_READING,
+    responsible={**RESPONSIBLE, **INTERIOR_RESPONSIBLE},
+    columns=tuple(
+        replace(column, meaning=column.meaning.replace("scene units", "metres"))
+        for column in ROOMS.columns
+        if column.name not in LIGHTS
+    ),
+    counts={name: of for name, of in ROOMS.counts.items() if "lights" not in name},
+    line=lambda rooms, stored: {
+        name: value for name, value in _line(rooms, stored).items() if name not in LIGHTS
+    },
+)

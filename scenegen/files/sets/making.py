@@ -71,7 +71,8 @@ def make_set(
         shard_size: most items of one file; more go to shards.
         workers: processes of this machine that make rows.
         cluster: whose workers make whole pieces instead.
-        progress: is called with the number of rows that are there since the last call.
+        progress: is called with the number of rows that are there since the last call; first when
+            nothing speaks against the request.
 
     Raises SpecError where the files there answer another request, SceneGenError while another run
     makes this set, FileExistsError where all files are there or others have their names, and
@@ -85,6 +86,7 @@ def make_set(
         place = place.absolute()  # workers are in other folders
     if len(pieces) == 1 and cluster is None:  # after a kill there is nothing to go on with
         _completed_files(place, request, pieces, overwrite)
+        progress(0)
         list(_made_here(place.parent, pieces, plan, work, workers, overwrite, progress, note))
         _remove(place, request.files if overwrite else (), keep=pieces[0].names)
         return

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -95,6 +96,26 @@ def from_folder(folder: str | Path) -> Mapping[str, tuple[MapFiles, ...]]:
         words = ", ".join(words.split("|")[0] for words, *_ in _WORDS)
         raise SpecError(root, "no name that tells a kind", f"names with one of {words}")
     return {kind: tuple(maps) for kind, maps in served.items()}
+
+
+def check_maps(served: Mapping[str, tuple[MapFiles, ...]]) -> None:
+    """Decode the maps of `from_folder`, in threads.
+
+    Raises FileFormatError where one is cut short or damaged.
+    """
+    paths = dict.fromkeys(
+        path for some in served.values() for maps in some for _, path in maps.files
+    )
+    pictures = [path for path in paths if path.suffix.lower() != ".exr"]  # which were decoded
+    with ThreadPoolExecutor() as threads:
+        for _ in threads.map(lambda path: _opened(path, _decoded), pictures):
+            pass
+
+
+def _decoded(path: Path) -> None:
+    with Image.open(path) as picture:
+        picture.draft(None, (64, 64))  # JPEG files are decoded at an eighth of their size
+        picture.load()
 
 
 def _check(where: Path, files: list[tuple[str, Path]]) -> None:

@@ -16,7 +16,7 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.backend import point_to_llvm
-from scenegen.rendering.materials.folders import MapFiles, from_folder
+from scenegen.rendering.materials.folders import MapFiles, check_maps, from_folder
 from scenegen.rendering.pictures.places import ASSETS
 
 Array = NDArray[Any]
@@ -86,6 +86,8 @@ def read_environment(place: Path) -> Array:
     if mi.variant() is None:  # bitmaps need one
         mi.set_variant("scalar_rgb")
     expected = "an equirectangular picture in HDR or EXR"
+    if not place.is_file():
+        raise FileFormatError(place, "no such file", expected)
     try:
         bitmap = mi.Bitmap(str(place))
     except Exception as error:  # Mitsuba raises RuntimeError for whatever it meets
@@ -94,13 +96,25 @@ def read_environment(place: Path) -> Array:
         raise FileFormatError(place, "a low dynamic range", expected)
     values = np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
     rows, columns = values.shape[:2]
-    if columns != 2 * rows:
+    if columns != 2 * rows or rows < 2:
         raise FileFormatError(place, f"{columns} x {rows} pixels", f"{expected}, twice as wide")
-    if not np.isfinite(values).all() or (values < 0).any() or not values.any():
+    if not np.isfinite(values).all() or (values < 0).any():
         raise FileFormatError(place, "radiance that is no finite, positive number", expected)
-    step = -(-columns // MOST_COLUMNS)
-    values = values[::step, ::step]
-    return np.asarray(values * (MEAN / max(float(values[: len(values) // 2].mean()), 1e-9)))
+    values = _reduced(values, -(-columns // MOST_COLUMNS))
+    mean = float(values[: len(values) // 2].mean())
+    if mean == 0.0:
+        raise FileFormatError(place, "a black upper half", f"{expected}, with the sky above")
+    return np.asarray(values * np.float32(MEAN / mean))
+
+
+def _reduced(values: Array, step: int) -> Array:
+    """Return means of blocks of so many pixels a side: a small sun keeps its light."""
+    for axis in (0, 1):
+        starts = np.arange(0, values.shape[axis], step)
+        counts = np.diff(starts, append=values.shape[axis]).astype(np.float32)
+        sums = np.add.reduceat(values, starts, axis=axis)
+        values = sums / counts.reshape((-1, 1, 1) if axis == 0 else (-1, 1))
+    return values
 
 
 def use_assets(materials: str | None, environment: str | None) -> dict[str, str]:
@@ -111,7 +125,7 @@ def use_assets(materials: str | None, environment: str | None) -> dict[str, str]
     ASSETS.use(materials, environment)
     settings = {}
     if ASSETS.materials is not None:
-        _folder(ASSETS.materials)
+        check_maps(_folder(ASSETS.materials))
         settings["materials"] = digest_of(ASSETS.materials)
     if ASSETS.environment is not None:
         read_environment(ASSETS.environment)

@@ -30,7 +30,7 @@ class Encoding:
     curve: str = "srgb"
     bits: int = 8
     exposure: float = 1.0
-    depth_unit: float = 1e-4
+    depth_unit: float = 1e-4  # as fine as the paper's room allows
 
     def colors(self, room: Room) -> Array:
         """Return the image as fractions of the brightest value. Raises SpecError."""
@@ -56,7 +56,7 @@ class Encoding:
         if steps.max() > 65535:
             farthest = float(np.nanmax(room.depth))
             hint = f"use --depth-unit {1.1 * farthest / 65535:.2g}, or --format exr"
-            expected = f"at most {65535 * self.depth_unit:.5g} scene units in 16 bits"
+            expected = f"at most {65535 * self.depth_unit:.5g} {room.unit}s in 16 bits"
             raise SpecError(f"row {room.index}: depth", f"{farthest:.5g}", expected, hint)
         return np.asarray(steps)
 
@@ -87,13 +87,19 @@ class Encoding:
         about = {
             **self.pictures(),
             "object_id": {"offset": -1, "bits": 8},
+            "length_unit": room.unit,
             "world_from_camera": room.world_from_camera.tolist(),
             "fov_y_degrees": room.fov_y_degrees,
         }
         return json.dumps(about, indent=1) + "\n"
 
 
-PLAIN = Encoding()
+def plain(interior: bool) -> Encoding:
+    """Return what is used where nothing else is told; depths of closed rooms are millimetres.
+
+    That is what readers of depth in metres take steps for, and reaches beyond any such room.
+    """
+    return Encoding(depth_unit=1e-3) if interior else Encoding()
 
 
 def write_png(path: Path, values: Array, bits: int) -> None:

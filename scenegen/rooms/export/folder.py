@@ -15,7 +15,7 @@ from scenegen.common.names import check_choice
 from scenegen.common.records import check
 from scenegen.files.new_file import folder_written_beside
 from scenegen.objects.catalogue import Objects
-from scenegen.rooms.export.encoding import PLAIN, Encoding, write_json
+from scenegen.rooms.export.encoding import Encoding, plain, write_json
 from scenegen.rooms.reader import Room, RoomsFile
 
 FOLDER_FORMATS = ("nerfstudio", "colmap", "bop", "coco", "moge")
@@ -45,8 +45,7 @@ class Source:
     @property
     def unit(self) -> str:
         """The unit of lengths, in words."""
-        interior = self.rooms.spec is not None and self.rooms.spec.interior
-        return "metre" if interior else "scene unit: the edge of the room"
+        return "metre" if self.rooms.spec.interior else "scene unit: the edge of the room"
 
     def views(self) -> Iterator[tuple[int, list[Room]]]:
         """Yield the number of each scene and its rows."""
@@ -65,7 +64,7 @@ def export_folder(
     folder: str | Path,
     rows: Sequence[int] | None = None,
     *,
-    encoding: Encoding = PLAIN,
+    encoding: Encoding | None = None,
     objects: Objects | None = None,
     device: str = "auto",
     overwrite: bool = False,
@@ -75,6 +74,7 @@ def export_folder(
 
     Args:
         form: one of FOLDER_FORMATS.
+        encoding: of pictures; None for `encoding.plain`.
         overwrite: replace an older folder of this function.
 
     Raises:
@@ -91,6 +91,7 @@ def export_folder(
     scenes: dict[int, list[int]] = {}
     for row in chosen:
         scenes.setdefault(int(rooms.read("scene_index", row)), []).append(row)
+    encoding = encoding or plain(rooms.spec.interior)
     source = Source(rooms, scenes, encoding, objects, device, progress)
     with folder_written_beside(folder, _older_names(Path(folder)), overwrite) as made:
         conventions = _writer(form)(source, made)

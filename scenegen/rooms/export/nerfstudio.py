@@ -77,5 +77,5 @@ def _write_scene(views: Sequence[Room], folder: Path, encoding: Encoding) -> Non
         transform_points(Z_UP, np.concatenate(points)),
         transform_vectors(Z_UP, np.concatenate(normals)),
         np.concatenate(colors),
-        ["surfels of all views: world frame, z up, scene units"],
+        [f"surfels of all views: world frame, z up, {views[0].unit}s"],
     )

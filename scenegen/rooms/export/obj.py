@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.description.scenes import SceneSpec
-from scenegen.objects.catalogue import built_in_shape
 from scenegen.objects.scene_mesh import scene_parts
 from scenegen.objects.solids import UnitShape
 
@@ -21,11 +20,12 @@ def write_obj(
     scene: SceneSpec,
     path: str | Path,
     materials: str,
-    shape_of: Callable[[str], UnitShape] = built_in_shape,
+    shape_of: Callable[[str], UnitShape],
 ) -> None:
     """Write room and objects as triangles in the world frame; `materials` names their library."""
+    unit = "scene unit" if scene.interior is None else "metre"
     lines = [
-        f"# scene {scene.index}: world frame, y up, scene units",
+        f"# scene {scene.index}: world frame, y up, {unit}s",
         f"mtllib {one_word(materials)}",
     ]
     vertices = normals = 0  # before this part; OBJ counts from 1

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from scenegen.camera import transform_vectors
 from scenegen.files.new_file import written_beside
-from scenegen.objects.catalogue import Objects, built_in_shape
-from scenegen.rooms.export.encoding import PLAIN, Encoding, write_png
+from scenegen.objects.catalogue import Objects, built_in_shape, interior_shape
+from scenegen.rooms.export.encoding import Encoding, plain, write_png
 from scenegen.rooms.export.obj import one_word, write_mtl, write_obj
 from scenegen.rooms.reader import Room
 
@@ -37,7 +37,7 @@ def export_room(
     form: str,
     overwrite: bool = False,
     objects: Objects | None = None,
-    encoding: Encoding = PLAIN,
+    encoding: Encoding | None = None,
 ) -> None:
     """Write one room to its `export_paths`.
 
@@ -46,7 +46,10 @@ def export_room(
     Raises SpecError where a value does not fit into an encoding of fixed range, before a file is
     written, and OSError as `new_file.written_beside`.
     """
-    shape_of = objects.shape if objects else built_in_shape
+    interior = room.scene.interior is not None
+    built_in = interior_shape if interior else built_in_shape
+    shape_of = objects.shape if objects else built_in
+    encoding = encoding or plain(interior)
     if form == "png":
         writers = _png_writers(room, encoding)
     elif form == "ply":
@@ -81,7 +84,8 @@ def write_exr(room: Room, path: str | Path) -> None:
     header = {
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
-        "comments": "Z planar depth in scene units; N in the camera frame (x right, y up, -z view)",
+        "comments": f"Z planar depth in {room.unit}s; N in the camera frame (x right, y up, -z"
+        " view)",
     }
     OpenEXR.File(header, channels).write(str(path))
 
@@ -90,7 +94,7 @@ def write_surfels_ply(room: Room, path: str | Path, colors: Array) -> None:
     """Write the surfels in the world frame: position, normal, colour (H, W, 3) uint8, object id."""
     hit = room.object_id >= 0
     comments = [
-        f"surfels of room {room.index}: world frame, y up, scene units",
+        f"surfels of room {room.index}: world frame, y up, {room.unit}s",
         "object_id: 0 the room, k the k-th object; pixels without a hit are left out",
     ]
     normals = transform_vectors(room.world_from_camera, room.normal[hit])

@@ -106,6 +106,13 @@ def test_images_are_srgb_bytes_and_cameras_are_told_only_on_request(run, truths,
             assert ("intrinsics" in found.notes) == told
 
 
+def test_a_model_sees_developed_pictures_as_they_are(run, interior_path, tmp_path):
+    keep = f"    np.save({str(tmp_path / 'seen.npy')!r}, image)\n    return"
+    run(INFER.replace("    return", keep), data=interior_path)
+    with RoomsFile(interior_path) as rooms:
+        np.testing.assert_array_equal(np.load(tmp_path / "seen.npy"), rooms[0].image)
+
+
 def returning(**keys):
     values = ", ".join(f"{name!r}: {value}" for name, value in keys.items())
     return f"""

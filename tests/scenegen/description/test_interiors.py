@@ -37,7 +37,8 @@ def test_settings_of_closed_rooms_are_refused_elsewhere(settings):
 
 @pytest.mark.parametrize(
     "settings",
-    [{"objects": (500, 500)}, {"objects": (12, 100)}, {"hours": (20, 25)}, {"shading": "paper"},
+    [{"objects": (500, 500)}, {"objects": (0, 3)},
+     {"objects": (12, 100)}, {"hours": (20, 25)}, {"shading": "paper"},
      {"source": "shapes", "shapes": ("box",)}, {"shapes": ("unicorn",)}],
 )  # fmt: skip
 def test_what_closed_rooms_cannot_have_is_refused(settings):
@@ -50,6 +51,14 @@ def test_a_request_without_interiors_has_the_json_that_it_had():
         assert "interior" not in preset_spec(name).to_json()
     spec = preset_spec("interiors", hours=(8, 9))
     assert DatasetSpec.from_json(spec.to_json()) == spec
+
+
+def test_pictures_of_8_bits_are_srgb_and_others_are_radiance():
+    (developed,) = (c for c in columns(preset_spec("interiors")) if c.name == "image")
+    spec = preset_spec("interiors", image_dtype="float16")
+    (linear,) = (c for c in columns(spec) if c.name == "image")
+    assert developed.unit.startswith(developed.more["encoding"])
+    assert linear.unit.startswith(linear.more["encoding"])
 
 
 def test_units_are_metres():

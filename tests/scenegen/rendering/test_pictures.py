@@ -76,9 +76,25 @@ def test_surroundings_are_equirectangular_and_of_high_range(tmp_path):
     Image.fromarray(np.full((8, 16, 3), 200, np.uint8)).save(flat)
     broken = tmp_path / "broken.exr"
     broken.write_bytes(good.read_bytes()[:60])
-    for path in (square, black, flat, broken):
+    tiny = write_environment(tmp_path / "tiny.exr", np.ones((1, 2, 3)))
+    below = np.ones((8, 16, 3))
+    below[:4] = 0.0
+    dark = write_environment(tmp_path / "below.exr", below)
+    for path in (square, black, flat, broken, tiny, dark, tmp_path / "none.exr", tmp_path):
         with pytest.raises(FileFormatError):
             read_environment(path)
+
+
+def test_large_surroundings_keep_the_light_of_a_small_sun(tmp_path, monkeypatch):
+    from scenegen.rendering.pictures import assets
+
+    monkeypatch.setattr(assets, "MOST_COLUMNS", 8)
+    sky = np.ones((9, 18, 3))
+    sky[1, 4] = 90.0
+    made = assets.read_environment(write_environment(tmp_path / "sky.exr", sky))
+    assert made.shape == (3, 6, 3)
+    np.testing.assert_allclose(made[0, 1] / made[0, 0], (8 + 90) / 9, rtol=1e-5)
+    assert made[:1].mean() == pytest.approx(assets.MEAN, rel=1e-5)
 
 
 def test_what_a_file_names_must_be_told():

@@ -17,6 +17,8 @@ from scenegen.description.specs import LATER, DatasetSpec
 from scenegen.files.content import datasets
 from scenegen.layout import FIELDS
 from scenegen.rendering.backend import VERSION_ATTRIBUTES, versions
+from scenegen.rooms.preview import srgb_bytes
+from scenegen.rooms.reader import RoomsFile, radiance_of
 
 # The layout as promised, written out: name, row, type, unit. K = 3 objects, L = 3 lights here.
 LAYOUT = [
@@ -198,3 +200,12 @@ def test_unknown_fields_are_named(rooms_path):
             RoomsDataset(rooms_path, fields=fields)
         assert caught.value.found == repr(fields[-1])
         assert "image, depth" in caught.value.expected
+
+
+def test_radiance_of_developed_pictures_is_what_they_show(interior_path, rooms_path):
+    for path in (interior_path, rooms_path):
+        with RoomsFile(path) as rooms:
+            np.testing.assert_array_equal(radiance_of(rooms, 0), rooms[0].radiance)
+    with RoomsFile(interior_path) as rooms:
+        shown = srgb_bytes(radiance_of(rooms, 0))
+        np.testing.assert_array_equal(shown, rooms[0].image)

@@ -112,7 +112,7 @@ def test_a_scene_is_the_same_alone_and_among_others():
 
 
 def test_rooms_that_cannot_hold_their_objects_are_refused(monkeypatch):
-    monkeypatch.setattr("scenegen.sampling.proposals.MAX_ATTEMPTS", 2)
+    monkeypatch.setattr("scenegen.sampling.scenes.MAX_FURNISHED", 2)
     spec = preset_spec("interiors", shapes=("bed",), objects=(30, 30))
     with pytest.raises(PlacementError):
         ProposalQueue(spec, range(1), objects_of(spec)).take(1, 1)

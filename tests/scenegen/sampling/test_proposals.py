@@ -58,7 +58,7 @@ def test_no_item_is_taken_at_or_after_the_end():
 
 
 def test_an_impossible_item_is_named_and_the_first_one(monkeypatch):
-    monkeypatch.setattr(proposals, "MAX_ATTEMPTS", 60)
+    monkeypatch.setattr("scenegen.sampling.scenes.MAX_ATTEMPTS", 60)
     spec = DatasetSpec(objects=(40, 40))
     queue = ProposalQueue(spec, range(3000), objects_of(spec))
     with pytest.raises(PlacementError) as refused:

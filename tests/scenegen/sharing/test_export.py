@@ -7,6 +7,7 @@ import tarfile
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
@@ -76,6 +77,19 @@ def test_pictures_are_srgb_and_decode_to_the_stored_radiance(form, holey_set, lo
             codes = np.asarray(VALUES[form](row, "image")).astype(float)
             check_srgb(codes, room.radiance)
             assert np.abs(codes - room.image).max() > 40, "a curve that does nothing"
+
+
+@pytest.mark.parametrize("encoding", ["srgb", "linear"])
+def test_developed_pictures_are_encoded_once(interior_path, tmp_path, encoding):
+    export_rows(interior_path, "webdataset", tmp_path / "out", encoding=encoding)
+    about = json.loads((tmp_path / "out" / ABOUT).read_text())["columns"]["image"]
+    assert about["encoding"] == encoding
+    with tarfile.open(tmp_path / "out" / "x-00000-of-00001.tar") as archive:
+        (name,) = (name for name in archive.getnames() if ".image." in name)
+        codes = np.asarray(Image.open(archive.extractfile(name))).astype(float)
+    with open_rooms(interior_path) as rooms:
+        expected = rooms[0].image if encoding == "srgb" else 255 * rooms[0].radiance
+    np.testing.assert_allclose(codes, expected, rtol=0, atol=0.501 if encoding == "linear" else 0)
 
 
 def test_floating_point_images_stay_radiance(float_path, tmp_path):

@@ -3,6 +3,8 @@
 import hashlib
 import json
 from contextlib import ExitStack
+from dataclasses import replace
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -12,12 +14,13 @@ from markdown_it import MarkdownIt
 
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.description.presets import preset_spec
 from scenegen.files.content import row_digest
 from scenegen.sharing.card import NAMES
 from scenegen.sharing.export import write_export
 from scenegen.sharing.index import index_columns
 from scenegen.sharing.publication import Publication
-from scenegen.sharing.rooms import ROOMS, make_rooms_card
+from scenegen.sharing.rooms import ROOMS, default_license, make_rooms_card
 from tests.support.loaders import faultless_croissant, validate
 
 TOLD = Publication("Two rooms", ("A. Person", "B. Person"), "2026-01-31", "CC-BY-4.0")
@@ -36,6 +39,25 @@ def made(holey_set, float_path, tmp_path_factory):
     folder = tmp_path_factory.mktemp("card") / "card"
     make_card([holey_set, float_path], folder)
     return folder
+
+
+def test_a_card_of_interiors_says_what_is_true_of_them(interior_path, rooms_path, tmp_path):
+    make_card([interior_path], tmp_path / "card")
+    page = (tmp_path / "card" / "README.md").read_text()
+    wrong = ("scene units", "corner", "no gamma", "two walls")
+    assert not [words for words in wrong if words in page]
+    assert "| `depth` | (y, x) | float32 | metre |" in page
+    faultless_croissant(tmp_path / "card" / "croissant.json")
+    with pytest.raises(SpecError):
+        make_card([interior_path, rooms_path], tmp_path / "both")
+
+
+def test_no_licence_is_guessed_of_what_others_made():
+    spec = preset_spec("interiors")
+    assert default_license([SimpleNamespace(spec=spec)])
+    for name in ("materials", "environment"):
+        with pytest.raises(SpecError):
+            default_license([SimpleNamespace(spec=replace(spec, **{name: "0" * 16}))])
 
 
 @pytest.fixture(scope="module")

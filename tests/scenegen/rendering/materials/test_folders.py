@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.rendering.materials.folders import from_folder, read_maps
+from scenegen.rendering.materials.folders import check_maps, from_folder, read_maps
 from scenegen.rendering.materials.kinds import material
 from scenegen.rendering.materials.material import SLOPE_STEPS
 from scenegen.rendering.materials.palettes import palette
@@ -149,6 +149,17 @@ def test_bad_folders_are_refused(tmp_path, make, error, word):
     assert str(tmp_path) in caught.value.where
     assert word in caught.value.found
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("ending", ["png", "jpg"])
+def test_maps_that_are_cut_short_are_refused_before_they_are_used(tmp_path, ending):
+    noise = np.random.default_rng(0).integers(0, 256, (64, 64, 3), np.uint8)
+    save(tmp_path / f"Wood01_1K_Color.{ending}", noise)
+    check_maps(from_folder(tmp_path))
+    whole = (tmp_path / f"Wood01_1K_Color.{ending}").read_bytes()
+    (tmp_path / f"Wood01_1K_Color.{ending}").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(FileFormatError):
+        check_maps(from_folder(tmp_path))
 
 
 def test_a_folder_that_is_not_there_is_refused(tmp_path):

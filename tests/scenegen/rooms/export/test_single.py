@@ -14,7 +14,7 @@ from scenegen.camera import pixel_directions, transform_vectors
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import SHAPE_NAMES
 from scenegen.objects.scene_mesh import scene_parts
-from scenegen.rooms.export.encoding import PLAIN, Encoding
+from scenegen.rooms.export.encoding import Encoding
 from scenegen.rooms.export.single import PICTURES, export_paths, export_room
 
 
@@ -43,7 +43,7 @@ def holey(float_path):
     )
 
 
-def export(room, folder, form, overwrite=False, encoding=PLAIN):
+def export(room, folder, form, overwrite=False, encoding=None):
     """Write a room as row 7 of "a.h5"; return the files written."""
     paths = export_paths(7, folder, "a", form)
     export_room(room, paths, form, overwrite, encoding=encoding)
