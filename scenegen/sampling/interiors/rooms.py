@@ -7,6 +7,7 @@ from scenegen.sampling.interiors.draws import Draws
 
 STEP = 2.0**-8  # metres, of which all lengths of a room are multiples
 CORNER = 0.4  # least distance of an opening from a corner
+FULL = 36  # objects, with fewer of which a room is smaller
 KINDS = ("living", "dining", "bedroom", "study")
 
 
@@ -30,9 +31,11 @@ def stepped(length: float) -> float:
     return round(length / STEP) * STEP
 
 
-def draw_room(draws: Draws, hours: tuple[float, float]) -> Room:
-    """Draw a room of 3 to 6 m by 3 to 5 m by 2.4 to 3 m."""
-    size = tuple(stepped(draws.span(*span)) for span in ((3.0, 6.0), (2.4, 3.0), (3.0, 5.0)))
+def draw_room(draws: Draws, hours: tuple[float, float], objects: int) -> Room:
+    """Draw a room of 3 to 6 m by 3 to 5 m by 2.4 to 3 m; with few objects it is small."""
+    share = min(objects / FULL, 1.0)
+    spans = (3.0, 3.0 + 3.0 * share), (2.4, 3.0), (3.0, 3.0 + 2.0 * share)
+    size = tuple(stepped(draws.span(*span)) for span in spans)
     kind = draws.pick(KINDS, (4, 3, 2.5, 2))
     walls = draws.shuffled(WALLS)
     openings = [_door(draws, walls[0], wall_length(size, walls[0]))]  # type: ignore[arg-type]

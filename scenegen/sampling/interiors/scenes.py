@@ -31,8 +31,8 @@ _Drawn = tuple[Room, list[Placed], list[tuple[float, float, float]], tuple[float
 def item_room(spec: DatasetSpec, index: int) -> tuple[Room, int, float]:
     """Return the room of an item, its number of objects, and its field of view in degrees."""
     draws = Draws(spec.seed, index, Purpose.ROOM)
-    room = draw_room(draws, spec.hours)
     count = draws.count(*spec.objects)
+    room = draw_room(draws, spec.hours, count)
     return room, count, spec.fov_degrees + spec.fov_spread_degrees * draws.unit()
 
 
