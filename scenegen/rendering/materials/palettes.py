@@ -41,7 +41,7 @@ _SCHEMES = (
     ("e9ece6 b5c2ae", "8fa087 dfe0d6 5b6b57 c4b79c", "d0b35f 44604f b87a5a e8e3d5"),
     ("f3f1ee e2d4d0", "c4a29e e7dfda 8d6f72 b7b2ad", "b56b75 6b7f86 d9b99b 4c4346"),
     ("e6e7ea aab4c4", "5b6f8f d6dae2 303c54 9aa6b8", "e0a84a b7473a 7f95b5 e9e4d8"),
-    ("f4efe3 e6d3a7", "d6b25f efe6d2 7c6a4a a4a08f", "3f6a73 c7743c 8a9a6a 2f3b45"),
+    ("f4efe3 e6d3a7", "c9b27e efe6d2 7c6a4a a4a08f", "3f6a73 c7743c 8a9a6a 2f3b45"),
     ("dfdcd6 8f9a99", "4d5a5b c9c5bc 8a8378 a7663f", "c58a4a 2f4548 d6cfbf 6f8683"),
     ("f0eeea 39505a", "36505c d8d2c6 a4743f 8c979a", "c9963f d4cdbd 7a3f34 52707a"),
     ("efeae6 c9b7c4", "8c7590 ddd3da 5a4a60 b7a9a0", "c79a5a 6a7a5f a8506a e6ddd2"),

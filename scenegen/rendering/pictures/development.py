@@ -21,11 +21,11 @@ BALANCE = 0.8  # how far white balance goes towards grey light
 BRIGHT = 99.5  # percentile of the radiance, WHITER times which becomes white
 WHITER = 1.15
 LEAST_WHITE = 2.5
-HIGHLIGHTS, SHADOWS = 0.45, 0.15  # shares that are taken off above and below KEY
+HIGHLIGHTS, SHADOWS = 0.4, 0.05  # shares that are taken off above and below KEY
 SMOOTH = 10  # windows of the guided filter along a picture's shorter side
 EDGE = 1.0  # variance of log2 luminance in such a window that is kept as an edge
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-CONTRAST = 0.5  # share of a smooth step in the tone curve
+CONTRAST = 0.7  # share of a smooth step in the tone curve
 
 
 def develop(radiance: Array, albedo: Array, inside: Array, dtype: str, noise: Array | None) -> Any:

@@ -56,6 +56,7 @@ ON_TOP: dict[str, dict[str, float]] = {
 SEATS = ("chair", "sofa", "armchair", "bed", "stool")
 INSIDE = ("shelf",)  # families on all of whose surfaces things stand; others have a top
 HIGHEST = 1.5  # metres of a top on which small things stand
+TELEVISION = 0.4  # metres, less than half the width of a television
 MOST_LAMPS = 2  # on tables and the like; more of them burn a picture
 MOST_ON_FLOOR = 5  # small things on the floor
 UPRIGHT_FRONT = ("books", "screen", "cushion", "lamp")  # look to the front
@@ -187,16 +188,19 @@ class Arranger:
         return 0
 
     def curtains(self) -> None:
-        """Hang a pair of curtains at some windows."""
-        for hole in self.room.openings:
-            if hole.kind != "window" or not self.draws.chance(0.6):
-                continue
-            piece = self.piece("curtain", 1)
-            if piece is None:
-                return
-            top = min(hole.top + 0.16, self.space.size[1] - 0.05)
-            if top - piece.height < 0.01:
-                continue
+        """Hang pairs of curtains that reach to the floor at the windows of some rooms."""
+        windows = [hole for hole in self.room.openings if hole.kind == "window"]
+        if not self.draws.chance(0.6):
+            return
+        low, high = max(hole.top for hole in windows) + 0.06, self.space.size[1] - 0.04
+        for _ in range(TRIES):
+            piece, above = self.member("curtain"), self.draws.span(0.015, 0.08)
+            if piece is not None and low < piece.height + above < high:
+                break
+        else:
+            return
+        top = piece.height + above
+        for hole in windows:
             length, pair = wall_length(self.space.size, hole.wall), []
             for side in (-1, 1):
                 edge = hole.left if side < 0 else hole.right
@@ -379,8 +383,8 @@ class Arranger:
 
     def screen_on(self, number: int) -> int:
         """Put a screen on furniture, looking to its front."""
-        screen, place = self.piece("screen", 1), self.space.placed[number - 1]
-        if screen is None or place.piece.height > 1.1:
+        screen, place = self.member("screen"), self.space.placed[number - 1]
+        if screen is None or place.piece.height > 1.1 or not _suits(screen, place.piece):
             return 0
         at = place.box.point(self.draws.span(-0.15, 0.15), -0.3 * place.box.half[1])
         return self.on_surface(screen, number, at, place.box.turns)
@@ -463,9 +467,10 @@ class Arranger:
         if family == "lamp" and lamps >= MOST_LAMPS:
             return 0
         piece = self.piece(family)
-        if piece is None or self._many(family, parent):
+        below = self.space.placed[parent - 1]
+        if piece is None or self._many(family, parent) or not _suits(piece, below.piece):
             return 0
-        place = self.space.placed[parent - 1].box
+        place = below.box
         x0, x1, z0, z1 = sides
         for _ in range(4):
             turns = place.turns + stepped_turn(
@@ -488,13 +493,13 @@ class Arranger:
 
     def _many(self, family: str, parent: int) -> bool:
         """Return whether an object carries enough of a family."""
-        most = {"screen": 1, "lamp": 1, "bag": 1, "cap": 1, "box": 3, "cushion": 4, "vase": 3,
-                "basket": 2, "books": 12}  # fmt: skip
+        most = {"screen": 1, "lamp": 1, "bag": 1, "cap": 1, "box": 3, "cushion": 4, "vase": 2,
+                "basket": 2, "books": 12, "plate": 6}  # fmt: skip
         same = sum(
             thing.stands_on == parent and thing.piece.family == family
             for thing in self.space.placed
         )
-        return same >= most.get(family, 6)
+        return same >= most.get(family, 4)
 
     def _on_sill(self, family: str, sides: Sequence[float]) -> int:
         left, right, height, wall = sides
@@ -508,6 +513,11 @@ class Arranger:
         box = box_at(piece, x, z, height + 0.015625 + ON, turns)
         # It may reach into the window's opening, which is as deep as the wall.
         return self.space.put(piece, box, 0) if self.space.free(box) else 0
+
+
+def _suits(piece: Piece, below: Piece) -> bool:
+    """Return whether a screen is a monitor on a desk, or a television elsewhere."""
+    return piece.family != "screen" or (piece.half[0] < TELEVISION) == (below.family == "desk")
 
 
 def _beside(box: Box, other: Box) -> bool:
@@ -583,8 +593,8 @@ def _living(arranger: Arranger) -> None:
             arranger.beside(sofa, draws.pick(("floor_lamp", "tall_plant", "nightstand")), side)
     opposite = [w for w in WALLS if math.isclose(abs(TURNS[w] - box.turns), 0.5)]
     cabinet = arranger.against_wall("cabinet", opposite, middle=True)
-    if cabinet and draws.chance(0.7):
-        arranger.screen_on(cabinet)
+    if cabinet and draws.chance(0.8):
+        any(arranger.screen_on(cabinet) for _ in range(4))
     if draws.chance(0.4):
         arranger.in_corner("armchair")
     if draws.chance(0.4):
@@ -628,5 +638,5 @@ def _desk(arranger: Arranger) -> None:
     desk = arranger.against_wall("desk", front=0.9)
     if desk:
         arranger.seat_at(desk)
-        if arranger.draws.chance(0.75):
-            arranger.screen_on(desk)
+        if arranger.draws.chance(0.8):
+            any(arranger.screen_on(desk) for _ in range(4))

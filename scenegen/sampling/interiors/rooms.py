@@ -7,6 +7,8 @@ from scenegen.sampling.interiors.draws import Draws
 
 STEP = 2.0**-8  # metres, of which all lengths of a room are multiples
 CORNER = 0.4  # least distance of an opening from a corner
+FULL = 36  # objects, with fewer of which a room is smaller
+CROWDED = 30, 80  # objects, from which on a room must be larger, and must be as large as can be
 KINDS = ("living", "dining", "bedroom", "study")
 
 
@@ -30,9 +32,12 @@ def stepped(length: float) -> float:
     return round(length / STEP) * STEP
 
 
-def draw_room(draws: Draws, hours: tuple[float, float]) -> Room:
-    """Draw a room of 3 to 6 m by 3 to 5 m by 2.4 to 3 m."""
-    size = tuple(stepped(draws.span(*span)) for span in ((3.0, 6.0), (2.4, 3.0), (3.0, 5.0)))
+def draw_room(draws: Draws, hours: tuple[float, float], objects: int) -> Room:
+    """Draw a room of 3 to 6 m by 3 to 5 m by 2.4 to 3 m, that is neither empty nor crowded."""
+    least = min(max((objects - CROWDED[0]) / (CROWDED[1] - CROWDED[0]), 0.0), 1.0)
+    most = min(objects / FULL, 1.0)
+    spans = (3 + 3 * least, 3 + 3 * most), (2.4, 3.0), (3 + 2 * least, 3 + 2 * most)
+    size = tuple(stepped(draws.span(*span)) for span in spans)
     kind = draws.pick(KINDS, (4, 3, 2.5, 2))
     walls = draws.shuffled(WALLS)
     openings = [_door(draws, walls[0], wall_length(size, walls[0]))]  # type: ignore[arg-type]

@@ -27,7 +27,6 @@ from scenegen.sampling.interiors.spaces import Placed, Space, turn
 from scenegen.sampling.interiors.viewpoints import draw_cameras
 
 Array = NDArray[Any]
-FITS = 15, 2.2  # objects that a room holds, and more for each square metre
 STREET = 32  # rooms beside each other that are furnished from the same stock
 STOCK = 10  # models of each family in it: models take longer to make than rooms to furnish
 _Drawn = tuple[Room, list[Placed], list[tuple[float, float, float]], tuple[float, float, float]]
@@ -36,10 +35,8 @@ _Drawn = tuple[Room, list[Placed], list[tuple[float, float, float]], tuple[float
 def item_room(spec: DatasetSpec, index: int) -> tuple[Room, int, float]:
     """Return the room of an item, its number of objects, and its field of view in degrees."""
     draws = Draws(spec.seed, index, Purpose.ROOM)
-    room = draw_room(draws, spec.hours)
-    least, most = spec.objects
-    fits = int(FITS[0] + FITS[1] * room.size[0] * room.size[2])
-    count = draws.count(least, max(least, min(most, fits)))
+    count = draws.count(*spec.objects)
+    room = draw_room(draws, spec.hours, count)
     return room, count, spec.fov_degrees + spec.fov_spread_degrees * draws.unit()
 
 

@@ -22,7 +22,7 @@ NEAREST = 0.7  # metres to what the camera may look at anywhere in the picture
 SHARE_NEAR = 0.12  # of the picture that may be nearer than NEAR
 NEAR = 1.1
 COLUMNS, ROWS = 11, 9  # of the rays that look for what stands in the way
-FURNISHED = 0.5  # of these rays, more of which need not meet objects
+FURNISHED = 0.6  # of these rays, more of which need not meet objects
 LARGEST = 0.3  # of these rays, which one object may take
 SEVERAL = 10  # objects that count as much as all objects of the room
 LEAST_SHOWN = 1e-3
@@ -103,7 +103,7 @@ def _shown(
     several = np.count_nonzero(rays) / SEVERAL
     too_large = max(float(rays.max(initial=0.0)) - LARGEST, 0.0)
     before = _before(place, target, boxes, fov_y) / max(len(boxes), 1)
-    return max(several + before + 2 * min(1 - empty, FURNISHED) - 3 * too_large, LEAST_SHOWN)
+    return max(several + before + 3 * min(1 - empty, FURNISHED) - 3 * too_large, LEAST_SHOWN)
 
 
 def _before(place: Place, target: Place, boxes: Array, fov_y: float) -> int:
