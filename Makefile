@@ -110,6 +110,7 @@ bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.rendering.shapes
 	$(BIN)/python -m benchmarks.rendering.questions
 	$(BIN)/python -m benchmarks.rendering.stream
+	$(BIN)/python -m benchmarks.rendering.interiors_speed
 	$(BIN)/python -m benchmarks.scoring.nearest
 	$(BIN)/python -m benchmarks.surfels
 	$(BIN)/python -m benchmarks.scoring.score_rows

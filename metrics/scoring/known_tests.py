@@ -87,7 +87,7 @@ _DIGESTS = {
         "1382577a054c986325744e6dc76009e5a68743c9279e064b66b2bc85a32f7101",
     ),
     "interiors-512-1": (
-        "00d9d398ca0a5d0879b5f25a2ce3e1b6510bf4351bb34273062f021456fe884e",
+        "d300e59b2b2d7a63401307ad123598e61d3852950a1c3fe9ef7713e1dd7c0676",
         "",
     ),
     "rotation-1/matched": (

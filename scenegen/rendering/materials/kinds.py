@@ -325,8 +325,10 @@ def _glow(rng: Generator, palette: Palette) -> Material:
 
 
 def _rug(rng: Generator, palette: Palette) -> Material:
-    colors = (*palette.fabrics[1:], *palette.accents)
-    return pictures.rug(rng, palette.fabrics[0], colors, patterns.pile(_seed(rng)))
+    ground, colors = palette.fabrics[0], (*palette.fabrics[1:], *palette.accents)
+    mixed = (0.75 * np.array(colors) + 0.25 * np.array(ground)).tolist()  # no rug is garish
+    colors = tuple((r, g, b) for r, g, b in mixed)
+    return pictures.rug(rng, ground, colors, patterns.pile(_seed(rng)))
 
 
 def _pages(rng: Generator, palette: Palette) -> Material:

@@ -24,6 +24,7 @@ NEAR = 1.1
 COLUMNS, ROWS = 11, 9  # of the rays that look for what stands in the way
 FURNISHED = 0.6  # of these rays, more of which need not meet objects
 LARGEST = 0.3  # of these rays, which one object may take
+TALL, NEAR_TALL = 0.8, 1.7  # metres: what is higher and nearer hides the room, as backs of chairs
 SEVERAL = 10  # objects that count as much as all objects of the room
 LEAST_SHOWN = 1e-3
 BEYOND = 1e3  # metres
@@ -102,8 +103,11 @@ def _shown(
     rays, empty = first[:-1], float(first[-1])
     several = np.count_nonzero(rays) / SEVERAL
     too_large = max(float(rays.max(initial=0.0)) - LARGEST, 0.0)
+    tall = hit[:, :-1][:, boxes[:, 5] > TALL].min(axis=1, initial=np.inf)
+    hidden = float((tall < NEAR_TALL).mean())
     before = _before(place, target, boxes, fov_y) / max(len(boxes), 1)
-    return max(several + before + 3 * min(1 - empty, FURNISHED) - 3 * too_large, LEAST_SHOWN)
+    shown = several + before + 3 * min(1 - empty, FURNISHED) - 3 * (too_large + hidden)
+    return max(shown, LEAST_SHOWN)
 
 
 def _before(place: Place, target: Place, boxes: Array, fov_y: float) -> int:
