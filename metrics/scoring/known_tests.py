@@ -87,7 +87,7 @@ _DIGESTS = {
         "1382577a054c986325744e6dc76009e5a68743c9279e064b66b2bc85a32f7101",
     ),
     "interiors-512-1": (
-        "d300e59b2b2d7a63401307ad123598e61d3852950a1c3fe9ef7713e1dd7c0676",
+        "1faa5b6fe7dc1ac382718288dc67b3b2ee788a278b718d3030be4ba38b383e22",
         "",
     ),
     "rotation-1/matched": (
