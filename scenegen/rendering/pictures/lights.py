@@ -144,7 +144,8 @@ def outside_radiance(lights: Lights, d: Any) -> Any:
         x = dr.select(x < 0, x + lights.columns, x)
         x = dr.select(x >= lights.columns, x - lights.columns, x)
         y = dr.clip(y0 + j, 0, lights.rows - 1)
-        total += w * dr.gather(mi.Color3f, lights.map, mi.UInt32(y * lights.columns + x))
+        at = mi.UInt32(dr.minimum(y * lights.columns + x, lights.rows * lights.columns - 1))
+        total += w * dr.gather(mi.Color3f, lights.map, at)
     return total
 
 

@@ -103,7 +103,8 @@ def meet(surfaces: Surfaces, o: Any, d: Any, active: Any) -> tuple[Any, Hit]:
     valid = active & found.is_valid()
     face = gather_row(surfaces.faces, dr.select(valid, found.prim_index, 0), FACE)
     corner, a, b = (mi.Vector3f(*face[i : i + 3]) for i in (0, 3, 6))
-    u, v = found.prim_uv.x, found.prim_uv.y
+    # Where a ray meets nothing, these may be anything, and would lead to places beyond all tables.
+    u, v = (dr.select(valid, x, 0) for x in (found.prim_uv.x, found.prim_uv.y))
     flat = unit(dr.cross(a, b))
     front = dr.dot(flat, d) < 0
     normal, along_a, along_b = (mi.Vector3f(*face[i : i + 3]) for i in (9, 12, 15))

@@ -12,7 +12,7 @@ from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import launch_fields
 
 SIZE = (4.0, 2.5, 3.0)
-SPEC = preset_spec("interiors", height=48, width=64, objects=(0, 3), min_visible_pixels=0)
+SPEC = preset_spec("interiors", height=48, width=64, objects=(1, 3), min_visible_pixels=0)
 NAMES = ("depth", "normal", "object_id")
 
 
