@@ -304,12 +304,15 @@ def _worst(
     normal = None if predicted.normal is None else truth.normal
     instead = replace(predicted, geometry=perfect, normal=normal)
     best = score_prediction(instead, truth, reference, other_relief)
+    farthest = float(truth.depth[truth.mask].max(initial=0.0))
     scores = {
-        name: value if np.isnan(value) else metric(name).worst
+        name: value if np.isnan(value) else metric(name).worst(farthest)
         for name, value in best.scores.items()
     }
     objects = {
-        name: np.full(column.shape, metric(name).worst) if name in OBJECT_SCORES else column
+        name: np.full(column.shape, metric(name).worst(farthest))
+        if name in OBJECT_SCORES
+        else column
         for name, column in best.objects.items()
     }
     return ImageScores(scores, objects)

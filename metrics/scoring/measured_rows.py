@@ -93,7 +93,8 @@ def scores_of_view(
         if protocol is DECLARED:
             scores |= _further(predicted, normal, truth, pair, dense)
         if broken:
-            scores = {name: metric(name).worst for name in scores}
+            farthest = float(true.max(initial=0.0))
+            scores = {name: metric(name).worst(farthest) for name in scores}
         alignment = protocol.alignment or scored_alignment(predicted.kind, predicted.alignment)
         scores |= _guesses(replace(protocol, alignment=alignment), mask, true)
         found |= {(protocol.name, name): value for name, value in scores.items()}

@@ -172,21 +172,26 @@ class Metric:
         """The direction that is better, in words."""
         return "higher is better" if self.higher_is_better else "lower is better"
 
-    @property
-    def worst(self) -> float:
-        """The value of an image in which a prediction is not finite, if these are penalised.
+    def worst(self, farthest: float = 0.0) -> float:
+        """Return the value of an image in which a prediction is not finite, if that is penalised.
 
         Of errors without a limit it is one that no surface in the room gets from another.
+
+        Args:
+            farthest: true depth of the image, scene units.
         """
         if self.higher_is_better:
             return self.smallest
-        return self.largest if math.isfinite(self.largest) else _WORST[self.unit]
+        if math.isfinite(self.largest):
+            return self.largest
+        length = max(_LENGTH, farthest)
+        lengths = {"scene unit": length, "scene unit squared": length**2}
+        return lengths[self.unit] if self.unit in lengths else _WORST[self.unit]
 
 
-# 4 scene units, and depth at the camera, of errors without a limit.
+# Of errors without a limit: 4 scene units, or the farthest depth, and depth at the camera.
+_LENGTH = 4.0
 _WORST = {
-    "scene unit": 4.0,
-    "scene unit squared": 16.0,
     "ratio": 4.0,
     "100 ln": 1000.0,
     "ln": 10.0,
@@ -550,4 +555,4 @@ def markdown_table() -> str:
 
 def _cells(m: Metric) -> tuple[str, str, str, str, str, str]:
     better = "higher" if m.higher_is_better else "lower"
-    return m.name, m.of, m.unit, better, f"{m.worst:g}", m.definition
+    return m.name, m.of, m.unit, better, f"{m.worst():g}", m.definition

@@ -204,7 +204,7 @@ def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_pa
     found = score([path], truth, Settings(non_finite="penalise"))
     assert not found.comparable
     assert found.meta.counts["rows_penalised"] == 1
-    assert found.items["mse_depth"][row] == metric("mse_depth").worst
+    assert found.items["mse_depth"][row] == metric("mse_depth").worst()
     assert np.count_nonzero(found.items["mse_depth"]) == 1
 
 

@@ -159,7 +159,7 @@ def test_an_image_with_a_value_that_is_not_finite_has_the_worst_scores(folder, t
     assert holes.any()
     for name in found.metrics:
         values = found.items[name][holes]
-        assert (values[np.isfinite(values)] == metric(name).worst).all(), name
+        assert (values[np.isfinite(values)] == metric(name).worst()).all(), name
     assert set(
         found.objects["object_depth_error"][np.isin(found.objects["row"], np.flatnonzero(holes))]
     ) == {4.0}

@@ -135,3 +135,10 @@ def test_the_order_is_that_of_the_table():
 def test_the_docs_hold_the_table():
     assert f"\n\n{markdown_table()}\n\n" in DOCS.read_text()
     assert all(row.count(" | ") == 5 for row in markdown_table().splitlines())
+
+
+def test_no_number_is_better_than_depth_at_the_camera():
+    for name, far, near in (("chamfer", 80.0, 4.0), ("mse_depth", 6400.0, 16.0)):
+        assert metric(name).worst(80.0) == far
+        assert metric(name).worst(2.0) == metric(name).worst() == near
+    assert metric("iqtt_accuracy").worst(80.0) == 0.0
