@@ -41,7 +41,7 @@ def plain(batch: SceneBatch) -> None:
     from scenegen.rendering.pictures.matter import gather_matter
     from scenegen.rendering.pictures.paths import MAX_DEPTH, ROULETTE_DEPTH
     from scenegen.rendering.pictures.sky import outside
-    from scenegen.rendering.pictures.tracer import _camera
+    from scenegen.rendering.pictures.tracer import device_camera
 
     grey = mi.load_dict({"type": "twosided", "bsdf": {"type": "diffuse"}})
     paths = mi.load_dict({"type": "path", "max_depth": MAX_DEPTH, "rr_depth": ROULETTE_DEPTH})
@@ -54,7 +54,7 @@ def plain(batch: SceneBatch) -> None:
             "type": "scene", "sky": {"type": "envmap", "bitmap": sky},
             "room": triangle_mesh("room", soup.corners, soup.normals, grey),
         })  # fmt: skip
-        camera = _camera(batch, b)
+        camera = device_camera(batch, b)
         for ray, sampler, _ in camera_rays(batch, b, camera[:5]):
             mi.Float(paths.sample(scene, sampler, ray)[0].x).numpy()
 

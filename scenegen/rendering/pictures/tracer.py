@@ -60,7 +60,7 @@ def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Arr
     x, y, z = interior.size
     # Of walls that reflect half of the light, the mean radiance in all directions.
     mean = lights.flux / (2 * np.pi * (x * y + y * z + z * x))
-    camera = _camera(batch, b)
+    camera = device_camera(batch, b)
     stream = int(batch.view[b])
     seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, stream)
 
@@ -95,7 +95,7 @@ def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Arr
     return found
 
 
-def _camera(batch: SceneBatch, b: int) -> Camera:
+def device_camera(batch: SceneBatch, b: int) -> Camera:
     """Return a camera. Its numbers are variables, so that all cameras share a kernel."""
     spec = batch.spec
     size = pixel_size(spec.height, float(batch.fov_y_degrees[b]))
