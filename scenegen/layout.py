@@ -12,6 +12,7 @@ from scenegen.common.text_table import piped
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.content import CONTENT_DIGEST
 from scenegen.files.schema import DIGEST, Column, Format
+from scenegen.objects.meshes.as_furniture import family_like
 
 FORMAT_NAME = "pix2shape-bench/rooms"
 FORMAT_VERSION = "1.0"
@@ -204,7 +205,7 @@ def columns(spec: DatasetSpec) -> list[Column]:
     }
     if spec.interior:
         more["image"]["encoding"] = "sRGB" if spec.image_dtype == "uint8" else "linear radiance"
-        numbers = [NYU40.get(name, OTHER_PROPERTY) for name in spec.shapes]
+        numbers = [NYU40.get(family_like(name), OTHER_PROPERTY) for name in spec.shapes]
         more["object/shape"]["nyu40"] = numbers
     return [
         replace(

@@ -81,7 +81,8 @@ class DatasetSpec:
         height, width: image size in pixels.
         objects: fewest and most objects of a scene.
         source: what objects are: "shapes" for basic shapes, "families" for the built-in object
-            classes, else the kind of folder that their meshes come from.
+            classes, else the kind of folder that their meshes come from; the
+            classes of closed rooms that a folder lacks are built in.
         shapes: names to draw from, each with the same probability: basic shapes, or classes.
         object_split: which objects of a class are drawn from (see `meshes.listing.object_split`).
         listing: digest of the names of a folder's models; empty for what is built in.
@@ -319,6 +320,5 @@ def _check_interior(spec: DatasetSpec) -> None:
         check(unused, name.replace("_", " "), f"{getattr(spec, name)} with {where}", "none")
     if spec.interior:
         check(spec.shading == "path", "shading", f"{spec.shading} with interiors", "path")
-        where = {"shapes": "shapes", "folder": "objects root"}.get(spec.source, "shapenet root")
-        families = "none: interiors are furnished with built-in classes (--classes)"
-        check(spec.source == "families", where, "given with interiors", families)
+        classes = "none: interiors are furnished with classes (--classes)"
+        check(spec.source != "shapes", "shapes", "given with interiors", classes)

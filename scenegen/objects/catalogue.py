@@ -5,13 +5,16 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from scenegen.common.errors import SpecError
+from scenegen.common.recent import Recent
 from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families.members import MEMBERS, member_shape
 from scenegen.objects.families.store import MEMBER_STORE
+from scenegen.objects.furnishing import furnishing
 from scenegen.objects.furniture import furniture_shape
+from scenegen.objects.meshes.as_furniture import family_like, mesh_furniture
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import object_split
 from scenegen.objects.meshes.store import MeshStore
@@ -51,8 +54,64 @@ def objects_of(spec: DatasetSpec) -> Objects:
 
 def mesh_objects(store: MeshStore) -> Objects:
     """Return the objects of a folder of meshes."""
-    models = {name: [file.name for file in files] for name, files in store.folder.models.items()}
-    return Objects(models, store.shape, store.digest, store.problems)
+    return Objects(_listed(store), store.shape, store.digest, store.problems)
+
+
+def furnished_objects(store: MeshStore, names: Sequence[str], split: str) -> Objects:
+    """Return furniture: models of a folder, and members of those classes that it lacks."""
+    families = tuple(name for name in names if name not in store.folder.models)
+    members = _built_in("families", families, split).models
+    furniture = _Furniture(store)
+    return Objects({**_listed(store), **members}, furniture.shape, furniture.digest, store.problems)
+
+
+@lru_cache(maxsize=16)
+def furniture_models(objects: Objects) -> Mapping[str, Sequence[str]]:
+    """Return the names of models by the family in whose place they stand, which may be OBJECT."""
+    found: dict[str, Sequence[str]] = {}
+    for name, models in objects.models.items():
+        family = family_like(name)
+        found[family] = [*found[family], *models] if family in found else models
+    return found
+
+
+def _listed(store: MeshStore) -> dict[str, Sequence[str]]:
+    return {name: [file.name for file in files] for name, files in store.folder.models.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class _Furniture:
+    """Models of a folder, and members of other families, as furniture."""
+
+    store: MeshStore
+
+    def shape(self, name: str) -> UnitShape:
+        return _kept(self, name) if self._is_own(name) else interior_shape(name)
+
+    def digest(self, name: str) -> str:
+        return self.store.digest(name) if self._is_own(name) else ""
+
+    def _is_own(self, name: str) -> bool:
+        return name.partition("/")[0] in self.store.folder.models
+
+
+_FURNITURE: Recent[UnitShape] = Recent(1_000_000)  # faces, of some 200 bytes
+
+
+def _kept(furniture: _Furniture | None, name: str) -> UnitShape:
+    """Return a piece of furniture, of a folder's models or of a family's members."""
+    key = furniture, name
+    shape = _FURNITURE.get(key)
+    if shape is None:
+        if furniture is None:
+            shape = furniture_shape(name, furnishing(*_family_and_number(name)))
+        else:
+            shape = mesh_furniture(furniture.store, name)
+        assert shape.furnished is not None
+        thing = shape.furnished.thing
+        texels = sum(texture.color[..., 0].size for texture in thing.textures)
+        _FURNITURE.put(key, shape, len(thing.faces) + texels // 16)
+    return shape
 
 
 def changed_meshes(objects: Objects, scene: SceneSpec) -> list[str]:
@@ -73,10 +132,7 @@ def interior_shape(name: str) -> UnitShape:
 
     Raises SpecError for any other name.
     """
-    if name.startswith(PREFIX):
-        return shell_shape(name)
-    _family_and_number(name)
-    return furniture_shape(name)
+    return shell_shape(name) if name.startswith(PREFIX) else _kept(None, name)
 
 
 def built_in_shape(name: str) -> UnitShape:

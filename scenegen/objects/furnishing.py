@@ -5,6 +5,7 @@ Frame: y up, standing on y = 0, centred in x and z, the front faces +z.
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,22 +21,15 @@ WHOLE = ("picture", "screen", "dial", "rug", "leaf")  # materials whose map cove
 
 @dataclass(frozen=True)
 class Facts:
-    """What a family is, how large, and where it belongs.
+    """How large a family is, and what it is for.
 
     Attributes:
-        name: of its class.
-        nyu40: number of its class in the NYU40 list of labels.
-        stands: where it may be: "floor", "wall" (hangs on it), "on" (a surface), "hung" (from the
-            ceiling), "window", "sill".
         height, width: least and greatest, in metres; the width is that along x. A width of None
             means that the builder works in metres; else the unit shape is scaled to the ranges.
         seats: whether people sit on it.
         surfaces: whether things stand on it.
     """
 
-    name: str
-    nyu40: int
-    stands: tuple[str, ...]
     height: tuple[float, float]
     width: tuple[float, float] | None = None
     seats: bool = False
@@ -43,41 +37,41 @@ class Facts:
 
 
 FAMILIES_FACTS = {
-    "bowl": Facts("bowl", 40, ("on",), (0.05, 0.12), (0.12, 0.3)),
-    "mug": Facts("mug", 40, ("on",), (0.08, 0.13), (0.09, 0.15)),
-    "bottle": Facts("bottle", 40, ("on",), (0.2, 0.33), (0.06, 0.14)),
-    "can": Facts("can", 40, ("on",), (0.08, 0.18), (0.06, 0.14)),
-    "lamp": Facts("lamp", 35, ("on",), (0.32, 0.6), (0.15, 0.4)),
-    "bag": Facts("bag", 37, ("floor", "on"), (0.25, 0.5), (0.2, 0.5)),
-    "cap": Facts("cap", 40, ("on",), (0.1, 0.2), (0.17, 0.32)),
-    "chair": Facts("chair", 5, ("floor",), (0.78, 1.0), (0.42, 0.75), seats=True),
-    "table": Facts("table", 7, ("floor",), (0.7, 0.77), (0.9, 1.8), surfaces=True),
-    "sofa": Facts("sofa", 6, ("floor",), (0.68, 1.0), seats=True),
-    "armchair": Facts("armchair", 6, ("floor",), (0.68, 1.0), seats=True),
-    "stool": Facts("stool", 5, ("floor",), (0.34, 0.78), seats=True),
-    "shelf": Facts("shelf", 15, ("floor",), (0.6, 2.1), surfaces=True),
-    "cabinet": Facts("cabinet", 3, ("floor",), (0.55, 2.15), surfaces=True),
-    "nightstand": Facts("night stand", 32, ("floor",), (0.4, 0.62), surfaces=True),
-    "desk": Facts("desk", 14, ("floor",), (0.71, 0.77), surfaces=True),
-    "coffee_table": Facts("coffee table", 7, ("floor",), (0.34, 0.48), surfaces=True),
-    "bed": Facts("bed", 4, ("floor",), (0.7, 1.2), seats=True),
-    "cushion": Facts("cushion", 18, ("seat",), (0.25, 0.55)),
-    "curtain": Facts("curtain", 16, ("window",), (1.9, 2.4)),
-    "rug": Facts("rug", 20, ("floor",), (0.004, 0.02)),
-    "plate": Facts("plate", 40, ("on",), (0.01, 0.07)),
-    "cup": Facts("cup", 40, ("on",), (0.05, 0.1)),
-    "vase": Facts("vase", 40, ("on", "sill"), (0.13, 0.9)),
-    "basket": Facts("basket", 40, ("floor", "on"), (0.19, 0.46)),
-    "book": Facts("book", 23, ("on",), (0.009, 0.2)),
-    "books": Facts("books", 23, ("on",), (0.14, 0.31)),
-    "box": Facts("box", 29, ("floor", "on"), (0.1, 0.55)),
-    "picture": Facts("picture", 11, ("wall",), (0.15, 0.95)),
-    "screen": Facts("screen", 25, ("on",), (0.35, 0.85)),
-    "clock": Facts("clock", 40, ("wall",), (0.22, 0.42)),
-    "floor_lamp": Facts("floor lamp", 35, ("floor",), (1.4, 1.75), (0.32, 0.55)),
-    "pendant": Facts("pendant lamp", 35, ("hung",), (0.35, 1.0)),
-    "plant": Facts("plant", 40, ("on", "sill"), (0.15, 0.65)),
-    "tall_plant": Facts("tall plant", 40, ("floor",), (0.55, 1.8)),
+    "bowl": Facts((0.05, 0.12), (0.12, 0.3)),
+    "mug": Facts((0.08, 0.13), (0.09, 0.15)),
+    "bottle": Facts((0.2, 0.33), (0.06, 0.14)),
+    "can": Facts((0.08, 0.18), (0.06, 0.14)),
+    "lamp": Facts((0.32, 0.6), (0.15, 0.4)),
+    "bag": Facts((0.25, 0.5), (0.2, 0.5)),
+    "cap": Facts((0.1, 0.2), (0.17, 0.32)),
+    "chair": Facts((0.78, 1.0), (0.42, 0.75), seats=True),
+    "table": Facts((0.7, 0.77), (0.9, 1.8), surfaces=True),
+    "sofa": Facts((0.68, 1.0), seats=True),
+    "armchair": Facts((0.68, 1.0), seats=True),
+    "stool": Facts((0.34, 0.78), seats=True),
+    "shelf": Facts((0.6, 2.1), surfaces=True),
+    "cabinet": Facts((0.55, 2.15), surfaces=True),
+    "nightstand": Facts((0.4, 0.62), surfaces=True),
+    "desk": Facts((0.71, 0.77), surfaces=True),
+    "coffee_table": Facts((0.34, 0.48), surfaces=True),
+    "bed": Facts((0.7, 1.2), seats=True),
+    "cushion": Facts((0.25, 0.55)),
+    "curtain": Facts((1.9, 2.4)),
+    "rug": Facts((0.004, 0.02)),
+    "plate": Facts((0.01, 0.07)),
+    "cup": Facts((0.05, 0.1)),
+    "vase": Facts((0.13, 0.9)),
+    "basket": Facts((0.19, 0.46)),
+    "book": Facts((0.009, 0.2)),
+    "books": Facts((0.14, 0.31)),
+    "box": Facts((0.1, 0.55)),
+    "picture": Facts((0.15, 0.95)),
+    "screen": Facts((0.35, 0.85)),
+    "clock": Facts((0.22, 0.42)),
+    "floor_lamp": Facts((1.4, 1.75), (0.32, 0.55)),
+    "pendant": Facts((0.35, 1.0)),
+    "plant": Facts((0.15, 0.65)),
+    "tall_plant": Facts((0.55, 1.8)),
 }
 _CASE = {
     "case": ("wood", "paint"),
@@ -162,31 +156,43 @@ _ROLES: dict[str, dict[str, tuple[str, ...]]] = {
     "plant": {"pot": ("ceramic", "terracotta", "wicker")},
     "tall_plant": {"pot": ("ceramic", "terracotta", "wicker"), "trunk": ("stem",)},
 }
-_SHARED = (
-    "wood",
-    "metal",
-    "paint",
-    "glow",
-    "leather",
-)  # all parts of one object are of the same one
+_SHARED = ("wood", "metal", "paint", "glow", "leather")  # all parts of an object are of the same
+_PLAIN = ("wood", "plastic", "ceramic", "paint")  # of meshes that tell none
+
+
+class Texture(NamedTuple):
+    """A picture on a surface: linear RGB, 0 to 1, (H, W, 3) float32, row 0 at v = 0; it repeats."""
+
+    color: Array
+    roughness: float
+    metallic: float
+
+
+class Paint(NamedTuple):
+    """What the faces of a mesh look like: textures, which of them (F,), and where (F, 3, 2)."""
+
+    textures: tuple[Texture, ...]
+    texture: Array
+    uv: Array
 
 
 @dataclass(frozen=True, eq=False)
 class Furnishing:
-    """A member of a family as a thing in a room.
+    """A member of a family as a thing in a room, or a mesh that takes the place of one.
 
     Attributes:
-        family, number: which member.
+        family, number: which member; a mesh has the number MESH.
         vertices: in metres, (V, 3) float64.
         faces: three vertices of each triangle, (F, 3), counter-clockwise seen from outside; the
-            parts are closed surfaces.
+            parts are closed surfaces. Neither need hold of a mesh.
         corner_uv: texture coordinates of the corners, (F, 3, 2), in metres; from 0 to 1 for
-            materials in `WHOLE`.
+            materials in `WHOLE` and textures.
         corner_normals: unit normals of the smooth surface at the corners, (F, 3, 3).
         part: the index into `materials`, (F,) int16.
         patch: the number of the closed surface that a face belongs to, (F,) int32.
         materials: kinds of materials, as of `rendering.materials`. A kind occurs twice where two
             parts are of different materials of the same kind.
+        textures: those of a mesh, which its first materials stand for.
     """
 
     family: str
@@ -198,6 +204,7 @@ class Furnishing:
     part: Array
     patch: Array
     materials: tuple[str, ...]
+    textures: tuple[Texture, ...] = ()
 
 
 @lru_cache(maxsize=256)
@@ -267,7 +274,15 @@ def _materials(
     return tuple(kinds), [number_of[name] for name in names]
 
 
+def whole_kind(family: str, share: float) -> str:
+    """Return a kind of material for a whole mesh in the place of a family, by a share of 1."""
+    roles = _ROLES.get(family, {})
+    kinds = next((kinds for kinds in roles.values() if "glow" not in kinds), _PLAIN)
+    return kinds[int(share * len(kinds))]
+
+
 Rectangle = tuple[float, float, float, float, float]
+MESH = -1
 CLEAR = 0.12  # metres of free height above a support
 LEAST_SIDE = 0.08  # metres, of a support
 _GRID = np.stack(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, 9)]), axis=-1).reshape(-1, 2)
@@ -279,13 +294,15 @@ def supports(thing: Furnishing) -> list[Rectangle]:
     They lie on tops, boards and seats, with at least CLEAR of free height above them. The lowest
     come first. There are none on a thing whose family has neither surfaces nor seats.
     """
-    facts = FAMILIES_FACTS[thing.family]
-    if not (facts.surfaces or facts.seats):
+    facts = FAMILIES_FACTS.get(thing.family)
+    if facts is None or not (facts.surfaces or facts.seats):
         return []
     corners = thing.vertices[thing.faces]
     a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(a, b)
-    level = (np.ptp(corners[..., 1], axis=1) < 1e-6) & (normal[:, 1] > 0.0)
+    # The faces of a mesh may look to either side.
+    up = (normal[:, 1] > 0.0) | (thing.number == MESH)
+    level = (np.ptp(corners[..., 1], axis=1) < 1e-6) & up
     patches = thing.patch[level]
     heights = np.round(corners[level, 0, 1], 4)
     found: list[Rectangle] = []

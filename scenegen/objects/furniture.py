@@ -4,16 +4,16 @@ A furnishing is centred at the middle of its box, and its bounding radius is 1, 
 shapes. So an object of a closed room is placed by the same similarity as all other objects.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.recent import Recent
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
-from scenegen.objects.furnishing import Furnishing, furnishing, supports
+from scenegen.objects.furnishing import Furnishing, supports
 from scenegen.objects.room_shell import box_hull
 from scenegen.objects.solids import Mesh, UnitShape
 
@@ -27,7 +27,8 @@ class Piece:
     """What placing needs of a piece of furniture, in its own frame: centred, on y = 0, front +z.
 
     Attributes:
-        name, family: family/number, and the family.
+        name: of the model, as in `scenes.PlacedObject.shape`.
+        family: whose place it takes, as of `Furnishing`.
         half: half its width along x and half its depth along z, metres.
         height: metres.
         radius: of the sphere about the middle of its box.
@@ -44,36 +45,40 @@ class Piece:
     boxes: Array
 
 
-def family_of(name: str) -> tuple[str, int]:
-    """Return family and number of a name."""
-    family, _, number = name.partition("/")
-    return family, int(number)
+class Furnished(NamedTuple):
+    """A furnishing; its vertices, (V, 3), in units of its radius about its middle; the radius."""
+
+    thing: Furnishing
+    vertices: Array
+    radius: float
 
 
-_KEPT: Recent[tuple[Furnishing, Array, float]] = Recent(1_000_000)  # faces, of some 200 bytes
-
-
-def furnished(name: str) -> tuple[Furnishing, Array, float]:
-    """Return a furnishing, its vertices in units of its radius about its middle, and the radius.
+def furniture_shape(name: str, thing: Furnishing) -> UnitShape:
+    """Return a piece of furniture as a unit shape.
 
     Rounded, as cosines and sums differ in their last bits between processors.
     """
-    known = _KEPT.get(name)
-    if known is None:
-        thing = furnishing(*family_of(name))
-        low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
-        moved = thing.vertices - (low + high) / 2
-        radius = float(np.sqrt((moved * moved).sum(axis=1).max()))
-        radius = float(np.ceil(radius / SIZE_STEP) * SIZE_STEP)
-        known = thing, rounded(moved / radius, POINT_STEP), radius
-        _KEPT.put(name, known, len(thing.faces))
-    return known
+    low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
+    moved = thing.vertices - (low + high) / 2
+    radius = float(np.sqrt((moved * moved).sum(axis=1).max()))
+    radius = float(np.ceil(radius / SIZE_STEP) * SIZE_STEP)
+    vertices = rounded(moved / radius, POINT_STEP)
+
+    def mesh() -> Mesh:
+        faces = np.arange(3 * len(thing.faces)).reshape(-1, 3)
+        normals = rounded(thing.corner_normals, POINT_STEP).reshape(-1, 3)
+        return Mesh(vertices[thing.faces].reshape(-1, 3), faces, normals)
+
+    made = Furnished(thing, vertices, radius)
+    return UnitShape(name, mesh, *box_hull(vertices), 0.0, UPRIGHT, furnished=made)
 
 
 @lru_cache(maxsize=2000)
-def piece(name: str) -> Piece:
-    """Return a piece of furniture as it is placed."""
-    thing, vertices, radius = furnished(name)
+def piece(shape_of: Callable[[str], UnitShape], name: str) -> Piece:
+    """Return a piece of furniture as it is placed. Raises as `shape_of`."""
+    made = shape_of(name).furnished
+    assert made is not None
+    thing, vertices, radius = made
     high = vertices.max(axis=0)
     half = np.ceil(high * radius / SIZE_STEP) * SIZE_STEP
     corners = (vertices * radius + [0.0, half[1], 0.0])[thing.faces]
@@ -86,12 +91,3 @@ def piece(name: str) -> Piece:
     )
     across, up, along = half.tolist()
     return Piece(name, thing.family, (across, along), 2 * up, radius, surfaces, boxes)
-
-
-def furniture_shape(name: str) -> UnitShape:
-    """Return a piece of furniture as a unit shape."""
-    thing, vertices, _ = furnished(name)
-    normals = rounded(thing.corner_normals, POINT_STEP).reshape(-1, 3)
-    faces = np.arange(3 * len(thing.faces)).reshape(-1, 3)
-    mesh = Mesh(vertices[thing.faces].reshape(-1, 3), faces, normals)
-    return UnitShape(name, lambda: mesh, *box_hull(vertices), 0.0, UPRIGHT)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 from scenegen.common.rotations import cross
 from scenegen.objects.basic_hulls import kept
 from scenegen.objects.exact_surfaces import Surface, polyhedron_of
+
+if TYPE_CHECKING:
+    from scenegen.objects.furniture import Furnished
 
 Array = NDArray[Any]
 SEGMENTS = 512  # around an axis
@@ -49,6 +52,7 @@ class UnitShape:
         surface: what is rendered instead of the triangles; None if those are rendered.
         coarse: as from `coarse_hulls.coarse_hull`, if it was kept.
         make_colors: returns `colors`; None for a shape without colours of its own.
+        furnished: what it is made of as a thing in a closed room; None elsewhere.
     """
 
     name: str
@@ -61,6 +65,7 @@ class UnitShape:
     surface: Surface | None = None
     coarse: tuple[Array, float] | None = None
     make_colors: Callable[[], Array] | None = None
+    furnished: "Furnished | None" = None
 
     @cached_property
     def colors(self) -> Array:

@@ -12,8 +12,9 @@ from scenegen.common.records import check
 from scenegen.description.presets import PRESETS
 from scenegen.description.specs import BUILT_IN, DatasetSpec
 from scenegen.objects.cache import default_cache_dir
-from scenegen.objects.catalogue import Objects, mesh_objects, objects_of
+from scenegen.objects.catalogue import Objects, furnished_objects, mesh_objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE
+from scenegen.objects.meshes.as_furniture import OBJECT, family_like
 from scenegen.objects.meshes.folders import open_objects
 from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.meshes.shapenet import open_shapenet
@@ -37,20 +38,32 @@ class ObjectSource:
         settings: arguments of `DatasetSpec`.
         objects: the catalogue; None if the objects are built in.
         store: the meshes, if they come from a folder.
+        is_furniture: whether these furnish closed rooms.
     """
 
     settings: dict[str, Any] = field(default_factory=dict)
     objects: Objects | None = None
     store: MeshStore | None = None
+    is_furniture: bool = False
 
     def notes(self, own_colors: bool = False) -> list[str]:
-        """Return lines on the models refused so far, and those of `folder_notes`."""
+        """Return lines on the models refused so far, and those of `folder_notes`.
+
+        In closed rooms they tell, too, which classes belong nowhere.
+        """
         problems = sorted(self.store.problems.items()) if self.store else []
         lines = [f"note: {name} was passed over: {why}" for name, why in problems[:NOTES_SHOWN]]
         if len(problems) > NOTES_SHOWN:
             more = len(problems) - NOTES_SHOWN
             lines.append(f"note: and {more} more; `scenegen check-objects` lists all")
-        return lines + (folder_notes(self.store.folder, own_colors) if self.store else [])
+        if self.store is None:
+            return lines
+        if self.is_furniture:
+            odd = [name for name in self.store.folder.classes if family_like(name) == OBJECT]
+            named = f"{', '.join(odd[:NOTES_SHOWN])}{', ...' if odd[NOTES_SHOWN:] else ''}"
+            told = f"note: small things, as no furniture is called so: {named}"
+            lines += [told] if odd else []
+        return lines + folder_notes(self.store.folder, own_colors or self.is_furniture)
 
 
 def folder_notes(folder: ModelFolder, own_colors: bool = False) -> list[str]:
@@ -107,7 +120,8 @@ def object_source(
 ) -> ObjectSource:
     """Return the settings on objects that go on top of a preset's, and the models.
 
-    Without `classes`, a folder gives those of the preset that it has, or else all that it has.
+    Without `classes`, a folder gives those of the preset that it has, or else all that it has. In
+    closed rooms it gives all that it has, and families stand where it has nothing alike.
 
     Raises:
         SpecError: settings that contradict one another.
@@ -125,14 +139,22 @@ def object_source(
         families = {} if classes is None else {"source": "families", "shapes": classes}
         return ObjectSource({**families, **split})
     shapenet, part = shapenet_root is not None, object_split or "all"
-    folder = _open(root, shapenet, classes, up, part)
-    if classes is None and preset in PRESETS:
-        wanted = PRESETS[preset].settings.get("shapes", ())
+    usual = PRESETS[preset].settings if preset in PRESETS else {}
+    wanted, interior = usual.get("shapes", ()), "interior" in usual
+    if interior:
+        folder = _open_own(root, shapenet, classes, up, part)
+        taken = folder.classes if classes else tuple(map(family_like, folder.classes))
+        names = (*folder.classes, *(n for n in classes or wanted if n not in taken))
+    else:
+        folder = _open(root, shapenet, classes, up, part)
         present = tuple(name for name in wanted if name in folder.classes)
-        folder = _open(root, shapenet, present, up, part) if present else folder
+        if classes is None and present:
+            folder = _open(root, shapenet, present, up, part)
+        names = folder.classes
     store = MeshStore(folder, cache_dir or default_cache_dir())
-    settings = {"source": folder.kind, "shapes": folder.classes, "listing": folder.digest()}
-    return ObjectSource({**settings, **split}, mesh_objects(store), store)
+    settings = {"source": folder.kind, "shapes": names, "listing": folder.digest()}
+    objects = furnished_objects(store, names, part) if interior else mesh_objects(store)
+    return ObjectSource({**settings, **split}, objects, store, interior)
 
 
 def mesh_folder(shapenet_root: str | None, objects_root: str | None, up: str) -> str | None:
@@ -172,11 +194,29 @@ def file_objects(
     if root is None:
         MEMBER_STORE.use(cache_dir or default_cache_dir())
         return objects_of(spec)
-    folder = _open(root, spec.source != "folder", spec.shapes, up, spec.object_split)
+    is_shapenet, split = spec.source != "folder", spec.object_split
+    if spec.interior:
+        folder = _open_own(root, is_shapenet, spec.shapes, up, split)
+    else:
+        folder = _open(root, is_shapenet, spec.shapes, up, split)
     if (folder.kind, folder.digest()) != (spec.source, spec.listing):
         found = f"other models than the file's: {folder.kind}, listing {folder.digest()[:12]}"
         raise SpecError(root, found, f"{spec.source}, listing {spec.listing[:12]}")
-    return mesh_objects(MeshStore(folder, cache_dir or default_cache_dir()))
+    store = MeshStore(folder, cache_dir or default_cache_dir())
+    return furnished_objects(store, spec.shapes, split) if spec.interior else mesh_objects(store)
+
+
+def _open_own(
+    root: str, shapenet: bool, classes: tuple[str, ...] | None, up: str, split: str
+) -> ModelFolder:
+    """Return the models of those classes that a folder has or that no family has."""
+    found = _open(root, shapenet, None, up, split)
+    if classes is None:
+        return found
+    families = BUILT_IN["families"]
+    own = tuple(n for n in classes if n in found.classes or n not in families)
+    check(bool(own), "classes", f"none that {root} has", f"some of {', '.join(found.classes)}")
+    return _open(root, shapenet, own, up, split)
 
 
 def _open(

@@ -1,5 +1,7 @@
 """The unit shapes of a folder's models, made when first used and kept in memory for a while."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -8,6 +10,7 @@ import numpy as np
 
 from scenegen.common.recent import Recent
 from scenegen.objects.cache import DiskCache
+from scenegen.objects.furnishing import Paint
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.meshes.models import Model, load_model
@@ -69,18 +72,35 @@ class MeshStore:
         except BadMeshError as error:
             raise error.inside(name) from error
 
+    def paint(self, name: str) -> Paint | None:
+        """Return what a model's file and those beside it say about its surface, if they do.
+
+        Raises BadMeshError as `shape` and `textures.paint_of` do.
+        """
+        from scenegen.objects.meshes.textures import paint_of  # imports trimesh, which is slow
+
+        model = self._load(name)
+        with self._told(name):
+            return paint_of(self._files[name].path, self.folder.up, model.vertices, model.faces)
+
+    @contextmanager
+    def _told(self, name: str) -> Iterator[None]:
+        """Keep why a model is refused, and tell its name."""
+        try:
+            yield
+        except BadMeshError as error:
+            self.problems[name] = str(error)
+            raise error.inside(name) from error
+
     def _load(self, name: str) -> Model:
         if name not in self._files:
             example = next(iter(self._files), "mug/1")
             expected = f"class/id of this folder and split, such as {example}"
             raise BadMeshError("model", repr(name), expected)
-        try:
+        with self._told(name):
             if name in self.problems:
                 raise BadMeshError(self.problems[name])
             model = load_model(self._files[name].path, self.folder.up, self._disk)
-        except BadMeshError as error:
-            self.problems[name] = str(error)
-            raise error.inside(name) from error
         self._digests[name] = model.digest
         return model
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.rotations import product
 from scenegen.description.interiors import WALLS
-from scenegen.objects.furniture import furnished
+from scenegen.objects.furnishing import Texture
 from scenegen.objects.room_shell import PARTS, shell_name, shell_of
 from scenegen.rendering.materials.folders import MapFiles
 from scenegen.rendering.materials.kinds import material
@@ -81,6 +81,15 @@ class _Collector:
             self.materials.append(material(kind, rng, self.colors, self.folder))
         return self.numbers[key]
 
+    def textured(self, texture: Texture, owner: str, part: int) -> int:
+        """Return the number of the material of a mesh's texture."""
+        key = owner, part
+        if key not in self.numbers:
+            self.numbers[key] = len(self.materials)
+            color, roughness, metallic = texture
+            self.materials.append(Material(color, roughness, metallic=metallic))
+        return self.numbers[key]
+
     def add(self, corners: Array, normals: Array, uv: Array, rows: Array) -> None:
         """Add triangles with the numbers of their materials."""
         self.parts.append((corners, normals, uv, rows))
@@ -124,13 +133,18 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -
         collected.shine(*glowing, CEILING_FLUX)
     for k in range(int(batch.object_count[b])):
         name = batch.names[batch.shape[b, k]]
-        thing, vertices, _ = furnished(name)
+        made = batch.shape_of(name).furnished
+        assert made is not None
+        thing, vertices, _ = made
         placed, scale = batch.world_from_object[b, k], batch.object_scale[b, k]
         turned = placed[:3, :3]
         points = product(vertices, turned.T) + placed[:3, 3]
         normals = product(thing.corner_normals.reshape(-1, 3), turned.T / scale).reshape(-1, 3, 3)
         corners = points[thing.faces]
-        rows = np.array([collected.number(kind, name, i) for i, kind in enumerate(thing.materials)])
+        rows = np.array([
+            collected.textured(thing.textures[i], name, i) if i < len(thing.textures)
+            else collected.number(kind, name, i) for i, kind in enumerate(thing.materials)
+        ])  # fmt: skip
         glows = np.array([kind == GLOW for kind in thing.materials])[thing.part] & lit
         dark = ~glows
         collected.add(corners[dark], normals[dark], thing.corner_uv[dark], rows[thing.part[dark]])

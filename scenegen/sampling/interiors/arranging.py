@@ -69,6 +69,7 @@ class Arranger:
     Attributes:
         room, space, draws: what it is, what is taken, and random numbers.
         member: returns a member of a family, or None if the data set has none of it.
+        other: the family of things that belong nowhere, and so stand anywhere; "" for none.
         kinds: members that this room has, by family: a set of chairs is of one kind.
     """
 
@@ -76,6 +77,7 @@ class Arranger:
     space: Space
     draws: Draws
     member: Callable[[str], Piece | None]
+    other: str = ""
     kinds: dict[str, list[Piece]] = field(default_factory=dict)
 
     # Choosing
@@ -424,7 +426,10 @@ class Arranger:
             kind, parent, y, sides = self.draws.pick(
                 [surface for surface, _ in surfaces], [weight for _, weight in surfaces]
             )
-            family = self.draws.pick(tuple(ON_TOP[kind]), tuple(ON_TOP[kind].values()))
+            weights = ON_TOP[kind]
+            if self.other and kind not in SEATS:
+                weights = {**weights, self.other: sum(weights.values())}
+            family = self.draws.pick(tuple(weights), tuple(weights.values()))
             if kind == "floor":
                 self.on_floor(family)
             elif kind == "sill":
@@ -456,7 +461,8 @@ class Arranger:
                 sill = (hole.left, hole.right, hole.bottom, float(WALLS.index(hole.wall)))
                 found.append((("sill", 0, hole.bottom, sill), 0.08))
         astray = sum(
-            t.piece.family in ON_TOP["floor"] and not t.stands_on for t in self.space.placed
+            t.piece.family in (*ON_TOP["floor"], self.other) and not t.stands_on
+            for t in self.space.placed
         )
         if astray < MOST_ON_FLOOR:
             found.append((("floor", 0, 0.0, ()), 0.06))

@@ -5,7 +5,8 @@ Another attempt draws the furniture and the cameras again.
 """
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from typing import Any
 
@@ -18,8 +19,10 @@ from scenegen.common.records import to_json
 from scenegen.description.interiors import Interior
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.catalogue import Objects
+from scenegen.objects.catalogue import Objects, furniture_models
 from scenegen.objects.furniture import Piece, piece
+from scenegen.objects.meshes.as_furniture import OBJECT
+from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.sampling.interiors.arranging import Arranger, furnish
 from scenegen.sampling.interiors.draws import Draws
 from scenegen.sampling.interiors.rooms import Room, draw_room
@@ -44,17 +47,20 @@ def draw_interior(spec: DatasetSpec, index: int, attempt: int, objects: Objects)
     """Return room, objects, camera positions and target of a proposal; None if it found no room."""
     room, count, fov = item_room(spec, index)
     draws = Draws(spec.seed, index, Purpose.ARRANGEMENT, attempt)
+    by_family = furniture_models(objects)
 
     def member(family: str) -> Piece | None:
-        models = objects.models.get(family)
+        models = by_family.get(family)
         if not models:
             return None
         share = draws.pick(_stock(spec.seed, index // STREET, family))
-        return piece(models[int(share * len(models))])
+        with suppress(BadMeshError):  # a mesh that cannot be used is left out
+            return piece(objects.shape, models[int(share * len(models))])
+        return None
 
     space = Space(room.size, count)
     if count:
-        furnish(Arranger(room, space, draws, member))
+        furnish(Arranger(room, space, draws, member, OBJECT if OBJECT in by_family else ""))
     if len(space.placed) < count:
         return None
     found = draw_cameras(spec, space, Draws(spec.seed, index, Purpose.VIEWPOINT, attempt), fov)
@@ -77,22 +83,26 @@ def sample_interiors(
     placed = np.array([found is not None for found in drawn], bool)
     names = tuple(model for family in spec.shapes for model in objects.models[family])
     found = [scene for scene in drawn if scene is not None]
-    return placed, _arrays(spec, index[placed], found, names)
+    return placed, _arrays(spec, index[placed], found, names, objects.digest)
 
 
 def _arrays(
-    spec: DatasetSpec, index: Array, drawn: Sequence[_Drawn], names: tuple[str, ...]
+    spec: DatasetSpec,
+    index: Array,
+    drawn: Sequence[_Drawn],
+    names: tuple[str, ...],
+    digest: Callable[[str], str],
 ) -> SceneArrays:
     count, slots, views = len(drawn), spec.object_slots, len(spec.views)
     number = {name: i for i, name in enumerate(names)}
-    shape = np.full((count, slots), -1, np.int32)
+    shape, mesh = np.full((count, slots), -1, np.int32), np.full((count, slots), "", object)
     position, scale = np.zeros((count, slots, 3)), np.zeros((count, slots))
     rotation = np.zeros((count, slots, 4))
     camera, target = np.zeros((count, views, 3)), np.zeros((count, views, 3))
     fov, interior = np.zeros((count, views)), np.full(count, "", object)
     for row, (room, things, places, at) in enumerate(drawn):
         for k, thing in enumerate(things):
-            shape[row, k] = number[thing.piece.name]
+            shape[row, k], mesh[row, k] = number[thing.piece.name], digest(thing.piece.name)
             box = thing.box
             position[row, k] = box.x, (box.bottom + box.top) / 2, box.z
             scale[row, k] = thing.piece.radius
@@ -121,7 +131,7 @@ def _arrays(
         fov_y_degrees=fov,
         object_count=used.sum(axis=1).astype(np.int32),
         shape=shape,
-        mesh=np.full((count, slots), "", object),
+        mesh=mesh,
         position=position,
         rotation=rotation,
         scale=scale,

@@ -1,0 +1,228 @@
+"""Meshes as furniture: their own textures and colours, their size and front, rooms with them."""
+
+import json
+import zlib
+
+import h5py
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given
+from hypothesis import strategies as st
+from PIL import Image
+
+from scenegen.objects.catalogue import furniture_models
+from scenegen.objects.families.members import MEMBERS
+from scenegen.objects.furnishing import furnishing
+from scenegen.objects.furniture import piece
+from scenegen.objects.meshes import limits, textures
+from scenegen.objects.meshes.as_furniture import family_like, mesh_furniture
+from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.meshes.listing import ModelFile, ModelFolder
+from scenegen.objects.meshes.store import MeshStore
+from scenegen.objects.sources import object_source
+from tests.support.verified import checks_of
+
+SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+COLORS = [[200, 10, 10], [10, 200, 10]], [[10, 10, 200], [200, 200, 200]]  # lower row last
+
+
+def store_of(path, kind="folder"):
+    """A folder whose only model is this file, as "thing/a"."""
+    return named(path, "thing/a", kind)
+
+
+def named(path, name, kind="folder"):
+    kept = ModelFile(name, path)
+    return MeshStore(ModelFolder(kind, "y", (name[:-2],), {name[:-2]: (kept,)}), None)
+
+
+def quad(folder, picture="picture.png", material="map_Kd"):
+    """A square with a picture of four colours, as files in `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    place = folder / picture.replace("\\", "/")
+    place.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray(np.array(COLORS, np.uint8)).save(place)
+    text = f"newmtl m\nKd 1 1 1\n{material} {picture}\n" if material else "newmtl m\nKd 1 0 0\n"
+    (folder / "a.mtl").write_text(text)
+    path = folder / "a.obj"
+    path.write_text(f"mtllib a.mtl\n{SQUARE}usemtl m\nf 1/1 2/2 3/3 4/4\n")
+    return path
+
+
+def shown(paint, corners, point):
+    """The linear colour at a point of a square in the plane z = 0, of the nearest pixel."""
+    for triangle, uv, number in zip(corners, paint.uv, paint.texture, strict=True):
+        a, b, c = triangle[:, :2]
+        s, t = np.linalg.solve(np.stack([b - a, c - a], axis=1), np.subtract(point, a))
+        if min(s, t, 1 - s - t) > -1e-9:
+            u, v = uv[0] + s * (uv[1] - uv[0]) + t * (uv[2] - uv[0])
+            color = paint.textures[number].color
+            rows, columns = color.shape[:2]
+            return color[int(v % 1 * rows), int(u % 1 * columns)]
+    raise AssertionError(point)
+
+
+@pytest.mark.parametrize(
+    "picture", ["picture.png", "maps/p.png", "../images/p.png", "..\\i\\p.png"]
+)
+def test_pictures_beside_a_model_lie_where_its_file_says(tmp_path, picture):
+    store = store_of(quad(tmp_path / "root" / "models", picture))
+    paint, mesh = store.paint("thing/a"), store.shape("thing/a").mesh
+    corners = mesh.vertices[mesh.faces].astype(float)
+    half = corners.max() / 2
+    expected = np.array(COLORS[::-1], float) / 255
+    expected = np.where(expected > 0.04045, ((expected + 0.055) / 1.055) ** 2.4, expected / 12.92)
+    for row, y in enumerate((-half, half)):
+        for column, x in enumerate((-half, half)):
+            np.testing.assert_allclose(
+                shown(paint, corners, (x, y)), expected[row, column], atol=1e-6
+            )
+
+
+@pytest.mark.parametrize("picture", ["../../secret.png", "{root}/secret.png"])
+def test_files_elsewhere_are_not_read(tmp_path, picture, monkeypatch):
+    path = quad(tmp_path / "root" / "models", "own.png")
+    Image.new("RGB", (2, 2), "red").save(tmp_path / "secret.png")
+    mtl = path.with_name("a.mtl")
+    mtl.write_text(mtl.read_text().replace("own.png", picture.format(root=tmp_path)))
+    read, real = [], textures.read_bytes
+    monkeypatch.setattr(textures, "read_bytes", lambda p: (read.append(p.name), real(p))[1])
+    assert len(store_of(path).paint("thing/a").textures) == 1
+    assert read == ["a.obj", "a.mtl"]
+
+
+@given(st.lists(st.tuples(*2 * [st.floats(0.05, 1.0)]), min_size=5, max_size=9))
+def test_coordinates_follow_the_surface_however_polygons_are_cut(points):
+    angles = 2 * np.pi * np.arange(len(points)) / len(points)
+    radii = np.array(points)[:, 0]
+    flat = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
+    theirs = np.stack([0 * flat, flat, np.roll(flat, -1, axis=0)], axis=1)  # a fan
+    theirs = np.concatenate([theirs, np.zeros((*theirs.shape[:2], 1))], axis=2)
+    matrix = np.array([[0.5, 0.2], [-0.1, 2.0], [0.0, 0.0]])
+    ours = np.concatenate([theirs[:, [1, 2]], theirs[:, [1]] * 0.5], axis=1)
+    found = textures._carried_over(theirs @ matrix, theirs, ours)
+    np.testing.assert_allclose(found, ours @ matrix, atol=1e-6)
+
+
+def test_colours_without_pictures_and_files_that_tell_nothing(tmp_path):
+    box = trimesh.creation.box((1, 2, 1))
+    box.visual.face_colors = [[255, 0, 0, 255]] * 6 + [[0, 0, 255, 255]] * 6
+    box.export(tmp_path / "a.ply")
+    paint = store_of(tmp_path / "a.ply").paint("thing/a")
+    (texture,) = paint.textures
+    seen = {tuple(texture.color[0, int(u * texture.color.shape[1])]) for u in paint.uv[:, 0, 0]}
+    assert seen == {(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)}
+    for suffix in (".stl", ".obj"):
+        trimesh.creation.box((1, 2, 1)).export(tmp_path / f"b{suffix}")
+        assert store_of(tmp_path / f"b{suffix}").paint("thing/a") is None
+    vase = mesh_furniture(named(tmp_path / "b.stl", "vase/a"), "vase/a").furnished.thing
+    assert vase.materials[0] in ("ceramic", "terracotta")
+    assert not vase.textures
+    sides = [x - np.roll(x, 1, axis=1) for x in (vase.corner_uv, vase.vertices[vase.faces])]
+    metres = [np.linalg.norm(side, axis=2) for side in sides]
+    np.testing.assert_allclose(*metres, atol=1e-6)
+
+
+def test_too_large_pictures_are_refused_and_large_ones_reduced(tmp_path, monkeypatch):
+    path = quad(tmp_path / "models")
+    monkeypatch.setattr(textures, "KEPT_PIXELS", 1)
+    assert store_of(path).paint("thing/a").textures[0].color.shape == (1, 1, 3)
+    monkeypatch.setattr(textures, "MOST_PIXELS", 1)
+    store = store_of(path)
+    with pytest.raises(BadMeshError):
+        store.paint("thing/a")
+    assert "thing/a" in store.problems
+    monkeypatch.setattr(limits, "MOST_BYTES", 150)  # too few for the picture, not for the model
+    path.with_name("picture.png").write_bytes(b"0" * 151)
+    assert len(store_of(path).paint("thing/a").textures[0].color) == 1
+
+
+@pytest.mark.parametrize(("kind", "front"), [("shapenet-v1", 0), ("shapenet-v2", 2), ("folder", 2)])
+def test_meshes_stand_with_their_front_to_z_as_large_as_their_kind(tmp_path, kind, front):
+    nose = trimesh.creation.box((0.2, 0.2, 0.2))
+    sign = -1 if kind == "shapenet-v2" else 1
+    nose.apply_translation(np.eye(3)[front] * 1.0 * sign)
+    mesh = trimesh.util.concatenate([trimesh.creation.box((1.0, 2.0, 1.0)), nose])
+    mesh.export(tmp_path / "a.obj")
+    thing = mesh_furniture(named(tmp_path / "a.obj", "chair/a", kind), "chair/a").furnished.thing
+    low, high = thing.vertices.min(axis=0), thing.vertices.max(axis=0)
+    np.testing.assert_allclose((low + high)[[0, 2]], 0, atol=1e-6)
+    assert low[1] == 0
+    small = thing.vertices[np.abs(thing.vertices[:, 0]) < 0.3 * high[0]]
+    assert small[:, 2].max() == high[2]
+    assert small[:, 2].min() > -high[2]
+    built_in = furnishing("chair", zlib.crc32(b"chair/a") % MEMBERS).vertices
+    same = np.linalg.norm(np.ptp(built_in, axis=0))
+    assert np.linalg.norm(high - low) == pytest.approx(same, abs=1e-5)
+
+
+@pytest.mark.parametrize("wound", [1, -1])
+def test_things_stand_on_meshes_of_tables_however_they_are_wound(tmp_path, wound):
+    top = trimesh.creation.box((2.0, 0.1, 1.0))
+    top.apply_translation((0, 1.0, 0))
+    legs = [trimesh.creation.box((0.1, 1.0, 0.1)) for _ in range(4)]
+    for leg, (x, z) in zip(legs, ((-1, -1), (-1, 1), (1, -1), (1, 1)), strict=True):
+        leg.apply_translation((0.9 * x, 0.45, 0.4 * z))
+    table = trimesh.util.concatenate([top, *legs])
+    table.faces = table.faces[:, ::wound]
+    table.export(tmp_path / "a.ply")
+    store = named(tmp_path / "a.ply", "table/a")
+    found = piece(lambda name: mesh_furniture(store, name), "table/a")
+    (y, x0, x1, z0, z1) = found.surfaces[-1]
+    assert y == pytest.approx(found.height, abs=1e-3)
+    assert (x1 - x0) * (z1 - z0) > 0.85 * 4 * found.half[0] * found.half[1]
+
+
+def test_classes_stand_in_the_places_of_families():
+    names = {"Sofa": "sofa", "coffee table": "coffee_table", "pillow": "cushion", "gun": "object"}
+    assert {name: family_like(name) for name in names} == names
+
+
+@pytest.fixture
+def own(tmp_path):
+    """A folder with a textured chair, tables, and things of an unknown class, some broken."""
+    root = tmp_path / "own"
+    for name in ("chair", "table", "dragon"):
+        for i, number in enumerate("abc"):
+            mesh = trimesh.creation.box((1.0, 0.6 + 0.2 * i, 0.8))
+            mesh.visual.face_colors = [[255 - 40 * i, 30, 30, 255]]
+            (root / name).mkdir(parents=True, exist_ok=True)
+            mesh.export(root / name / f"{number}.ply")
+    (root / "dragon" / "bad.obj").write_text("nothing of use")
+    return root
+
+
+def test_rooms_with_meshes_are_verified(own, run):
+    options = ("--preset", "interiors", "--size", 24, "--spp", 1, "--no-denoise", "--seed", 5)
+    result = run("render", "--n", 3, *options, "--objects-root", own)
+    assert result.exit_code == 0, result.output
+    with h5py.File("rooms.h5") as file:
+        names = json.loads(file.attrs["spec"])["shapes"]
+        numbers = dict(zip(names, file["object/shape"].attrs["nyu40"], strict=True))
+        scenes = [json.loads(text) for text in file["scene"].asstr()]
+    assert (numbers["chair"], numbers["dragon"]) == (5, 40)
+    used = [(item["shape"], item["mesh"]) for scene in scenes for item in scene["objects"]]
+    mine = {name for name, mesh in used if mesh}
+    assert {name.partition("/")[0] for name in mine} == {"chair", "table", "dragon"}
+    assert not {name for name, mesh in used if not mesh and name.startswith(("chair/", "table/"))}
+    assert "dragon/bad" not in mine
+    assert len({name for name, mesh in used if not mesh}) > 5
+
+    objects = object_source("interiors", objects_root=str(own)).objects
+    assert set(furniture_models(objects)["object"]) == {
+        f"dragon/{n}" for n in ("a", "b", "bad", "c")
+    }
+    checks = checks_of("rooms.h5", objects=objects)
+    assert all(check.ok for check in checks), checks
+    table = next(name for name in mine if name.startswith("table/"))
+    trimesh.creation.icosphere(1).export(own / f"{table}.ply")
+    changed = object_source("interiors", objects_root=str(own)).objects
+    assert not all(check.ok for check in checks_of("rooms.h5", objects=changed))
+
+
+@pytest.mark.parametrize(
+    "options", [("--classes", "chair,nonsense"), ("--classes", "rug"), ("--shapes", "box")]
+)
+def test_classes_that_nobody_has_are_refused(own, refuses, options):
+    refuses("render", "--n", 1, "--preset", "interiors", "--objects-root", own, *options)
