@@ -12,7 +12,7 @@ from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families.members import MEMBERS, member_shape
 from scenegen.objects.families.store import MEMBER_STORE
-from scenegen.objects.furnishing import furnishing
+from scenegen.objects.furnishing import MESH, furnishing
 from scenegen.objects.furniture import furniture_shape
 from scenegen.objects.meshes.as_furniture import family_like, mesh_furniture
 from scenegen.objects.meshes.errors import BadMeshError
@@ -95,7 +95,8 @@ class _Furniture:
         return name.partition("/")[0] in self.store.folder.models
 
 
-_FURNITURE: Recent[UnitShape] = Recent(1_000_000)  # faces, of some 200 bytes
+_FURNITURE: Recent[UnitShape] = Recent(400_000_000)  # bytes, about
+_FACE, _TEXEL = 100, 12  # bytes; a member's face, whose normals are smooth, takes 4 times as many
 
 
 def _kept(furniture: _Furniture | None, name: str) -> UnitShape:
@@ -110,7 +111,8 @@ def _kept(furniture: _Furniture | None, name: str) -> UnitShape:
         assert shape.furnished is not None
         thing = shape.furnished.thing
         texels = sum(texture.color[..., 0].size for texture in thing.textures)
-        _FURNITURE.put(key, shape, len(thing.faces) + texels // 16)
+        faces = len(thing.faces) * (1 if thing.number == MESH else 4)
+        _FURNITURE.put(key, shape, _FACE * faces + _TEXEL * texels)
     return shape
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
-from scenegen.objects.furnishing import Furnishing, supports
+from scenegen.objects.furnishing import MESH, Furnishing, supports
 from scenegen.objects.room_shell import box_hull
 from scenegen.objects.solids import Mesh, UnitShape
 
@@ -65,6 +65,8 @@ def furniture_shape(name: str, thing: Furnishing) -> UnitShape:
     vertices = rounded(moved / radius, POINT_STEP)
 
     def mesh() -> Mesh:
+        if thing.number == MESH:
+            return Mesh(vertices, thing.faces, None)
         faces = np.arange(3 * len(thing.faces)).reshape(-1, 3)
         normals = rounded(thing.corner_normals, POINT_STEP).reshape(-1, 3)
         return Mesh(vertices[thing.faces].reshape(-1, 3), faces, normals)

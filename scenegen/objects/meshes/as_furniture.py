@@ -72,8 +72,9 @@ def mesh_furniture(store: MeshStore, name: str) -> UnitShape:
     return furniture_shape(
         name,
         Furnishing(
-            family, MESH, vertices, faces, paint.uv, normals[:, None].repeat(3, axis=1),
-            paint.texture.astype(np.int16), np.zeros(len(faces), np.int32), kinds, paint.textures,
+            family, MESH, vertices, faces, paint.uv.astype(np.float32),
+            np.broadcast_to(normals[:, None], corners.shape), paint.texture.astype(np.int16),
+            np.broadcast_to(np.int32(0), len(faces)), kinds, paint.textures,
         ),
     )  # fmt: skip
 
