@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.common.srgb import decoded
+
 Array = NDArray[Any]
 KEPT = "on the device: "  # before the names of fields that stay there
 
@@ -57,9 +59,7 @@ def decode_image(image: Array) -> Array:
 
 def undeveloped(image: Array) -> Array:
     """Return the linear light, 0 to 1 float32, of an sRGB picture in 8 bits (IEC 61966-2-1)."""
-    levels = np.arange(256) / 255
-    curve = np.where(levels <= 0.04045, levels / 12.92, ((levels + 0.055) / 1.055) ** 2.4)
-    return np.asarray(curve.astype(np.float32)[image])
+    return np.asarray(decoded(np.arange(256) / 255).astype(np.float32)[image])
 
 
 def visible_pixels(object_id: Array, slots: int) -> NDArray[np.int32]:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from scenegen.common.srgb import encoded
 from scenegen.rooms.reader import Room
 
 Array = NDArray[Any]
@@ -63,17 +64,9 @@ def tiles(room: Room) -> list[NDArray[np.uint8]]:
     return pictures
 
 
-def srgb(radiance: Array) -> Array:
-    """Encode linear radiance for the eye, clipped to 0..1: sRGB (IEC 61966-2-1), 0..1."""
-    linear = np.clip(radiance, 0.0, 1.0)
-    return np.asarray(
-        np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    )
-
-
 def srgb_bytes(radiance: Array) -> NDArray[np.uint8]:
-    """Encode linear radiance as `srgb`, in 8 bits."""
-    return np.asarray(np.rint(srgb(radiance) * 255).astype(np.uint8))
+    """Encode linear radiance, 0 to 1, as sRGB in 8 bits."""
+    return np.asarray(np.rint(encoded(radiance) * 255).astype(np.uint8))
 
 
 def depth_bytes(depth: Array) -> NDArray[np.uint8]:

@@ -12,6 +12,7 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from scenegen.common.srgb import decoded
 from scenegen.objects.meshes.clean import normalised
 from scenegen.objects.meshes.errors import BadMeshError
 
@@ -90,7 +91,7 @@ def colors_of(mesh: Any, vertex_colors_are_linear: bool) -> Array:
     if visual.kind in ("vertex", "face"):
         stored = visual.vertex_colors[faces] if visual.kind == "vertex" else visual.face_colors
         rgb = np.asarray(stored, np.float64)[..., :3] / 255
-        linear = rgb if vertex_colors_are_linear else linear_rgb(rgb)
+        linear = rgb if vertex_colors_are_linear else decoded(rgb)
         return ones * (linear if linear.ndim == 3 else linear[:, None])
     if visual.kind != "texture":
         return ones
@@ -100,12 +101,7 @@ def colors_of(mesh: Any, vertex_colors_are_linear: bool) -> Array:
     colors = ones if factor is None else ones * (np.asarray(factor, np.float64)[:3] / 255)
     if image is not None and visual.uv is not None:
         texels = trimesh.visual.color.uv_to_interpolated_color(visual.uv, image)
-        return np.asarray(colors * linear_rgb(texels[:, :3].astype(np.float64) / 255)[faces])
+        return np.asarray(colors * decoded(texels[:, :3].astype(np.float64) / 255)[faces])
     if factor is None and image is None and hasattr(material, "diffuse"):
-        return np.asarray(ones * linear_rgb(np.asarray(material.diffuse, np.float64)[:3] / 255))
+        return np.asarray(ones * decoded(np.asarray(material.diffuse, np.float64)[:3] / 255))
     return colors
-
-
-def linear_rgb(srgb: Array) -> Array:
-    """Decode sRGB (IEC 61966-2-1), 0 to 1."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import trimesh
 
+from scenegen.common.srgb import decoded
 from scenegen.objects.furnishing import Paint, Texture
-from scenegen.objects.meshes.colors import colors_of, linear_rgb, matched, read_triangles
+from scenegen.objects.meshes.colors import colors_of, matched, read_triangles
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.read import read_bytes
 from scenegen.objects.solids import Array
@@ -106,7 +107,7 @@ def _texture(mesh: Any) -> Texture | None:
             picture = picture.reduce(-(-max(picture.size) // KEPT_PIXELS))
     except Exception as error:  # Pillow raises what its formats meet
         raise BadMeshError("texture", f"{type(error).__name__}: {error}", "a picture") from error
-    color = linear_rgb(np.asarray(picture, np.float64)[::-1] / 255)
+    color = decoded(np.asarray(picture, np.float64)[::-1] / 255)
     factor = getattr(material, "baseColorFactor", None)
     color = color if factor is None else color * (np.asarray(factor, np.float64)[:3] / 255)
     return Texture(

@@ -13,6 +13,7 @@ import OpenEXR
 from PIL import Image
 
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.srgb import decoded
 from scenegen.rendering.materials.material import Array, Material, slopes_of
 
 Result = TypeVar("Result")
@@ -165,12 +166,12 @@ def read_maps(maps: MapFiles) -> Material:
     """Return a material from its files. Raises FileFormatError where one cannot be read."""
     fields = {kind: _opened(path, _pixels) for kind, path in maps.files}
     color = fields["color"]
-    linear = np.where(color <= 0.04045, color / 12.92, ((color + 0.055) / 1.055) ** 2.4)
     rough = fields["roughness"].mean(axis=2) if "roughness" in fields else 0.6
     height = _height(fields["normal"], maps.metres) if "normal" in fields else None
     metallic = float(fields["metallic"].mean()) if "metallic" in fields else 0.0
     return Material(
-        np.asarray(linear, np.float32), rough, None, None if height is None else slopes_of(height),
+        decoded(color).astype(np.float32), rough, None,
+        None if height is None else slopes_of(height),
         metallic=round(metallic), metres=maps.metres,
     )  # fmt: skip
 

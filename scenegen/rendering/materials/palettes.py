@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from scenegen.common.srgb import decoded
 from scenegen.objects.families.parts.draws import chance, pick, span
 
 Color = tuple[float, float, float]  # linear RGB, 0 to 1
@@ -88,7 +89,6 @@ def _colors(row: str) -> tuple[Color, ...]:
 
 
 def linear(name: str) -> Color:
-    """Decode a colour of six hexadecimal digits, sRGB (IEC 61966-2-1)."""
-    values = [int(name[i : i + 2], 16) / 255 for i in (0, 2, 4)]
-    r, g, b = (v / 12.92 if v <= 0.04045 else ((v + 0.055) / 1.055) ** 2.4 for v in values)
+    """Decode a colour of six hexadecimal digits, sRGB."""
+    r, g, b = decoded([int(name[i : i + 2], 16) / 255 for i in (0, 2, 4)]).tolist()
     return r, g, b

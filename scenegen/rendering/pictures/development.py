@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.common.srgb import encoded
 from scenegen.rendering.ground_truth import encode_image
 
 Array = NDArray[Any]
@@ -74,10 +75,6 @@ def evened(exposed: Array) -> Array:
 def tone(exposed: Array, white: float, noise: Array | None = None) -> Array:
     """Return exposed radiance as sRGB, 0 to 1 where it is not brighter than white."""
     curve = exposed * (1 + exposed / white**2) / (1 + exposed)
-    curve = np.maximum(curve, 0.0)
-    encoded = np.where(
-        curve <= 0.0031308, 12.92 * curve, 1.055 * np.maximum(curve, 1e-9) ** (1 / 2.4) - 0.055
-    )
-    encoded = np.clip(encoded, 0.0, 1.0)
-    encoded += CONTRAST * (encoded * encoded * (3 - 2 * encoded) - encoded)
-    return np.asarray(np.clip(encoded if noise is None else encoded + noise, 0.0, 1.0))
+    y = encoded(curve)
+    y += CONTRAST * (y * y * (3 - 2 * y) - y)
+    return np.asarray(np.clip(y if noise is None else y + noise, 0.0, 1.0))

@@ -10,7 +10,7 @@ import png
 from numpy.typing import NDArray
 
 from scenegen.common.errors import SpecError
-from scenegen.rooms.preview import srgb
+from scenegen.common.srgb import encoded
 from scenegen.rooms.reader import Room
 
 Array = NDArray[Any]
@@ -40,11 +40,7 @@ class Encoding:
             hint = f"use --exposure {0.9 * self.exposure / brightest:.2g}, or --format exr"
             where = f"row {room.index}: radiance"
             raise SpecError(where, f"{brightest:.4g} with this exposure", "at most 1", hint)
-        return (
-            np.asarray(srgb(radiance))
-            if self.curve == "srgb"
-            else np.asarray(np.clip(radiance, 0, 1))
-        )
+        return encoded(radiance) if self.curve == "srgb" else np.asarray(np.clip(radiance, 0, 1))
 
     def color_bytes(self, room: Room) -> NDArray[np.uint8]:
         """Return the image in 8 bits, (H, W, 3). Raises SpecError."""
