@@ -22,7 +22,7 @@ from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pictures.assets import environment_of, materials_of
 from scenegen.rendering.pictures.denoiser import denoised
 from scenegen.rendering.pictures.development import develop
-from scenegen.rendering.pictures.lights import Window, lights_of
+from scenegen.rendering.pictures.lights import Lights, Window, lights_of
 from scenegen.rendering.pictures.matter import gather_matter
 from scenegen.rendering.pictures.paths import Camera, trace_paths
 from scenegen.rendering.pictures.sky import SUNLESS, Outside, outside, sun_height
@@ -41,11 +41,16 @@ LANES = 2  # of a pixel, at most
 def trace_pictures(batch: SceneBatch, names: Sequence[str], variant: str) -> dict[str, Array]:
     """Return pictures, (B, H, W, 3), in the spec's image type, and what else `names` ask for."""
     mi.set_variant(variant)
-    found = [_trace_one(batch, b, names) for b in range(len(batch))]
+    found: list[dict[str, Array]] = []
+    for b in range(len(batch)):
+        if b == 0 or batch.index[b] != batch.index[b - 1]:  # views of a room share it
+            room = _lit_room(batch, b)
+        found.append(_trace_one(batch, b, room, names))
     return {name: np.stack([one[name] for one in found]) for name in names}
 
 
-def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Array]:
+def _lit_room(batch: SceneBatch, b: int) -> tuple[Surfaces, Lights, float]:
+    """Return what an image's room holds, its lights, and the mean radiance of its walls."""
     assert batch.interior is not None
     spec = batch.spec
     interior = from_json(Interior, batch.interior[b], "interior")
@@ -59,11 +64,15 @@ def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Arr
     surfaces = surfaces_of(matter, lights.by_area)
     x, y, z = interior.size
     # Of walls that reflect half of the light, the mean radiance in all directions.
-    mean = lights.flux / (2 * np.pi * (x * y + y * z + z * x))
-    camera = device_camera(batch, b)
-    stream = int(batch.view[b])
-    seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, stream)
+    return surfaces, lights, lights.flux / (2 * np.pi * (x * y + y * z + z * x))
 
+
+def _trace_one(
+    batch: SceneBatch, b: int, room: tuple[Surfaces, Lights, float], names: Sequence[str]
+) -> dict[str, Array]:
+    spec, (surfaces, lights, mean) = batch.spec, room
+    camera = device_camera(batch, b)
+    seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, int(batch.view[b]))
     places = sample_positions(spec.spp)
     lanes = max(n for n in range(1, LANES + 1) if spec.spp % n == 0)
     index = dr.arange(mi.UInt32, spec.height * spec.width * lanes)
@@ -80,8 +89,8 @@ def _trace_one(batch: SceneBatch, b: int, names: Sequence[str]) -> dict[str, Arr
     dr.eval(planes)  # at once: each would trace the paths again
     values = np.stack([np.asarray(plane) for plane in planes], -1)
     values = np.nan_to_num(values).reshape(spec.height, spec.width, lanes, 10)
-    mean = values.sum(axis=2, dtype=np.float64) / spec.spp
-    radiance, albedo, normal, hit = np.split(mean, (3, 6, 9), axis=-1)
+    pixels = values.sum(axis=2, dtype=np.float64) / spec.spp
+    radiance, albedo, normal, hit = np.split(pixels, (3, 6, 9), axis=-1)
     if spec.denoise:
         radiance = np.maximum(denoised(radiance, albedo, normal), 0.0)
     noise = None
