@@ -1,12 +1,8 @@
 """Where furniture stands: along walls, about tables, on surfaces, on the floor.
 
-A room is filled in steps. First comes what the room is for, such as a table with its chairs; then
-what stands along walls and hangs on them; then small things on all surfaces, until the room holds
-as many objects as it should. A thing for which there is no place is left out, and another one is
-tried.
+A thing for which there is no place is left out, and another one is tried.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -30,36 +26,8 @@ TURNS = {"west": 0.25, "east": 0.75, "north": 0.0, "south": 0.5}  # of fronts th
 BEHIND = 0.03  # metres between a wall and what stands along it
 DOOR_CLEAR, FRONT_CLEAR = 0.85, 0.55  # metres that stay free before doors and before furniture
 RUG_TOP = 0.03  # metres, above all rugs
-SILL_DEPTH = 0.14  # of a window's sill, inside the wall's plane
-TOP = 1.0  # least height of a wall's free part for a picture's lower edge
-FILL_TRIES = 400
-# What stands on what, by family and with weights; "sill" and "floor" are the room's.
-ON_TOP: dict[str, dict[str, float]] = {
-    "table": {"plate": 2, "cup": 3, "mug": 3, "bowl": 3, "bottle": 2, "can": 1, "vase": 2,
-              "book": 2, "plant": 1, "cap": 0.3, "basket": 0.3},
-    "coffee_table": {"book": 4, "cup": 2, "mug": 2, "vase": 2, "bowl": 2, "plant": 1, "can": 0.5},
-    "desk": {"book": 4, "books": 3, "screen": 3, "lamp": 3, "mug": 3, "cup": 1, "can": 1,
-             "plant": 1, "box": 0.5, "cap": 0.3, "bottle": 0.5},
-    "shelf": {"books": 10, "book": 4, "vase": 2, "box": 1.5, "plant": 1.5, "bowl": 1, "cup": 1,
-              "bottle": 0.5, "can": 0.5, "plate": 0.3, "basket": 1, "cap": 0.2, "mug": 0.7},
-    "cabinet": {"lamp": 3, "vase": 3, "plant": 3, "books": 2, "book": 2, "bowl": 2, "screen": 1,
-                "box": 0.5, "bottle": 0.5, "basket": 0.5},
-    "nightstand": {"lamp": 4, "book": 3, "mug": 1, "cup": 1, "plant": 1, "bottle": 0.3},
-    "sofa": {"cushion": 5, "book": 0.3, "bag": 0.2},
-    "armchair": {"cushion": 2, "book": 0.2},
-    "bed": {"cushion": 3, "book": 0.3, "bag": 0.2},
-    "chair": {"bag": 0.5, "cap": 0.3, "book": 0.4},
-    "stool": {"plant": 2, "book": 2, "mug": 1, "vase": 1},
-    "sill": {"plant": 5, "vase": 2, "book": 0.5, "cup": 0.5, "bowl": 0.5},
-    "floor": {"bag": 2, "box": 2, "basket": 2, "stool": 0.5},
-}  # fmt: skip
-SEATS = ("chair", "sofa", "armchair", "bed", "stool")
-INSIDE = ("shelf",)  # families on all of whose surfaces things stand; others have a top
-HIGHEST = 1.5  # metres of a top on which small things stand
 TELEVISION = 0.4  # metres, less than half the width of a television
-MOST_LAMPS = 2  # on tables and the like; more of them burn a picture
-MOST_ON_FLOOR = 5  # small things on the floor
-UPRIGHT_FRONT = ("books", "screen", "cushion", "lamp")  # look to the front
+TOP = 1.0  # least height of a wall's free part for a picture's lower edge
 
 
 @dataclass
@@ -386,7 +354,7 @@ class Arranger:
     def screen_on(self, number: int) -> int:
         """Put a screen on furniture, looking to its front."""
         screen, place = self.member("screen"), self.space.placed[number - 1]
-        if screen is None or place.piece.height > 1.1 or not _suits(screen, place.piece):
+        if screen is None or place.piece.height > 1.1 or not suits(screen, place.piece):
             return 0
         at = place.box.point(self.draws.span(-0.15, 0.15), -0.3 * place.box.half[1])
         return self.on_surface(screen, number, at, place.box.turns)
@@ -403,12 +371,12 @@ class Arranger:
         turns = stepped_turn(self.draws.unit()) if turns is None else turns
         for y, *sides in reversed(below.piece.surfaces):
             box = box_at(piece, *at, below.box.bottom + y + ON, turns)
-            if self._on(box, below.box, sides) and self.space.free(box, parent):
+            if self.stands(box, below.box, sides) and self.space.free(box, parent):
                 return self.space.put(piece, box, parent)
         return 0
 
     @staticmethod
-    def _on(box: Box, place: Box, sides: Sequence[float]) -> bool:
+    def stands(box: Box, place: Box, sides: Sequence[float]) -> bool:
         """Return whether a box stands wholly on a rectangle (x0, x1, z0, z1) of an object."""
         x0, x1, z0, z1 = sides
         x, z = place.local(box.x, box.z)
@@ -417,111 +385,8 @@ class Arranger:
             x0 <= x - reach[0] and x + reach[0] <= x1 and z0 <= z - reach[1] and z + reach[1] <= z1
         )
 
-    def fill(self) -> None:
-        """Put small things on surfaces until the room holds what it should."""
-        for _ in range(FILL_TRIES):
-            if self.space.full:
-                return
-            surfaces = self._surfaces()
-            kind, parent, y, sides = self.draws.pick(
-                [surface for surface, _ in surfaces], [weight for _, weight in surfaces]
-            )
-            weights = ON_TOP[kind]
-            if self.other and kind not in SEATS:
-                weights = {**weights, self.other: sum(weights.values())}
-            family = self.draws.pick(tuple(weights), tuple(weights.values()))
-            if kind == "floor":
-                self.on_floor(family)
-            elif kind == "sill":
-                self._on_sill(family, sides)
-            else:
-                self._small(family, parent, y, sides)
 
-    def _surfaces(self) -> list[tuple[tuple[str, int, float, Sequence[float]], float]]:
-        """Return surfaces as (family, number, height, sides), with weights."""
-        found: list[tuple[tuple[str, int, float, Sequence[float]], float]] = []
-        carried = [thing.stands_on for thing in self.space.placed]
-        for number, thing in enumerate(self.space.placed, start=1):
-            family = thing.piece.family
-            if family not in ON_TOP:
-                continue
-            top = max((surface[0] for surface in thing.piece.surfaces), default=0.0)
-            for y, *sides in thing.piece.surfaces:
-                if family not in INSIDE and (
-                    (y < top - 0.01 and family not in SEATS) or y > HIGHEST
-                ):
-                    continue
-                area = (sides[1] - sides[0]) * (sides[3] - sides[2])
-                weight = min(area, 0.8) * (0.3 if family in SEATS else 1.0)
-                found.append(
-                    ((family, number, y, sides), weight / (1 + 0.1 * carried.count(number)))
-                )
-        for hole in self.room.openings:
-            if hole.kind == "window":
-                sill = (hole.left, hole.right, hole.bottom, float(WALLS.index(hole.wall)))
-                found.append((("sill", 0, hole.bottom, sill), 0.08))
-        astray = sum(
-            t.piece.family in (*ON_TOP["floor"], self.other) and not t.stands_on
-            for t in self.space.placed
-        )
-        if astray < MOST_ON_FLOOR:
-            found.append((("floor", 0, 0.0, ()), 0.06))
-        return found
-
-    def _small(self, family: str, parent: int, y: float, sides: Sequence[float]) -> int:
-        lamps = sum(thing.piece.family == "lamp" for thing in self.space.placed)
-        if family == "lamp" and lamps >= MOST_LAMPS:
-            return 0
-        piece = self.piece(family)
-        below = self.space.placed[parent - 1]
-        if piece is None or self._many(family, parent) or not _suits(piece, below.piece):
-            return 0
-        place = below.box
-        x0, x1, z0, z1 = sides
-        for _ in range(4):
-            turns = place.turns + stepped_turn(
-                self.draws.span(-0.06, 0.06) if family in UPRIGHT_FRONT else self.draws.unit()
-            )
-            reach = Box(0, 0, piece.half, 0, 1, turns - place.turns).reach()
-            if 2 * reach[0] > x1 - x0 or 2 * reach[1] > z1 - z0:
-                continue
-            x = self.draws.span(x0 + reach[0], x1 - reach[0])
-            z = self.draws.span(z0 + reach[1], z1 - reach[1])
-            if family == "cushion":
-                z = z0 + reach[1]
-            elif family == "books":
-                z = min(z, z0 + reach[1] + 0.03)
-            at = place.point(x, z)
-            box = box_at(piece, *at, place.bottom + y + ON, turns)
-            if self._on(box, place, sides) and self.space.free(box, parent):
-                return self.space.put(piece, box, parent)
-        return 0
-
-    def _many(self, family: str, parent: int) -> bool:
-        """Return whether an object carries enough of a family."""
-        most = {"screen": 1, "lamp": 1, "bag": 1, "cap": 1, "box": 3, "cushion": 4, "vase": 2,
-                "basket": 2, "books": 12, "plate": 6}  # fmt: skip
-        same = sum(
-            thing.stands_on == parent and thing.piece.family == family
-            for thing in self.space.placed
-        )
-        return same >= most.get(family, 4)
-
-    def _on_sill(self, family: str, sides: Sequence[float]) -> int:
-        left, right, height, wall = sides
-        piece = self.piece(family)
-        name = WALLS[int(wall)]
-        if piece is None or max(piece.half) > SILL_DEPTH or piece.height > 0.5:
-            return 0
-        turns = TURNS[name]
-        along = self.draws.span(left + piece.half[0], right - piece.half[0])
-        x, z = self.wall_place(name, along, SILL_DEPTH - max(piece.half) * 0.98)
-        box = box_at(piece, x, z, height + 0.015625 + ON, turns)
-        # It may reach into the window's opening, which is as deep as the wall.
-        return self.space.put(piece, box, 0) if self.space.free(box) else 0
-
-
-def _suits(piece: Piece, below: Piece) -> bool:
+def suits(piece: Piece, below: Piece) -> bool:
     """Return whether a screen is a monitor on a desk, or a television elsewhere."""
     return piece.family != "screen" or (piece.half[0] < TELEVISION) == (below.family == "desk")
 
@@ -537,112 +402,3 @@ def _above(box: Box, other: Box) -> bool:
     (a, b) = other.half
     local = (other.local(*corner) for corner in box.corners())
     return all(abs(x) <= a - 0.02 and abs(z) <= b - 0.02 for x, z in local)
-
-
-def furnish(arranger: Arranger) -> None:
-    """Fill a room with what it is for, and then with small things."""
-    room, space, draws = arranger.room, arranger.space, arranger.draws
-    for hole in room.openings:
-        if hole.kind == "door":
-            middle, half = (hole.left + hole.right) / 2, (hole.right - hole.left) / 2
-            x, z = arranger.wall_place(hole.wall, middle, DOOR_CLEAR / 2)
-            space.kept.append(Box(x, z, (half, DOOR_CLEAR / 2), 0.0, 2.0, TURNS[hole.wall]))
-    small = max(3, space.most // 3)  # places for small things
-    whole, space.most = space.most, space.most - small
-    {"living": _living, "dining": _dining, "bedroom": _bedroom, "study": _study}[room.kind](
-        arranger
-    )
-    arranger.curtains()
-    for step in draws.shuffled(
-        ("shelf", "cabinet", "picture", "tall_plant", "clock", "floor", "shelf", "picture",
-         "floor_lamp", "armchair", "picture", "rug", "picture")
-    ):  # fmt: skip
-        if step == "picture":
-            arranger.on_wall(step, 1.45, 1.75)
-        elif step == "clock" and draws.chance(0.5):
-            arranger.on_wall(step, 1.7, 2.0)
-        elif step in ("shelf", "cabinet"):
-            arranger.against_wall(step, front=0.75)
-        elif step == "floor":
-            arranger.on_floor(draws.pick(("box", "bag", "basket", "stool")))
-        elif step in ("tall_plant", "floor_lamp"):
-            arranger.on_floor(step, corner=True)
-        elif step == "armchair" and draws.chance(0.3):
-            arranger.in_corner(step)
-        elif step == "rug" and not arranger.kinds.get("rug") and draws.chance(0.5):
-            width, _, depth = space.size
-            x, z = draws.span(0.3, 0.7) * width, draws.span(0.3, 0.7) * depth
-            arranger.rug(x, z, draws.pick((0.0, 0.25)))
-    space.most = whole
-    arranger.fill()
-
-
-def _living(arranger: Arranger) -> None:
-    """Put a sofa along a wall, a table before it on a rug, and a screen opposite."""
-    draws, space = arranger.draws, arranger.space
-    sofa = arranger.against_wall("sofa", front=0.9, middle=True)
-    if not sofa:
-        arranger.table_with_chairs()
-        return
-    box = space.placed[sofa - 1].box
-    space.kept.pop()
-    if draws.chance(0.7):
-        arranger.rug(*box.point(0.0, box.half[1] + 0.8), box.turns)
-    table = arranger.piece("coffee_table", 1)
-    if table is not None and draws.chance(0.85):
-        for away in (0.38, 0.5, 0.3, 0.65, 0.8):
-            x, z = box.point(draws.span(-0.1, 0.1), box.half[1] + away + table.half[1])
-            if arranger.stand(table, box_at(table, x, z, 0.0, box.turns)):
-                break
-    for side in draws.shuffled((-1, 1)):
-        if draws.chance(0.45):
-            arranger.beside(sofa, draws.pick(("floor_lamp", "tall_plant", "nightstand")), side)
-    opposite = [w for w in WALLS if math.isclose(abs(TURNS[w] - box.turns), 0.5)]
-    cabinet = arranger.against_wall("cabinet", opposite, middle=True)
-    if cabinet and draws.chance(0.8):
-        any(arranger.screen_on(cabinet) for _ in range(4))
-    if draws.chance(0.4):
-        arranger.in_corner("armchair")
-    if draws.chance(0.4):
-        arranger.table_with_chairs()
-
-
-def _dining(arranger: Arranger) -> None:
-    """Put a table with chairs below a lamp, and a cabinet along a wall."""
-    table = arranger.table_with_chairs()
-    if table and arranger.draws.chance(0.6):
-        box = arranger.space.placed[table - 1].box
-        arranger.hang("pendant", box.x, box.z)
-    arranger.against_wall("cabinet", middle=True)
-
-
-def _bedroom(arranger: Arranger) -> None:
-    """Put a bed with its head to a wall, with night stands, and a cabinet."""
-    bed = arranger.against_wall("bed", front=0.5, middle=True)
-    if bed:
-        for side in (-1, 1):
-            if arranger.draws.chance(0.8):
-                arranger.beside(bed, "nightstand", side)
-        if arranger.draws.chance(0.4):
-            box = arranger.space.placed[bed - 1].box
-            arranger.rug(*box.point(0.0, box.half[1] + 0.7), box.turns)
-    arranger.against_wall("cabinet")
-    if arranger.draws.chance(0.5):
-        _desk(arranger)
-
-
-def _study(arranger: Arranger) -> None:
-    """Put a desk with a chair along a wall, a shelf, and perhaps a sofa."""
-    _desk(arranger)
-    arranger.against_wall("shelf", front=0.75)
-    if arranger.draws.chance(0.4):
-        arranger.against_wall("sofa", front=0.6)
-
-
-def _desk(arranger: Arranger) -> None:
-    """Put a desk along a wall with a screen on it, and a chair before it."""
-    desk = arranger.against_wall("desk", front=0.9)
-    if desk:
-        arranger.seat_at(desk)
-        if arranger.draws.chance(0.8):
-            any(arranger.screen_on(desk) for _ in range(4))

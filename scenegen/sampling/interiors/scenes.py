@@ -23,8 +23,9 @@ from scenegen.objects.catalogue import Objects, furniture_models
 from scenegen.objects.furniture import Piece, piece
 from scenegen.objects.meshes.as_furniture import OBJECT
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.sampling.interiors.arranging import Arranger, furnish
+from scenegen.sampling.interiors.arranging import Arranger
 from scenegen.sampling.interiors.draws import Draws
+from scenegen.sampling.interiors.recipes import furnish
 from scenegen.sampling.interiors.rooms import Room, draw_room
 from scenegen.sampling.interiors.spaces import Placed, Space, turn
 from scenegen.sampling.interiors.viewpoints import draw_cameras

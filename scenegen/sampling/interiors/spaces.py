@@ -15,7 +15,6 @@ from scenegen.objects.furniture import Piece
 
 GAP = 0.004  # metres between two objects side by side
 ON = 2.0**-12  # metres between an object and what it stands on
-FLOOR, WALL, SILL = 0, 0, 0  # what is fixed counts as the room
 
 
 @dataclass(frozen=True)
