@@ -45,7 +45,6 @@ class RowFile:
 
     SCORED: tuple[str, ...] = ()  # columns that scores depend on
     part = ""  # which of the tables of a file
-    has_truth = True  # whether it holds all of SCORED
 
     def __init__(self, opened: OpenFile) -> None:
         """Read the root and take the columns; close the file where it is not what it should be."""
@@ -183,15 +182,18 @@ class RowFile:
                     return str(piece.compression)
         return "none"
 
-    def problems(self) -> list[str]:
-        """Return what is wrong with attributes of the columns, and with the digest of the truth."""
+    def problems(self, whole: bool = True) -> list[str]:
+        """Return what is wrong with attributes of the columns, and with the digest of the truth.
+
+        A file that is not `whole` lacks its truth.
+        """
         with reading(self.path):
             problems = [
                 problem
                 for group, column in self._schema.values()
                 for problem in attribute_problems(group, column)
             ]
-            if self.has_truth and self.stored_truth_digest is not None:
+            if whole and self.stored_truth_digest is not None:
                 scored = [name for name in self.SCORED if name in self._stored]
                 digests = {name: str(self._stored[name].attrs.get(SHA256)) for name in scored}
                 if joint_digest(digests) != self.stored_truth_digest:
