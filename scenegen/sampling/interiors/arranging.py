@@ -417,10 +417,12 @@ class Arranger:
 
     def fill(self) -> None:
         """Put small things on surfaces until the room holds what it should."""
-        for _ in range(FILL_TRIES):
-            if self.space.full:
+        placed, known = self.space.placed, -1
+        for left in range(FILL_TRIES, 0, -1):
+            if self.space.full or len(placed) + left < self.space.most:
                 return
-            surfaces = self._surfaces()
+            if len(placed) != known:  # since surfaces were looked for
+                surfaces, known = self._surfaces(), len(placed)
             kind, parent, y, sides = self.draws.pick(
                 [surface for surface, _ in surfaces], [weight for _, weight in surfaces]
             )
