@@ -170,6 +170,7 @@ def render(
     source = object_source(preset, **objects)
     spec = _with_assets(preset_spec(preset, **chosen, **source.settings), **assets)
     spec, notes = _with_denoiser(spec, chosen)
+    notes += _crowded(spec)
     images = count * len(spec.views)
     started = time.perf_counter()
     handed_out, out = out, _truth_place(out, overwrite) if withhold_truth else out
@@ -246,6 +247,15 @@ def _with_denoiser(
         return spec, []
     text = f"no denoiser: {NOISY_SPP} samples a pixel instead; the extra `denoise` has one"
     return replace(spec, spp=NOISY_SPP), [] if has_denoiser() else [text]
+
+
+def _crowded(spec: "DatasetSpec") -> list[str]:
+    """Return a line that says so where few rooms have room for what is asked for."""
+    from scenegen.sampling.interiors.rooms import CROWDED
+
+    if not spec.interior or spec.objects[1] < CROWDED[1]:
+        return []
+    return [f"few rooms hold {spec.objects[1]} objects: a scene may take minutes, or find no room"]
 
 
 def _telling(lines: list[str], progress: Callable[[int], Any]) -> Callable[[int], None]:

@@ -96,6 +96,7 @@ def verify(
 ) -> None:
     """Check digests and values of every row of a file, and render some rows again.
 
+    Of a file without its truth, check the digests of what it holds.
     Of a folder with a manifest, check the SHA-256 of every file and that every row is there once.
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
@@ -106,7 +107,7 @@ def verify(
     from scenegen.objects.sources import file_objects
     from scenegen.rendering.pictures.places import ASSETS as PLACES
     from scenegen.rooms.reader import RoomsFile
-    from scenegen.rooms.verify import verify_file, verify_set
+    from scenegen.rooms.verify import verify_file, verify_set, verify_withheld
 
     PLACES.use(materials, environment)
     paths: list[tuple[Path, Manifest | None]] = [(Path(file), None)]
@@ -116,6 +117,9 @@ def verify(
     checks: list[Check] = []
     for path, manifest in paths:
         with RoomsFile(path) as rooms, progress_bar(len(rooms), "image") as bar:
+            if not rooms.has_truth:
+                checks += verify_withheld(rooms, bar.update)
+                continue
             if items and rooms.spec.interior:
                 _check_pictures(path, rooms.spec)
             how = (items, device, file_objects(rooms.spec, **meshes), bar.update)

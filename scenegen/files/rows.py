@@ -182,15 +182,18 @@ class RowFile:
                     return str(piece.compression)
         return "none"
 
-    def problems(self) -> list[str]:
-        """Return what is wrong with attributes of the columns, and with the digest of the truth."""
+    def problems(self, whole: bool = True) -> list[str]:
+        """Return what is wrong with attributes of the columns, and with the digest of the truth.
+
+        A file that is not `whole` lacks its truth.
+        """
         with reading(self.path):
             problems = [
                 problem
                 for group, column in self._schema.values()
                 for problem in attribute_problems(group, column)
             ]
-            if self.stored_truth_digest is not None:
+            if whole and self.stored_truth_digest is not None:
                 scored = [name for name in self.SCORED if name in self._stored]
                 digests = {name: str(self._stored[name].attrs.get(SHA256)) for name in scored}
                 if joint_digest(digests) != self.stored_truth_digest:
@@ -320,11 +323,12 @@ def _stacked(file: RowFile, name: str, rows: list[int]) -> Array:
     return np.stack(values) if values else np.asarray(file.read(name, slice(0, 0)))
 
 
-def content_problems(opened: OpenFile, digests: Mapping[str, str]) -> list[str]:
+def content_problems(opened: OpenFile, digests: Mapping[str, str], whole: bool = True) -> list[str]:
     """Return a sentence for each data set that is not as it was sealed, and one for attributes.
 
-    `digests` are the `content.column_digest`s of data sets that the caller has read already. Raises
-    FileFormatError where the attributes cannot be read.
+    `digests` are the `content.column_digest`s of data sets that the caller has read already. The
+    attributes of a file that is not `whole` are those of the whole one. Raises FileFormatError
+    where the attributes cannot be read.
     """
     problems = []
     with reading(opened.path):
@@ -341,7 +345,7 @@ def content_problems(opened: OpenFile, digests: Mapping[str, str]) -> list[str]:
             elif not (isinstance(sealed, str) and sealed == digest):
                 problems.append(f"{name}: values are not those of its attribute {SHA256!r}")
         sealed = opened.file.attrs.get(CONTENT_DIGEST)
-        if not (isinstance(sealed, str) and sealed == content_digest(opened.file)):
+        if whole and not (isinstance(sealed, str) and sealed == content_digest(opened.file)):
             what = "the attributes, or the names, types and shapes of the datasets,"
             problems.append(f"{what} are not those of the attribute {CONTENT_DIGEST!r}")
     return problems

@@ -58,7 +58,7 @@ def further_truth(
         for (depth, normal, ids), i in zip(maps, images, strict=True)
     ]
     if masks is not None:
-        made["object/amodal_mask"] = masks.astype(np.uint8)
+        made["object/amodal_mask"] = masks.view(np.uint8)  # no copy: they are large
         made["object/visible_fraction"] = np.stack(
             [visible_fraction(v.object_id, m) for v, m in zip(views, masks, strict=True)]
         )

@@ -17,7 +17,7 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.content import fingerprint
-from scenegen.files.rows import RowBlock
+from scenegen.files.rows import RowBlock, content_problems
 from scenegen.files.sets.manifest import Manifest
 from scenegen.files.verify import (
     SHOWN,
@@ -43,6 +43,7 @@ from scenegen.rooms.row_rules import (
     row_problems,
     row_rules,
 )
+from scenegen.rooms.withheld import truth_path
 from scenegen.sampling.scenes import most_attempts, sample_scenes
 
 Array = NDArray[Any]
@@ -99,6 +100,25 @@ def verify_file(
         *(listed_check(x, f"{rules[x]} ({len(rooms)} rows)", broken[x]) for x in rules),
         Check("fingerprint", same, rooms.fingerprint if same else "does not match"),
         *_some_again(rooms, items, device, made_of),
+    ]
+
+
+def verify_withheld(
+    rooms: RoomsFile, progress: Callable[[int], Any] = lambda done: None
+) -> list[Check]:
+    """Check what a file that is handed out without truth holds: `withheld.withhold_truth`.
+
+    `progress` as in `verify_file`.
+    """
+    step = max(1, BLOCK_PIXELS // (rooms.spec.height * rooms.spec.width))
+    digests, _ = read_all(rooms, step, lambda block, row: (), progress)
+    wrong = content_problems(rooms.opened, digests, whole=False)
+    layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
+    truth = f"withheld, so nothing else is checked; {truth_path(rooms.path).name} has it"
+    return [
+        listed_check("layout", layout, rooms.problems(whole=False)),
+        listed_check("content", "every value as written, by SHA-256", wrong),
+        Check("truth", True, truth),
     ]
 
 

@@ -1,7 +1,7 @@
 """What a scene looks like in 3D, as plain arrays: surfels, their colours, meshes, and clicks."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -129,7 +129,7 @@ class Mesh:
     Attributes:
         object_id: k for the k-th object.
         triangles: corners, (F, 3, 3), world frame, counter-clockwise seen from outside.
-        color: (3,) uint8, sRGB: its reflectance.
+        color: (3,) uint8, sRGB: its reflectance, or what pictures show of it.
     """
 
     object_id: int
@@ -203,6 +203,21 @@ def scene_meshes(scene: SceneSpec, shape_of: ShapeOf) -> tuple[list[Mesh], list[
         color = srgb_bytes(np.array(item.reflectance))
         meshes.append(Mesh(k, transform_points(place, triangles), color))
     return meshes, list(reasons)
+
+
+def pictured(meshes: Sequence[Mesh], rooms: Sequence[Room]) -> list[Mesh]:
+    """Return the meshes of a scene, each in the mean colour of its pixels in all views.
+
+    A mesh that no view shows keeps its own. Reflectances of closed rooms are constants, which
+    textures replace.
+    """
+    ids = np.concatenate([room.object_id.ravel() for room in rooms])
+    colors = np.concatenate([pixel_colors(room, "Image").reshape(-1, 3) for room in rooms])
+    shown = [colors[ids == mesh.object_id] for mesh in meshes]
+    return [
+        replace(mesh, color=np.rint(some.mean(axis=0)).astype(np.uint8)) if len(some) else mesh
+        for mesh, some in zip(meshes, shown, strict=True)
+    ]
 
 
 def hit_by(

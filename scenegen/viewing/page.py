@@ -5,6 +5,7 @@ A file of rooms has one, with or without predictions beside the truth.
 
 import html
 import threading
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -28,6 +29,7 @@ from scenegen.viewing.geometry import (
     error_colors,
     has_surfel,
     hit_by,
+    pictured,
     pixel_colors,
     scene_meshes,
     surfels_of,
@@ -49,6 +51,7 @@ LAYERS = {  # controls that show a part of the scene
 }
 OF_PREDICTIONS = ("prediction", "beside")
 MOST_REASONS = 3  # why meshes are missing
+MOST_NAMED = 8  # objects, of more of which only classes are named
 CLICK = 3.0  # pixels of the screen by which a click may miss
 NOTHING_CLICKED = "Click on a surfel to read its values."
 STYLE = "margin:0.4em 0.8em;font-size:0.85em;overflow-wrap:anywhere"
@@ -193,6 +196,8 @@ class RoomsPage:
                 check_camera(room)
             self._rows, self._views = rows, {_view_label(room): room for room in rooms}
             self._meshes, self._reasons = scene_meshes(rooms[0].scene, self._shape_of)
+            if rooms[0].scene.interior:
+                self._meshes = pictured(self._meshes, rooms)
             names = list(self._views)
             self.controls["view"].options = [*names, *([ALL_VIEWS] if len(names) > 1 else [])]
             self.controls["view"].value = names[0]
@@ -256,7 +261,7 @@ class RoomsPage:
     def _description(self, shown: Sequence[Room]) -> str:
         """Return what to say of these views, as HTML: scene, objects, scores, missing meshes."""
         scene, (height, width) = shown[0].scene, shown[0].depth.shape
-        names = ", ".join(item.shape for item in scene.objects) or "none"
+        names = _names([item.shape for item in scene.objects])
         views = f"{len(scene.cameras)} views" if len(scene.cameras) > 1 else "1 view"
         size = f"{views} of {width} x {height} pixels"
         parts = [_paragraph(f"Scene {scene.index}: {size}. Objects: {names}.")]
@@ -335,6 +340,14 @@ def scene_rows(rooms: RoomsFile, items: Sequence[int] | None = None) -> list[tup
     for row in rows:
         scenes.setdefault(int(scene_index[row]), []).append(row)
     return [tuple(views) for views in scenes.values()]
+
+
+def _names(shapes: Sequence[str]) -> str:
+    """Return the names of objects, or of many objects their classes and how many are of each."""
+    if len(shapes) <= MOST_NAMED:
+        return ", ".join(shapes) or "none"
+    classes = Counter(shape.partition("/")[0] for shape in shapes)
+    return ", ".join(f"{name} {count}" for name, count in sorted(classes.items()))
 
 
 def _view_label(room: Room) -> str:

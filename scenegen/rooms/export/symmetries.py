@@ -18,7 +18,8 @@ Array = NDArray[np.float64]
 WITHIN = 0.01  # of the size: rounded parts are made of flat faces
 SAMPLES = 8_000  # points of the surface
 NEAREST = 8
-FIRST, TRIED = 24, 500  # of them are turned: few suffice to tell most rotations from symmetries
+FIRST = slice(4), slice(4, 24)  # of them are turned: few tell most rotations from symmetries
+OTHERS = slice(24, 500)
 FEW = 62  # corners of a convex hull whose corners, edges and faces may hold an axis
 ORDERS = range(2, 13)
 ANY_ANGLES = (0.41, 1.13, 2.3)  # radians; no fractions of a turn
@@ -64,19 +65,21 @@ def symmetries(mesh: trimesh.Trimesh) -> Symmetries:
     within = WITHIN * float(mesh.scale)
     middle = mesh.triangles_center.T @ mesh.area_faces / mesh.area  # every symmetry keeps it
 
-    def alike(turn: Rotation) -> bool:
-        for some in (slice(FIRST), slice(FIRST, TRIED)):
-            moved = turn.apply(points[some] - middle) + middle
-            apart, near = tree.query(moved, k=NEAREST)
-            off = np.abs(((moved[:, None] - points[near]) * normals[near]).sum(axis=2))
-            # In the plane of a sample, and close to it. At an edge, others have the other side.
-            if np.maximum(off, apart / 5.0).min(axis=1).max() > within:
-                return False
-        return True
+    def alike(turns: Array, some: slice) -> NDArray[np.bool_]:
+        """Return which rotations, (T, 3, 3), leave some points where the surface is, (T,)."""
+        moved = (points[some] - middle) @ turns.transpose(0, 2, 1) + middle
+        apart, near = tree.query(moved, k=NEAREST)
+        off = np.abs(((moved[..., None, :] - points[near]) * normals[near]).sum(axis=-1))
+        # In the plane of a sample, and close to it. At an edge, others have the other side.
+        return np.asarray(np.maximum(off, apart / 5.0).min(axis=-1).max(axis=-1) <= within)
 
     axes = [np.array(d, float) for d in product((1, 0, -1), repeat=3) if any(d)]
     axes = _each_once(axes)
-    free = [a for a in axes if all(alike(Rotation.from_rotvec(t * a)) for t in ANY_ANGLES)]
+    free = []
+    for axis in axes:
+        about = Rotation.from_rotvec(np.outer(ANY_ANGLES, axis)).as_matrix()
+        if all(alike(about, some).all() for some in (*FIRST, OTHERS)):
+            free.append(axis)
     turns = []
     if len(free) == 1:
         across = np.cross(free[0], np.roll(free[0], 1))
@@ -84,10 +87,13 @@ def symmetries(mesh: trimesh.Trimesh) -> Symmetries:
     elif not free:
         angles = sorted({2.0 * np.pi * k / n for n in ORDERS for k in range(1, n)})
         turns = [t * a for a in _each_once([*axes, *_of_hull(mesh, middle)]) for t in angles]
+    matrices = Rotation.from_rotvec(np.reshape(turns, (-1, 3))).as_matrix()
+    for some in FIRST:
+        matrices = matrices[alike(matrices, some)]
     found: list[Array] = []
-    for turn in map(Rotation.from_rotvec, turns):
-        matrix = turn.as_matrix()
-        if all(np.abs(matrix - other).max() > 0.05 for other in found) and alike(turn):
+    for matrix in matrices:
+        new = all(np.abs(matrix - other).max() > 0.05 for other in found)
+        if new and alike(matrix[None], OTHERS).all():
             found.append(matrix)
     ball = len(free) > 1
     return Symmetries(

@@ -38,10 +38,12 @@ UPRIGHT_FRONT = ("books", "screen", "cushion", "lamp")  # look to the front
 
 def fill(arranger: Arranger) -> None:
     """Put small things on surfaces until the room holds what it should."""
-    for _ in range(FILL_TRIES):
-        if arranger.space.full:
+    placed, known = arranger.space.placed, -1
+    for left in range(FILL_TRIES, 0, -1):
+        if arranger.space.full or len(placed) + left < arranger.space.most:
             return
-        surfaces = _surfaces(arranger)
+        if len(placed) != known:  # since surfaces were looked for
+            surfaces, known = _surfaces(arranger), len(placed)
         kind, parent, y, sides = arranger.draws.pick(
             [surface for surface, _ in surfaces], [weight for _, weight in surfaces]
         )

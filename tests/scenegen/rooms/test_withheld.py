@@ -57,6 +57,15 @@ def test_predictions_of_it_are_scored_with_either_name_of_the_truth(handed_out, 
     assert score([path], moved).comparable
 
 
+def test_a_file_without_truth_passes_until_an_image_changes(handed_out, verdict):
+    code, checks, _ = verdict(handed_out)
+    assert (code, checks["content"], set(checks.values())) == (0, "ok", {"ok"})
+    with h5py.File(handed_out, "r+") as file:
+        file["image"][0, 0, 0] += 1
+    code, checks, _ = verdict(handed_out)
+    assert (code, checks["content"]) == (1, "FAIL")
+
+
 def test_what_cannot_be_withheld_is_refused(handed_out, tmp_path):
     with refused(FileFormatError, str(handed_out)):
         withhold_truth(handed_out, tmp_path / "again.h5")

@@ -19,6 +19,7 @@ from scenegen.viewing.geometry import (
     check_camera,
     error_colors,
     hit_by,
+    pictured,
     pixel_colors,
     scene_meshes,
     shapes_of,
@@ -145,3 +146,13 @@ def test_impossible_cameras_are_refused(rooms, changes):
     check_camera(rooms[0])
     with pytest.raises(FileFormatError):
         check_camera(replace(rooms[0], **changes))
+
+
+def test_meshes_of_closed_rooms_look_as_their_pictures(interior_path):
+    with open_rooms(interior_path) as rooms:
+        room = rooms[0]
+        meshes, _ = scene_meshes(room.scene, shapes_of(rooms.spec))
+    shown = {mesh.object_id: mesh.color for mesh in pictured(meshes, [room])}
+    for k in np.unique(room.object_id[room.object_id > 0]):
+        mean = room.image[room.object_id == k].mean(axis=0)
+        assert np.abs(shown[k] - mean).max() <= 1.5
