@@ -121,6 +121,8 @@ def predicted_rooms(
     place_of = {row: i for i, row in enumerate(rows)}
     names = _sortable(scores, predictions.task)
     alone = [(row,) for row in rows]
+    in_metres = isinstance(truth, MeasuredFile) or truth.spec.interior
+    length = "metre" if in_metres else "scene unit"
     scenes = alone if isinstance(truth, MeasuredFile) else scene_rows(truth, rows)
     orders = {title: worst_first(scores, name, scenes) for title, name in names.items()}
 
@@ -137,7 +139,7 @@ def predicted_rooms(
     def texts(row: int, title: str) -> dict[str, str]:
         values = {name: float(column[place_of[row]]) for name, column in scores.values.items()}
         shown = [n for n in dict.fromkeys((names[title], *SHOWN_SCORES)) if n in values]
-        return {metric(name).title: _text(name, values[name]) for name in shown}
+        return {metric(name).title: _text(name, values[name], length) for name in shown}
 
     return scenes, Predicted(orders, points, normal if predictions.has_normals else None, texts)
 
@@ -213,8 +215,9 @@ def worst_first(
     return sorted(inside, key=place)
 
 
-def _text(name: str, value: float) -> str:
+def _text(name: str, value: float, length: str) -> str:
+    """Return a score with its unit; `length` is that of lengths."""
     if not np.isfinite(value):
         return "none"
-    unit = metric(name).unit
+    unit = metric(name).unit.replace("scene unit", length)
     return f"{value:.4g} {UNITS.get(unit, unit)}".rstrip()
