@@ -285,6 +285,7 @@ Rectangle = tuple[float, float, float, float, float]
 MESH = -1
 CLEAR = 0.12  # metres of free height above a support
 LEAST_SIDE = 0.08  # metres, of a support
+_AT_ONCE = 10_000  # triangles, to take little memory
 _GRID = np.stack(np.meshgrid(*2 * [np.linspace(-1.0, 1.0, 9)]), axis=-1).reshape(-1, 2)
 
 
@@ -325,7 +326,14 @@ def supports(thing: Furnishing) -> list[Rectangle]:
 
 def _is_on(corners: Array, places: Array, y: float) -> bool:
     """Return whether all places (x, z), (P, 2), are on a horizontal surface at y."""
-    a, b, c = corners[np.abs(corners[..., 1] - y).max(axis=1) < 1e-6][..., ::2].swapaxes(0, 1)
+    level = corners[np.abs(corners[..., 1] - y).max(axis=1) < 1e-6][..., ::2]
+    parts = (level[i : i + _AT_ONCE] for i in range(0, len(level), _AT_ONCE))
+    return bool(np.any([_inside(part, places) for part in parts], axis=0).all())
+
+
+def _inside(triangles: Array, places: Array) -> Array:
+    """Return which places, (P, 2), are in one of the triangles, (F, 3, 2)."""
+    a, b, c = triangles.swapaxes(0, 1)
 
     def side(p: Array, q: Array) -> Array:
         """Return on which side of the lines p-q the places lie, seen from above, (F, P)."""
@@ -334,7 +342,7 @@ def _is_on(corners: Array, places: Array, y: float) -> bool:
 
     u, v, w = side(b, c), side(c, a), side(a, b)
     inside = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0))
-    return bool(inside.any(axis=0).all())
+    return np.asarray(inside.any(axis=0))
 
 
 def _free(corners: Array, first: Array, last: Array, y: float) -> tuple[Array, Array]:

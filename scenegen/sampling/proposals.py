@@ -4,6 +4,7 @@ import heapq
 from collections import Counter, defaultdict, deque
 from collections.abc import Sequence
 
+from scenegen.common.errors import PlacementError
 from scenegen.description.scene_arrays import SceneArrays, joined
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects
@@ -61,7 +62,7 @@ class ProposalQueue:
         Raises PlacementError where MAX_RENDERED proposals of it did.
         """
         if self._taken[item] == MAX_RENDERED:
-            raise refusal(self._spec, item, self._taken[item], self._attempts[item])
+            raise self._refusal(item)
         heapq.heappush(self._stock if self._scenes[item] else self._again, item)
 
     def _ready(self, end: int) -> bool:
@@ -69,6 +70,10 @@ class ProposalQueue:
 
     def _left(self) -> bool:
         return self._begun < len(self._items)
+
+    def _refusal(self, item: int) -> PlacementError:
+        problems = self._objects.problems if self._objects else {}
+        return refusal(self._spec, item, self._taken[item], self._attempts[item], problems)
 
     def _draw(self) -> None:
         """Draw as many proposals as are due: of items in need of another attempt, then new ones.
@@ -81,7 +86,7 @@ class ProposalQueue:
             item = heapq.heappop(self._again)
             first = self._attempts[item]
             if first == self._most:
-                raise refusal(self._spec, item, self._taken[item], first)
+                raise self._refusal(item)
             more = range(first, min(first + max(first, self._retries), self._most))
             tries += [(item, attempt) for attempt in more]
         room = min(

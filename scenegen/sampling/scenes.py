@@ -6,6 +6,7 @@ orientations and places of the objects again.
 """
 
 import itertools
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -117,15 +118,21 @@ def most_attempts(spec: DatasetSpec) -> int:
 
 
 def refusal(
-    spec: DatasetSpec, index: int, placed_but_hidden: int, attempts: int = MAX_ATTEMPTS
+    spec: DatasetSpec,
+    index: int,
+    placed_but_hidden: int,
+    attempts: int = MAX_ATTEMPTS,
+    problems: Mapping[str, str] | None = None,
 ) -> PlacementError:
     """Return the error for item `index`, which got no scene.
 
     Args:
         placed_but_hidden: how many of its proposals found room and were rendered.
         attempts: how many were made.
+        problems: reasons, by name, why models were refused.
     """
     if spec.interior:
+        refused = [f"; {name} was passed over: {why}" for name, why in (problems or {}).items()]
         return PlacementError(
             f"item {index}",
             f"no room for its {item_room(spec, index)[1]} objects in {attempts} proposals"
@@ -133,7 +140,7 @@ def refusal(
             else f"{placed_but_hidden} proposals that show too few objects",
             f"room for all of them, and a camera that sees {LEAST_SEEN}",
             "try fewer --objects, more --classes, a wider --fov, fewer --min-visible-pixels, or"
-            " --views that are less far apart",
+            f" --views that are less far apart{''.join(refused[:1])}",
         )
     objects = int(sample_counts(spec, np.array([index]))[0])
     if placed_but_hidden:

@@ -28,12 +28,14 @@ class CleanMesh:
     Attributes:
         vertices: (V, 3) float32, all different, all used.
         faces: (F, 3) int32; each has an area, and no two have the same vertices.
+        kept: which of the faces given they are, (F,).
         mended: counts of what was removed: unused_vertices, merged_vertices, faces_out_of_range,
             faces_not_finite, degenerate_faces, double_faces.
     """
 
     vertices: Array
     faces: Array
+    kept: Array
     mended: Mapping[str, int]
 
 
@@ -55,11 +57,12 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     if not len(faces):
         raise BadMeshError("faces", f"none, but {len(vertices)} vertices")
     mended: dict[str, int] = {}
+    kept = np.arange(len(faces))
 
     def keep(good: Any, name: str) -> None:
-        nonlocal faces
+        nonlocal faces, kept
         mended[name] = mended.get(name, 0) + int(len(good) - good.sum())
-        faces = faces[good]
+        faces, kept = faces[good], kept[good]
 
     keep(((faces >= 0) & (faces < len(vertices))).all(axis=1), "faces_out_of_range")
     with np.errstate(invalid="ignore"):
@@ -90,7 +93,7 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     mended["merged_vertices"] = int(used.sum()) - len(points)
     faces = number[faces]
     keep(_first_copies(faces), "double_faces")
-    return CleanMesh(points, faces.astype(np.int32), mended)
+    return CleanMesh(points, faces.astype(np.int32), kept, mended)
 
 
 def normalised(vertices: Array, faces: Array) -> Array:

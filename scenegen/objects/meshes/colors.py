@@ -13,10 +13,13 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from scenegen.common.srgb import decoded
-from scenegen.objects.meshes.clean import normalised
+from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
 
 Array = NDArray[Any]
+NEAR = 1e-5  # distance of centres of the same triangle, in bounding radii; or more, of others
+SAME_PLANE = 1e-4  # distance of corners from a triangle's plane, in bounding radii
+CANDIDATES = 8, 64  # triangles that may be of the same polygon; first few, then many
 
 
 def corner_colors(
@@ -31,7 +34,7 @@ def corner_colors(
         up: the axis, "y" or "z", that points up in the file.
         vertices, faces: of the cleaned mesh, (V, 3) and (F, 3).
 
-    Raises BadMeshError as `read_triangles`.
+    Raises BadMeshError as `read_triangles` and `matched`.
     """
     triangles, meshes = read_triangles(data, suffix.lower())
     if not len(triangles):
@@ -72,16 +75,32 @@ def matched(triangles: Array, up: str, vertices: Array, faces: Array) -> tuple[A
     """Return which of a file's triangles each face of the cleaned mesh is, (F,), and the corners of
     both, (F, 3, 3), in the cleaned mesh's frame.
 
-    They are matched by their centres, as cleaning merges and drops some.
+    They are matched by their centres, as cleaning merges and drops some. Of a polygon that is cut
+    in another way, the nearest triangle in the face's plane is taken.
+
+    Raises BadMeshError where the file's triangles have another pose than the mesh.
     """
-    points = triangles.reshape(-1, 3)
-    if up == "z":
-        points = points[:, [0, 2, 1]] * (1, 1, -1)
-    count = len(triangles)
-    theirs = normalised(points, np.arange(3 * count).reshape(-1, 3)).reshape(-1, 3, 3)
+    cleaned = clean_mesh(triangles.reshape(-1, 3), np.arange(3 * len(triangles)), up)
+    theirs = cleaned.vertices.astype(np.float64)[cleaned.faces]
     ours = vertices.astype(np.float64)[faces]
-    match = np.asarray(cKDTree(theirs.mean(axis=1)).query(ours.mean(axis=1))[1])
-    return match, theirs[match], ours
+    low, high = (np.abs(f(theirs, (0, 1)) - f(ours, (0, 1))).max() for f in (np.min, np.max))
+    if max(low, high) > 1e-3:
+        found = "triangles in another pose than trimesh finds"
+        raise BadMeshError("colours", found, hint="export it without bones")
+    tree, centres = cKDTree(theirs.mean(axis=1)), ours.mean(axis=1)
+    distance, match = (np.asarray(x) for x in tree.query(centres))
+    across = np.cross(theirs[:, 1] - theirs[:, 0], theirs[:, 2] - theirs[:, 0])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    far = np.flatnonzero(distance > NEAR)
+    for most in CANDIDATES:
+        count = min(most, len(theirs))
+        near = np.asarray(tree.query(centres[far], np.arange(1, count + 1))[1])
+        offset = ours[far, None] - theirs[near][:, :, :1]
+        height = np.abs((offset * across[near][:, :, None]).sum(axis=3)).max(axis=2)
+        nearest = np.argmin(np.maximum(height, SAME_PLANE), axis=1)  # the first of equals
+        match[far] = near[np.arange(len(far)), nearest]
+        far = far[height.min(axis=1, initial=np.inf) > SAME_PLANE]
+    return cleaned.kept[match], theirs[match], ours
 
 
 def colors_of(mesh: Any, vertex_colors_are_linear: bool) -> Array:
@@ -99,6 +118,10 @@ def colors_of(mesh: Any, vertex_colors_are_linear: bool) -> Array:
     factor = getattr(material, "baseColorFactor", None)  # linear, as glTF has it
     image = getattr(material, "baseColorTexture", getattr(material, "image", None))
     colors = ones if factor is None else ones * (np.asarray(factor, np.float64)[:3] / 255)
+    more = visual.vertex_attributes.get("color")  # those of glTF beside a material
+    if more is not None and vertex_colors_are_linear:
+        most = np.iinfo(more.dtype).max if more.dtype.kind == "u" else 1
+        colors = colors * (more[faces][..., :3].astype(np.float64) / most)
     if image is not None and visual.uv is not None:
         texels = trimesh.visual.color.uv_to_interpolated_color(visual.uv, image)
         return np.asarray(colors * decoded(texels[:, :3].astype(np.float64) / 255)[faces])

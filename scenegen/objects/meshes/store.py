@@ -1,5 +1,6 @@
 """The unit shapes of a folder's models, made when first used and kept in memory for a while."""
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -34,6 +35,7 @@ class MeshStore:
         self._files = {file.name: file for files in folder.models.values() for file in files}
         self._disk = DiskCache(cache_dir)
         self._digests: dict[str, str] = {}
+        self._lacks = False
         self._shapes: Recent[UnitShape] = Recent(MOST_FACES_KEPT)
 
     def __reduce__(self) -> Any:
@@ -75,13 +77,28 @@ class MeshStore:
     def paint(self, name: str) -> Paint | None:
         """Return what a model's file and those beside it say about its surface, if they do.
 
-        Raises BadMeshError as `shape` and `textures.paint_of` do.
+        Raises BadMeshError as `shape`, and where these cannot be read.
         """
         from scenegen.objects.meshes.textures import paint_of  # imports trimesh, which is slow
 
         model = self._load(name)
+        path, up = self._files[name].path, self.folder.up
+        lacking: list[str] = []
         with self._told(name):
-            return paint_of(self._files[name].path, self.folder.up, model.vertices, model.faces)
+            try:
+                paint = paint_of(path, up, model.vertices, model.faces, lacking)
+            except (BadMeshError, MemoryError):
+                raise
+            except Exception as error:  # one bad picture must not stop a run
+                problem = f"{type(error).__name__}: {error}"
+                raise BadMeshError("colours and pictures", problem, "readable ones") from error
+        if lacking and not self._lacks:  # the first tells enough
+            self._lacks = True
+            warnings.warn(
+                f"{name} names {lacking[0]!r}, which cannot be read; such models are plain",
+                stacklevel=2,
+            )
+        return paint
 
     @contextmanager
     def _told(self, name: str) -> Iterator[None]:

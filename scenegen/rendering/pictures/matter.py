@@ -24,6 +24,7 @@ GLOW = "glow"
 ACCENT_SHARE = 0.35  # of rooms in which one wall has another colour
 LAMP_FLUX = 0.018  # of a lamp, in the units of the sky's radiance times square metres
 CEILING_FLUX = 0.13
+ALIGNED = 256  # texels, of which each map begins at a multiple: float32 tells it up to 2**32
 LEAST_GLOW = 0.06  # square metres; what is smaller shines less, not more brightly
 WARM = (1.0, 0.72, 0.44)  # linear RGB of lamps, of some 3000 K
 
@@ -83,7 +84,7 @@ class _Collector:
 
     def textured(self, texture: Texture, owner: str, part: int) -> int:
         """Return the number of the material of a mesh's texture."""
-        key = owner, part
+        key = f"{owner} texture", part
         if key not in self.numbers:
             self.numbers[key] = len(self.materials)
             color, roughness, metallic = texture
@@ -165,14 +166,27 @@ def tables_of(materials: Sequence[Material], of_face: Array) -> Tables:
         row[:4] = first_texel, texels[-1].shape[1], texels[-1].shape[0], one.metres
         row[4:6] = one.metallic, one.specular
         row[12:15] = one.radiance
-        first_texel += texels[-1].size
+        first_texel += _padded(texels[-1].size)
         if one.slopes is not None:
             if id(one.slopes) not in maps:
                 maps[id(one.slopes)] = one.slopes, first_slope
-                first_slope += one.slopes.size
+                first_slope += _padded(one.slopes.size)
             start = maps[id(one.slopes)][1]
             factor = one.bumps / (one.metres * SLOPE_STEPS)
             row[8:12] = start, one.slopes.shape[1], one.slopes.shape[0], factor
     slopes = [values for values, _ in maps.values()] or [np.zeros((1, 1), np.uint32)]
-    flat = (np.concatenate([x.ravel() for x in values]) for values in (texels, slopes))
-    return Tables(of_face.astype(np.uint32), rows, *flat)
+    return Tables(of_face.astype(np.uint32), rows, _joined(texels), _joined(slopes))
+
+
+def _padded(size: int) -> int:
+    return -(-size // ALIGNED) * ALIGNED
+
+
+def _joined(maps: Sequence[Array]) -> Array:
+    """Return the values of maps in one row, each from a multiple of ALIGNED on."""
+    values = np.zeros(sum(_padded(x.size) for x in maps), np.uint32)
+    start = 0
+    for x in maps:
+        values[start : start + x.size] = x.ravel()
+        start += _padded(x.size)
+    return values

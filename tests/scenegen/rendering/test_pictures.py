@@ -202,3 +202,19 @@ def test_an_even_sky_lights_alike_with_and_without_windows():
 def test_the_sun_lights_by_the_cosine():
     found = radiance_of_floor(sun=(np.radians(40), 3.0), spp=2**16)
     assert found == pytest.approx(REFLECTANCE / np.pi * 3.0 * np.sin(np.radians(40)), rel=0.02)
+
+
+def test_maps_of_rooms_begin_where_single_precision_tells_exactly():
+    from scenegen.rendering.pictures.matter import tables_of
+
+    levels = [0.0, 0.2, 0.4, 0.6, 0.8, 1.0]
+    sizes = [1, 4200, 3, 4200, 5, 2]  # 4200**2 > 2**24
+    materials = [
+        Material(np.broadcast_to(np.float32(level), (1 if size < 9 else size, size, 3)), 1.0)
+        for level, size in zip(levels, sizes, strict=True)
+    ]
+    tables = tables_of(materials, np.arange(6))
+    first = tables.rows[:, 0].astype(np.int64)
+    assert first[-1] > 2**25
+    red = np.square((tables.texels[first] & 255) / 255)
+    np.testing.assert_allclose(red, levels, atol=0.005)

@@ -1,6 +1,7 @@
 """Meshes as furniture: their own textures and colours, their size and front, rooms with them."""
 
 import json
+import struct
 import zlib
 
 import h5py
@@ -11,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
+from scenegen.common.srgb import encoded
 from scenegen.objects.catalogue import furniture_models
 from scenegen.objects.families.members import MEMBERS
 from scenegen.objects.furnishing import furnishing
@@ -88,7 +90,8 @@ def test_files_elsewhere_are_not_read(tmp_path, picture, monkeypatch):
     mtl.write_text(mtl.read_text().replace("own.png", picture.format(root=tmp_path)))
     read, real = [], textures.read_bytes
     monkeypatch.setattr(textures, "read_bytes", lambda p: (read.append(p.name), real(p))[1])
-    assert len(store_of(path).paint("thing/a").textures) == 1
+    with pytest.warns(UserWarning, match="secret.png"):
+        assert len(store_of(path).paint("thing/a").textures) == 1
     assert read == ["a.obj", "a.mtl"]
 
 
@@ -135,7 +138,8 @@ def test_too_large_pictures_are_refused_and_large_ones_reduced(tmp_path, monkeyp
     assert "thing/a" in store.problems
     monkeypatch.setattr(limits, "MOST_BYTES", 150)  # too few for the picture, not for the model
     path.with_name("picture.png").write_bytes(b"0" * 151)
-    assert len(store_of(path).paint("thing/a").textures[0].color) == 1
+    with pytest.warns(UserWarning, match="picture.png"):
+        assert len(store_of(path).paint("thing/a").textures[0].color) == 1
 
 
 @pytest.mark.parametrize(("kind", "front"), [("shapenet-v1", 0), ("shapenet-v2", 2), ("folder", 2)])
@@ -226,3 +230,135 @@ def test_rooms_with_meshes_are_verified(own, run):
 )
 def test_classes_that_nobody_has_are_refused(own, refuses, options):
     refuses("render", "--n", 1, "--preset", "interiors", "--objects-root", own, *options)
+
+
+@pytest.mark.parametrize(
+    "line", ["v nan 0 0\nf 5/1 1/1 2/2", "v 99 50 9\nf 5/1 5/1 5/2"], ids=["not finite", "no area"]
+)
+def test_faces_that_cleaning_drops_move_no_picture(tmp_path, line):
+    path = quad(tmp_path / "models")
+    usual = store_of(path).paint("thing/a")
+    path.write_text(f"{path.read_text()}{line}\n")
+    found = store_of(path).paint("thing/a")
+    np.testing.assert_allclose(found.uv, usual.uv, atol=1e-6)
+
+
+@pytest.mark.parametrize("places", ["nan nan", "inf 0", "1e300 -1e300"])
+def test_texture_coordinates_are_finite(tmp_path, places):
+    path = quad(tmp_path / "models")
+    path.write_text(path.read_text().replace("vt 1 1", f"vt {places}"))
+    thing = mesh_furniture(store_of(path), "thing/a").furnished.thing
+    assert np.isfinite(thing.corner_uv).all()
+
+
+def test_faces_of_polygons_cut_otherwise_keep_their_colours(tmp_path):
+    count, rng = 30, np.random.default_rng(1)
+    angle, radius = 2 * np.pi * np.arange(count) / count, rng.uniform(0.3, 1.0, count)
+    points = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
+    ring = list(range(1, count + 1))
+    lines = [f"v {x} {y} {z}" for y in (0, 0.03) for x, z in points]
+    for color, faces in (
+        ("r", [[count + i for i in ring]]),
+        ("g", [ring]),
+        ("b", [[i, i % count + 1, count + i % count + 1, count + i] for i in ring]),
+    ):
+        lines += [f"usemtl {color}", *(f"f {' '.join(map(str, face))}" for face in faces)]
+    (tmp_path / "a.mtl").write_text("newmtl r\nKd 1 0 0\nnewmtl g\nKd 0 1 0\nnewmtl b\nKd 0 0 1\n")
+    (tmp_path / "a.obj").write_text("\n".join(["mtllib a.mtl", *lines]))
+    store = store_of(tmp_path / "a.obj")
+    paint, mesh = store.paint("thing/a"), store.shape("thing/a").mesh
+    heights = mesh.vertices[mesh.faces][..., 1]
+    sides = np.ptp(heights, axis=1) > 1e-6
+    expected = np.where(sides, 2, np.where(heights[:, 0] > 0, 0, 1))
+    palette = paint.textures[0].color[0]
+    shown_colors = palette[(paint.uv[:, 0, 0] * len(palette)).astype(int)]
+    np.testing.assert_array_equal(shown_colors.argmax(axis=1), expected)
+
+
+def test_pictures_of_16_bits_and_options_of_materials(tmp_path):
+    path = quad(tmp_path / "models", material="map_Kd -s 2 2 1 -o 0.5 0 0")
+    place = path.with_name("picture.png")
+    Image.fromarray(np.array([[0, 257 * 128], [257 * 200, 65535]], np.uint16)).save(place)
+    texture = store_of(path).paint("thing/a").textures[0]
+    np.testing.assert_allclose(np.sort(encoded(texture.color[..., 0]).ravel() * 255),
+                               [0, 128, 200, 255], atol=1e-3)  # fmt: skip
+    uv = store_of(path).paint("thing/a").uv
+    np.testing.assert_allclose(np.ptp(uv, axis=1), 2)
+
+
+def test_files_that_are_lacking_are_told_once(tmp_path):
+    path = quad(tmp_path / "models")
+    path.with_name("picture.png").write_text("no picture")
+    with pytest.warns(UserWarning, match="picture.png") as told:
+        paint = store_of(path).paint("thing/a")
+    assert len(told) == 1
+    assert paint.textures[0].color.tolist() == [[[1.0, 1.0, 1.0]]]
+    path.with_name("a.mtl").unlink()
+    with pytest.warns(UserWarning, match="a.mtl"):
+        assert store_of(path).paint("thing/a") is None
+
+
+def rewritten(data, change):
+    """A GLB file whose JSON is changed."""
+    end = 20 + struct.unpack_from("<I", data, 12)[0]
+    document = json.loads(data[20:end])
+    change(document)
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    head = struct.pack(
+        "<4sIIII", b"glTF", 2, 20 + len(text) + len(data) - end, len(text), 0x4E4F534A
+    )
+    return head + text + data[end:]
+
+
+def test_pictures_of_glb_files_are_moved_and_mirrored_as_they_tell(tmp_path):
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorTexture=Image.fromarray(np.array(COLORS, np.uint8)), metallicFactor=1.0,
+        metallicRoughnessTexture=Image.new("RGB", (2, 2), (0, 51, 0)),
+    )  # fmt: skip
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
+    visual = trimesh.visual.TextureVisuals(corners[:, :2], material)
+    square = trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], visual=visual, process=False)
+    data = trimesh.Scene(square).export(file_type="glb")
+
+    def lower_left(change):
+        (tmp_path / "a.glb").write_bytes(rewritten(data, change))
+        store = store_of(tmp_path / "a.glb")
+        paint, mesh = store.paint("thing/a"), store.shape("thing/a").mesh
+        corners = mesh.vertices[mesh.faces].astype(float)
+        assert paint.textures[0][1:] == pytest.approx((0.2, 0.0))
+        color = shown(paint, corners, [-corners.max() / 2] * 2)
+        return np.rint(encoded(color) * 255).astype(int).tolist()
+
+    def moved(**told):
+        def change(document):
+            texture = document["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+            texture["extensions"] = {"KHR_texture_transform": told}
+
+        return change
+
+    def mirrored(document):
+        node = next(node for node in document["nodes"] if "mesh" in node)
+        node["matrix"] = np.diag([-1.0, 1, 1, 1]).ravel().tolist()
+
+    (upper_left, upper_right), (own, lower_right) = COLORS
+    assert lower_left(lambda document: None) == own
+    assert lower_left(mirrored) == lower_right
+    assert lower_left(moved(offset=[0.5, 0])) == lower_right
+    assert lower_left(moved(offset=[0, 0.5])) == upper_left
+    assert lower_left(moved(rotation=np.pi / 2)) == lower_right
+    assert lower_left(moved(scale=[-1, 1])) == lower_right
+    assert lower_left(moved(scale=[-1, -1])) == upper_right
+
+
+def test_vertex_colours_beside_a_material_count(tmp_path):
+    box = trimesh.creation.box((1, 2, 1))
+    box.visual.vertex_colors = [[255, 0, 0, 255]] * len(box.vertices)
+
+    def change(document):
+        document["materials"] = [{}]
+        document["meshes"][0]["primitives"][0]["material"] = 0
+
+    data = trimesh.Scene(box).export(file_type="glb")
+    (tmp_path / "a.glb").write_bytes(rewritten(data, change))
+    assert store_of(tmp_path / "a.glb").paint("thing/a").textures[0].color.tolist() == [[[1, 0, 0]]]
