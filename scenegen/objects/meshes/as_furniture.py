@@ -29,7 +29,7 @@ _ALIKE = {
     "couch": "sofa", "dishwasher": "cabinet", "display": "screen", "dresser": "cabinet",
     "file": "nightstand", "flowerpot": "plant", "jar": "vase", "monitor": "screen",
     "piano": "cabinet", "pillow": "cushion", "pot": "plant", "stove": "nightstand",
-    "television": "screen", "trash bin": "basket", "wardrobe": "cabinet", "washer": "nightstand",
+    "television": "screen", "trash_bin": "basket", "wardrobe": "cabinet", "washer": "nightstand",
 }  # fmt: skip
 # Where fronts look, as signs and columns of the axes that become x and z.
 _TURNED = {"shapenet-v1": ((-1, 2), (1, 0)), "shapenet-v2": ((-1, 0), (-1, 2))}
@@ -37,8 +37,8 @@ _TURNED = {"shapenet-v1": ((-1, 2), (1, 0)), "shapenet-v2": ((-1, 0), (-1, 2))}
 
 def family_like(name: str) -> str:
     """Return the family in whose place a class stands: itself, one alike, or OBJECT."""
-    lower = name.lower().replace(" ", "_")
-    return lower if lower in FAMILIES_FACTS else _ALIKE.get(name.lower(), OBJECT)
+    word = name.lower().replace(" ", "_").replace("-", "_")
+    return word if word in FAMILIES_FACTS else _ALIKE.get(word, OBJECT)
 
 
 def mesh_furniture(store: MeshStore, name: str) -> UnitShape:
