@@ -85,7 +85,7 @@ def _empty(rooms: RoomsFile, row: int) -> Array:
 
 
 def _mask(rooms: RoomsFile, row: int) -> Array:
-    return outline_mask(radiance_of(rooms, row), *_camera(rooms, row))
+    return outline_mask(radiance_of(rooms, row), *_camera(rooms, row), rooms.room_size(row))
 
 
 def cut_out(rooms: RoomsFile, row: int) -> Array:
@@ -247,7 +247,7 @@ def _trees(features: Array, relief: Array) -> Callable[[Array], Array]:
 
 def _left_over(rooms: RoomsFile, row: int) -> Array:
     """Return the size of the picture's residual, reduced to CELLS x CELLS, as a vector."""
-    off, mask = residual(radiance_of(rooms, row), *_camera(rooms, row))
+    off, mask = residual(radiance_of(rooms, row), *_camera(rooms, row), rooms.room_size(row))
     size = np.linalg.norm(off, axis=-1) * mask
     rows, columns = (np.linspace(0, n, CELLS + 1).astype(int)[:-1] for n in size.shape)
     sums = np.add.reduceat(np.add.reduceat(size, rows, axis=0), columns, axis=1)

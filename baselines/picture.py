@@ -6,6 +6,7 @@ the fit show objects. The fit is robust: it begins with all pixels of a wall and
 that lie near it. Only the picture and the camera are read; where the walls are is known.
 """
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -24,28 +25,35 @@ DEGREE = 2
 SMALLEST = 12  # pixels of a blob
 
 
-def outline_mask(image: Array, world_from_camera: Array, fov_y_degrees: float) -> Array:
+def outline_mask(
+    image: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+) -> Array:
     """Return the pixels that show objects, (H, W) bool.
 
     Args:
         image: linear radiance, (H, W, 3).
         world_from_camera: (4, 4).
+        room_size: of a closed room, (3,); None for the paper's room.
     """
-    return residual(image, world_from_camera, fov_y_degrees)[1]
+    return residual(image, world_from_camera, fov_y_degrees, room_size)[1]
 
 
-def residual(image: Array, world_from_camera: Array, fov_y_degrees: float) -> tuple[Array, Array]:
+def residual(
+    image: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+) -> tuple[Array, Array]:
     """Return how far each pixel lies off the fitted shading, (H, W, 3), and the mask (H, W)."""
     height, width = image.shape[:2]
-    depth, normal = empty_room(world_from_camera, fov_y_degrees, height, width)
+    depth, normal = empty_room(world_from_camera, fov_y_degrees, height, width, room_size)
     points = transform_points(world_from_camera, back_project(depth, fov_y_degrees))
-    walls = np.argmax(normal @ world_from_camera[:3, :3].T, axis=-1)
+    places = points if room_size is None else points / room_size
+    facing = normal @ world_from_camera[:3, :3].T
+    walls = np.argmax(np.abs(facing), axis=-1)
     off, mask = np.zeros(image.shape), np.zeros(image.shape[:2], bool)
-    for axis in range(3):
-        wall = walls == axis
+    for axis, far in itertools.product(range(3), (False, True)):
+        wall = (walls == axis) & ((facing[..., axis] < 0) == far)
         if np.count_nonzero(wall) < 4 * (DEGREE + 1) ** 2:
             continue
-        a, b = (2.0 * points[wall][:, k] - 1.0 for k in range(3) if k != axis)
+        a, b = (2.0 * places[wall][:, k] - 1.0 for k in range(3) if k != axis)
         basis = np.stack(
             [a**i * b**j for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)], axis=1
         )

@@ -41,6 +41,7 @@ from metrics.scoring.records import (
     SHAPE_COLUMN,
     AnswerGroups,
     Label,
+    Length,
     Meta,
     Name,
     Number,
@@ -115,6 +116,7 @@ class _Stored:
     answer_groups: AnswerGroups = field(default_factory=dict)
     shown: Shown = "scored_view"
     protocol: str = ""
+    length: Length = "scene unit"
     summary: Any = None
 
 
@@ -167,6 +169,7 @@ def _document(scores: ScoreFile) -> dict[str, Any]:
         "alignment": scores.alignment,
         **({"shown": scores.shown} if scores.task == "rooms" else {}),
         **({"protocol": scores.protocol} if scores.protocol else {}),
+        **({"length": scores.length} if scores.length != "scene unit" else {}),
         "summary": {
             "comparable": scores.comparable,
             "warnings": scores.warnings,
@@ -248,6 +251,7 @@ def _checked(document: Any) -> ScoreFile:
         stored.answer_groups,
         shown=stored.shown,
         protocol=stored.protocol,
+        length=stored.length,
         older=stored.format_version != FORMAT_VERSION,
     )
     _check_meta(scores)

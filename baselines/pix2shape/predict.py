@@ -170,13 +170,15 @@ def write_depths(
 
     Args:
         data: path of the rooms, as the submission records it.
-        depth_of: returns planar depth, (B, S, S), of some rows.
+        depth_of: returns planar depth, (B, S, S), of some rows, which have one field of view.
         how: as for `RoomPredictionWriter`.
     """
-    size, fov = rooms.spec.height, rooms.spec.fov_y_degrees
+    size, fov = rooms.spec.height, rooms.read("camera/fov_y_degrees", slice(None))
+    runs = np.split(np.arange(len(fov)), np.flatnonzero(np.diff(fov)) + 1)
+    batches = (run[places] for run in runs for places in row_batches(len(run), BATCH))
     with RoomPredictionWriter(out, data, **how) as submission:
-        for rows in row_batches(len(rooms), BATCH):
-            depth, normal = enlarged(depth_of(rows), fov, size)
+        for rows in batches:
+            depth, normal = enlarged(depth_of(rows), float(fov[rows[0]]), size)
             normals = np.moveaxis(normal.cpu().numpy(), 1, -1)
             for row, z, n in zip(rows, depth.cpu().numpy(), normals, strict=True):
                 submission.add(int(row), z, n)

@@ -11,7 +11,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from baselines.pix2shape.matching.search import STEPS, reliefs, reprojected
+from baselines.pix2shape.matching.search import STEPS, paper_rooms_only, reliefs, reprojected
 from baselines.pix2shape.network.architecture import RAY_PLANES
 from baselines.pix2shape.network.empty_rooms import NEAREST, Cameras, empty_rooms, planes_of
 from baselines.relief import depth_supervised, predict, training
@@ -51,6 +51,7 @@ class Completion(Relief):
 
     def channels(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
         """As `Relief` says."""
+        paper_rooms_only(targets.room_size)
         size = image.shape[-1]
         with torch.no_grad():
             surface = predicted_depth(self.seen, image, cameras, cameras)

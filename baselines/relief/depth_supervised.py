@@ -25,10 +25,11 @@ def lessons_of(rooms: Rooms, settings: Settings, _folder: Path | None, _progress
     depths = rooms.depth
 
     def target(rows: Tensor) -> tuple[Tensor, Tensor]:
-        poses, depth = rooms.world_from_camera[rows], depths[rows]
-        walls, _, _ = empty_rooms(poses, rooms.fov_of(rows), settings.size)
+        cameras, depth = training.cameras_of(rooms, rows), depths[rows]
+        pose, sizes = cameras.world_from_camera, cameras.room_size
+        walls, _, _ = empty_rooms(pose, cameras.fov_y_degrees, settings.size, sizes)
         surface = depth.isfinite()
-        return torch.where(surface, walls - depth, 0), surface.float()
+        return torch.where(surface, (walls - depth) / cameras.edge, 0), surface.float()
 
     return Lessons(torch.arange(len(rooms)), target, inside=rooms.inside)
 

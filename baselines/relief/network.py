@@ -1,8 +1,9 @@
 """The network that gives the relief of a room from one image and its camera.
 
-Relief is how far a surface lies before the empty room, along the viewing axis, in scene units:
-depth = depth of the empty room - relief. So networks are told where floor and walls are, as
-the baseline empty-room is.
+Relief is how far a surface lies before the empty room, along the viewing axis: depth = depth of the
+empty room - relief. So networks are told where floor and walls are, as the baseline empty-room is.
+They give relief in edges of the room, of which the paper's is a scene unit, and that of a closed
+room is its longest one.
 """
 
 import itertools
@@ -67,8 +68,10 @@ def predicted_depth(
     network: nn.Module, image: Tensor, cameras: Cameras, targets: Cameras
 ) -> Tensor:
     """Return planar depth, (B, S, S), scene units: what the network gives, before the walls."""
-    relief = network(image, cameras, targets)
-    walls, entry, _ = empty_rooms(targets.world_from_camera, targets.fov_y_degrees, image.shape[-1])
+    relief = network(image, cameras, targets) * targets.edge
+    walls, entry, _ = empty_rooms(
+        targets.world_from_camera, targets.fov_y_degrees, image.shape[-1], targets.room_size
+    )
     return torch.maximum(walls - torch.where(relief > FLAT, relief, 0), entry)
 
 

@@ -12,7 +12,7 @@ from baselines.pix2shape.predict import Progress, write_depths
 from baselines.relief.network import Card, predicted_depth
 from baselines.training.checkpoint import Method, bundled, load_weights
 from baselines.training.images import Array, check_reducible
-from baselines.training.rooms import camera_poses, input_views, room_images
+from baselines.training.rooms import camera_poses, input_views, room_images, room_sizes
 from scenegen import open_rooms
 from scenegen.files.new_file import check_writable
 
@@ -43,17 +43,20 @@ def write_submission(
     size, from_first = card.settings.size, network.from_first_view
     with open_rooms(data) as rooms:
         check_reducible(data, rooms.spec.height, rooms.spec.width, size)
-        poses = torch.from_numpy(camera_poses(rooms).astype(np.float32))
-        fov, source = rooms.spec.fov_y_degrees, np.arange(len(rooms))
+        poses = torch.from_numpy(camera_poses(rooms, closed=True).astype(np.float32))
+        fov = rooms.read("camera/fov_y_degrees", slice(None))
+        sizes = room_sizes(rooms) if rooms.spec.interior else None
+        source = np.arange(len(rooms))
         if from_first:
             inputs, place = input_views(rooms)
             source = inputs[place]
 
         def depth(rows: Array) -> Tensor:
             image = room_images(rooms, source[rows], size)
-            cameras = target_cameras = Cameras(poses[source[rows]], fov)
+            own = float(fov[rows[0]]), None if sizes is None else sizes[rows]
+            cameras = target_cameras = Cameras(poses[source[rows]], *own)
             if from_first:
-                target_cameras = Cameras(poses[rows], fov)
+                target_cameras = Cameras(poses[rows], *own)
             return predicted_depth(network, image, cameras, target_cameras)
 
         notes = f"{FROM_FIRST if from_first else FROM}; {TOLD}{told_in_training}"

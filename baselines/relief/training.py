@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, cast
@@ -35,7 +35,8 @@ class Lessons:
 
     Attributes:
         rows: of the rooms to train on, (M,).
-        target: the relief of some rows, and how much each pixel counts, (B, S, S) each.
+        target: the relief of some rows, in edges of their rooms, and how much each pixel counts,
+            (B, S, S) each.
         views: for each row, the rows whose cameras may be asked for; None for its own alone.
         inside: the object that each pixel of the rooms lies inside, or 0, (N, S, S), to learn the
             shape of; None to learn relief alone.
@@ -47,6 +48,11 @@ class Lessons:
     inside: Tensor | None = None
 
 
+def cameras_of(rooms: Rooms, rows: Tensor) -> Cameras:
+    """Return the cameras of some rows."""
+    return Cameras(rooms.world_from_camera[rows], rooms.fov_of(rows), rooms.room_size[rows])
+
+
 Teach = Callable[[Rooms, Settings, Path | None, Callable[[int, int], None]], Lessons]
 
 
@@ -56,18 +62,16 @@ class Batch:
 
     Attributes:
         image: linear radiance, (B, 3, S, S), float16.
-        pose, target_pose: of the image's camera and, if it is another one, of that asked for,
-            (B, 4, 4).
-        fov_y_degrees: of both, a number for all or (B,).
+        cameras: of the images.
+        target_pose: of the cameras asked for, if they are others, (B, 4, 4).
         target, weight: relief, and how much each pixel counts, (B, S, S).
         inside: the object that each pixel lies inside, or 0, (B, S, S); None to learn relief alone.
         place: where windows lie, from 0 to 1, among the pixels that are inside objects, (B,).
     """
 
     image: Tensor
-    pose: Tensor
+    cameras: Cameras
     target_pose: Tensor | None
-    fov_y_degrees: float | Tensor
     target: Tensor
     weight: Tensor
     inside: Tensor | None
@@ -182,9 +186,8 @@ def _batch(rooms: Rooms, lessons: Lessons, rows: Tensor, rng: np.random.Generato
     target, weight = lessons.target(seen)
     return Batch(
         rooms.image[rows],
-        rooms.world_from_camera[rows],
+        cameras_of(rooms, rows),
         None if lessons.views is None else rooms.world_from_camera[seen],
-        rooms.fov_of(rows),
         target,
         weight,
         None if lessons.inside is None else lessons.inside[seen],
@@ -194,9 +197,9 @@ def _batch(rooms: Rooms, lessons: Lessons, rows: Tensor, rng: np.random.Generato
 
 def _loss(network: Relief, batch: Batch, windows_only: bool) -> Tensor:
     """Return the loss of a batch; where objects are told, of windows around them or of all."""
-    cameras = target_cameras = Cameras(batch.pose, batch.fov_y_degrees)
+    cameras = target_cameras = batch.cameras
     if batch.target_pose is not None:
-        target_cameras = Cameras(batch.target_pose, batch.fov_y_degrees)
+        target_cameras = replace(cameras, world_from_camera=batch.target_pose)
     channels = network.channels(batch.image.float(), cameras, target_cameras)
     target, weight, inside = batch.target, batch.weight, batch.inside
     if inside is not None and windows_only:
@@ -217,7 +220,7 @@ def shape_loss(errors: Tensor, inside: Tensor) -> Tensor:
     are the pixels below and to the right, where they lie inside the same object.
 
     Args:
-        errors: of relief, scene units, (B, S, S).
+        errors: of relief, (B, S, S).
         inside: the object that each pixel lies inside, (B, S, S), int; 0 for none.
     """
     image = torch.arange(len(inside), device=inside.device)[:, None, None]

@@ -11,7 +11,7 @@ from torch import Tensor
 
 from baselines.training.images import Array, channels_first, check_reducible, reduced
 from metrics.measures.shape import inside_objects
-from scenegen.common.errors import FileFormatError
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.rooms.reader import RoomsFile, radiance_of
 
 FARTHEST = 1e4  # scene units; a camera farther away sees the whole room in less than a pixel
@@ -27,6 +27,7 @@ class Rooms:
         image: linear radiance, (N, 3, S, S), float16.
         world_from_camera: (N, 4, 4).
         fov_y_degrees: vertical angle of view: a number for all rows, or (N,) where they differ.
+        room_size: as `room_sizes`, (N, 3).
         scene: number of the scene, (N,); scenes of different files have different ones.
         angle: of the view, about the vertical axis from the scene's first one, degrees, (N,).
         rounded: whether radiance was stored in 8 bits.
@@ -39,6 +40,7 @@ class Rooms:
     image: Tensor
     world_from_camera: Tensor
     fov_y_degrees: float | Tensor
+    room_size: Tensor
     scene: Tensor
     angle: Tensor
     rounded: bool
@@ -85,7 +87,7 @@ def read_rooms(files: Sequence[RoomsFile], size: int, *, depth: bool = False) ->
 
 def _read_file(rooms: RoomsFile, size: int, depth: bool) -> Rooms:
     check_reducible(rooms.path, rooms.spec.height, rooms.spec.width, size)
-    poses = camera_poses(rooms).astype(np.float32)
+    poses = camera_poses(rooms, closed=True).astype(np.float32)
     images = np.empty((len(rooms), 3, size, size), np.float16)
     depths = np.empty((len(rooms), size, size), np.float32) if depth else None
     inside = np.empty((len(rooms), size, size), np.int32) if depth else None
@@ -101,6 +103,7 @@ def _read_file(rooms: RoomsFile, size: int, depth: bool) -> Rooms:
         torch.from_numpy(images),
         torch.from_numpy(poses),
         torch.from_numpy(bounded(rooms, "camera/fov_y_degrees", WIDEST)),
+        room_sizes(rooms),
         torch.from_numpy(np.asarray(scene)),
         torch.from_numpy(np.asarray(angle)),
         rooms.spec.image_dtype == "uint8",
@@ -129,11 +132,28 @@ def room_images(rooms: RoomsFile, rows: Array, size: int) -> Tensor:
     return torch.from_numpy(np.stack([room_image(rooms, int(row), size) for row in rows]))
 
 
-def camera_poses(rooms: RoomsFile) -> Array:
+def room_sizes(rooms: RoomsFile) -> Tensor:
+    """Return the inner size of the closed room of each row, metres, (N, 3) float32.
+
+    The paper's room is infinite, as it is open. Raises FileFormatError where a size is not known.
+    """
+    if not rooms.spec.interior:
+        return torch.full((len(rooms), 3), torch.inf)
+    return torch.from_numpy(bounded(rooms, "room/size", FARTHEST).astype(np.float32))
+
+
+def camera_poses(rooms: RoomsFile, *, closed: bool = False) -> Array:
     """Return world_from_camera of all rows, (N, 4, 4).
 
-    Raises FileFormatError where one is unknown, far away, or no rotation and translation.
+    Args:
+        closed: whether the method takes closed rooms, too.
+
+    Raises FileFormatError where one is unknown, far away, or no rotation and translation, and
+    SpecError for closed rooms.
     """
+    if rooms.spec.interior and not closed:
+        expected = "the paper's rooms, for which this method was made"
+        raise SpecError(rooms.path, "closed rooms in metres", expected)
     name = "camera/world_from_camera"
     poses = bounded(rooms, name, FARTHEST)
     turns = poses[:, :3, :3].astype(float)

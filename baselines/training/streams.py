@@ -74,6 +74,8 @@ class TrainingStreams:
             specs.append(preset_spec(name, **split, **given))
             if not self.allow_test_set:
                 refuse_request(self.where, specs[-1].to_json())
+        if len({getattr(spec, "interior", False) for spec in specs}) > 1:
+            raise SpecError("stream", self.names, "closed rooms alone, or none of them")
         return Shown(tuple(specs))
 
 
@@ -108,7 +110,8 @@ class Shown:
             stream: Any = QuestionStream(requests, **how)
         else:
             first = MAX_COUNT * len(self.specs[0].views)
-            stream = RoomStream(requests, fields=ROOM_FIELDS, start=first + before, **how)
+            fields = ROOM_FIELDS + ["room/size"] * self.specs[0].interior
+            stream = RoomStream(requests, fields=fields, start=first + before, **how)
         mark = self.card()["fingerprint"]
         for values in stream:
             yield Block("stream", self.specs[0], mark, values)

@@ -46,6 +46,7 @@ from metrics.scoring.metric_names import (
     BLOCKS,
     CUT_OUT,
     EMPTY_ROOM,
+    LEANING,
     OBJECT_SCORES,
     OF_EMPTY_ROOM,
     OTHER_SCENE,
@@ -152,6 +153,8 @@ def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
             normals[derived_at], inside[derived_at]
         ),
     }
+    if truth.room_size is not None:  # of a leaning cut-out, but for each object's shift
+        floors[f"{LEANING}shape_error"] = flat_error((empty / 2.0 - truth.depth)[at], inside[at])
     return Reference(empty, surface, normals, smooth, counted, inside, hidden, floors)
 
 
@@ -162,12 +165,14 @@ def _guesses(
 
     Where nothing is hidden they are not scored, and so not drawn.
     """
+    closed = (LEANING,) if truth.room_size is not None else ()
     if first is None or not hidden.any():
-        return dict.fromkeys((EMPTY_ROOM, CUT_OUT, BALLS, BLOCKS), empty)
-    flat = empty.copy()
+        return dict.fromkeys((EMPTY_ROOM, CUT_OUT, BALLS, BLOCKS, *closed), empty)
+    flat, leaning = empty.copy(), empty.copy()
     for number in np.unique(truth.object_id[hidden]).tolist():
         own = truth.object_id == number
         flat[own] = np.median(truth.depth[own])
+        leaning[own] = flat[own] + (empty[own] - np.median(empty[own])) / 2.0
     camera = truth.world_from_camera, truth.fov_y_degrees
     seen = first.depth, first.object_id, first.world_from_camera, truth.fov_y_degrees
     balls, blocks = balls_and_blocks(*seen)
@@ -176,6 +181,7 @@ def _guesses(
         CUT_OUT: flat,
         BALLS: depth_of_balls(balls, *camera, empty),
         BLOCKS: depth_of_blocks(blocks, *camera, empty),
+        **dict.fromkeys(closed, leaning),
     }
 
 

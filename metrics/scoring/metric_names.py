@@ -27,6 +27,7 @@ OBJECT_SCORES = (
 )  # of single objects, too
 EMPTY_ROOM = "empty_room_"  # begins the names of the empty room's own scores
 CUT_OUT = "cut_out_"  # begins the names of the scores of flat cut-outs
+LEANING = "leaning_"  # the same of cut-outs that lean half as much as a closed room behind them
 # Begin the names of the scores of guesses at what the first view does not show.
 BALLS, BLOCKS = "balls_", "blocks_"
 # Begin the names of the scores of guesses at measured depth, which see no picture.
@@ -34,6 +35,7 @@ FLAT, RAMP = "flat_", "ramp_"
 OF_TRUTH = (
     EMPTY_ROOM,
     CUT_OUT,
+    LEANING,
     BALLS,
     BLOCKS,
     FLAT,
@@ -50,6 +52,8 @@ OF_CUT_OUT = {
     "shape_normal_degrees": "of each object's mean true normal",
     "derived_shape_normal_degrees": "of each object's mean true normal, derived from depth",
 }
+OF_LEANING = ("behind_depth_error", "shape_error")
+_LEAN = "of cut-outs that lean half as much as the walls behind them, in closed rooms alone"
 RELIEF = ("relief_correlation", "relief_iou")
 BEHIND = "behind_depth_error"
 # Scores that have a skill: what begins the names of the columns that may be the floor, by name.
@@ -59,7 +63,8 @@ SKILLED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(OF_EMPTY_ROOM, (EMPTY_ROOM,)),
     # Tops and fronts of furniture are parallel to floor and walls.
     **dict.fromkeys(OF_CUT_OUT, (CUT_OUT, EMPTY_ROOM)),
-    BEHIND: (EMPTY_ROOM, CUT_OUT, BALLS, BLOCKS),
+    "shape_error": (CUT_OUT, EMPTY_ROOM, LEANING),
+    BEHIND: (EMPTY_ROOM, CUT_OUT, LEANING, BALLS, BLOCKS),
     **dict.fromkeys(HEADLINE["measured"], (FLAT, RAMP)),
 }
 # The floors of BEHIND that were shown no more than the method.
@@ -77,6 +82,7 @@ _SURFACES = (
 WHOSE = {
     EMPTY_ROOM: "empty room",
     CUT_OUT: "flat cut-out",
+    LEANING: "leaning cut-out",
     BALLS: "balls",
     BLOCKS: "blocks",
     FLAT: "one depth",
@@ -441,6 +447,15 @@ ALL |= {
     for name, whose in OF_CUT_OUT.items()
 }
 ALL |= {
+    LEANING + name: replace(
+        ALL[name],
+        name=LEANING + name,
+        title=f"{ALL[name].title}, {WHOSE[LEANING]}",
+        definition=f"`{name}` {_LEAN}.",
+    )
+    for name in OF_LEANING
+}
+ALL |= {
     guess + name: replace(
         ALL[name],
         name=guess + name,
@@ -531,6 +546,7 @@ def markdown_table() -> str:
     floor = f"the same of the empty room, for {of_these}; in `items` alone."
     flat = "; ".join(f"`{name}` {whose}" for name, whose in OF_CUT_OUT.items())
     other = "the same of the prediction with the relief of another scene, seen in the same view."
+    leaning = " and ".join(f"`{name}`" for name in OF_LEANING) + f" {_LEAN}; in `items` alone."
     guesses = f"`{BEHIND}` of {BALLS[:-1]} and {BLOCKS[:-1]}; in `items` alone."
     blind = "the same of guesses that see no picture, of measured truth; in `items` alone."
     derived = "the same of normals derived from the predicted and from the true points."
@@ -544,6 +560,7 @@ def markdown_table() -> str:
         (f"{OTHER_SCENE}<relief score>", *same[:2], "-", "the same", other),
         (f"{EMPTY_ROOM}<score>", *same, floor),
         (f"{CUT_OUT}<score>", *same, f"{flat}; in `items` alone."),
+        (f"{LEANING}<score>", *same, leaning),
         (f"{BALLS}{BEHIND}`, `{BLOCKS}{BEHIND}", *same, guesses),
         (f"{FLAT}<score>`, `{RAMP}<score>", *same, blind),
         _cells(_ACCURACY),

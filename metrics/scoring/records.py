@@ -6,7 +6,7 @@ are first asked for.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, TypeVar
@@ -44,6 +44,7 @@ __all__ = [
     "GROUPINGS",
     "AnswerGroup",
     "Groups",
+    "Length",
     "Meta",
     "Score",
     "ScoreFile",
@@ -55,6 +56,7 @@ __all__ = [
 
 LONGEST_NAME = 200  # characters of method, run and fingerprint
 LONGEST_TEXT = 10_000
+Length = Literal["scene unit", "metre"]
 TruthSource = Literal["given", "known", "submission"]
 Array = NDArray[Any]
 Value = TypeVar("Value")
@@ -197,6 +199,7 @@ class ScoreFile:
         path: where it was read from; no part of the content.
         shown: rooms: which image of a scene the method was shown.
         protocol: measured truth: by which of `metrics.measured.protocols` it was scored; else "".
+        length: the unit of lengths, "metre" in closed rooms.
         older: whether it was read from a file of an older format, in which scores of CHANGED have
             other definitions.
     """
@@ -212,6 +215,7 @@ class ScoreFile:
     shown: Shown = "scored_view"
     older: bool = False
     protocol: str = ""
+    length: Length = "scene unit"
 
     @property
     def runs(self) -> int:
@@ -242,6 +246,10 @@ class ScoreFile:
         return (
             "scenes" if self.task == "rooms" else "shapes" if "shape" in self.items else "questions"
         )
+
+    def unit_of(self, name: str) -> str:
+        """Return the unit of a score."""
+        return metric(name).unit.replace("scene unit", self.length)
 
     @property
     def weights(self) -> Array | None:
@@ -319,7 +327,8 @@ class ScoreFile:
         if self.weights is not None:
             weights = self.weights
             return pooled_estimates(self._runs_of_scores, self.clusters, weights, self._bootstrap)
-        return estimates(self._runs_of_scores, self.clusters, self._bootstrap)
+        found = estimates(self._runs_of_scores, self.clusters, self._bootstrap)
+        return {name: replace(score, unit=self.unit_of(name)) for name, score in found.items()}
 
     @cached_property
     def skills(self) -> Mapping[str, Skill]:

@@ -67,8 +67,9 @@ def score_rooms(
     meta = meta_of(files, truth, truth_given, truth.fingerprint, digest, settings, counts)
     alignment = scored_alignment(files[0].kind, files[0].alignment)
     objects[SHAPE_COLUMN] = shape
-    shown = files[0].shown
-    return ScoreFile("rooms", files[0].method, alignment, items, meta, objects, shown=shown)
+    more: dict[str, Any] = {"shown": files[0].shown}
+    more |= {"length": "metre"} if truth.spec.interior else {}
+    return ScoreFile("rooms", files[0].method, alignment, items, meta, objects, **more)
 
 
 def require_one_kind(files: Sequence[RoomPredictions]) -> None:

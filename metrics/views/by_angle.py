@@ -8,7 +8,7 @@ import numpy as np
 from metrics.measures.statistics import cluster_means
 from metrics.scoring.metric_names import HEADLINE, WHOSE, metric
 from metrics.scoring.records import Score, ScoreFile
-from metrics.views.paper import PAPER, TABLES
+from metrics.views.paper import PAPER, PaperTable, tables_beside
 from metrics.views.plots import COLOURS, LINE, Chart, Point, Series, curves, kind_of
 from metrics.views.table import Cell, make_table
 
@@ -47,9 +47,9 @@ def view_curves(files: Sequence[ScoreFile], labels: Sequence[str]) -> Iterator[C
         if points:
             series.append(Series(f"floor: {WHOSE[str(files[0].floor_of(name))]}", points, LINE))
         if len({point.at for line in series for point in line.points}) >= 2:
-            chart = curves(series, metric(name).title, metric(name).unit)
+            chart = curves(series, metric(name).title, files[0].unit_of(name))
             assert chart is not None
-            yield _with_paper(chart, name)
+            yield _with_paper(chart, name, tables_beside(files[0]))
 
 
 def _points(file: ScoreFile, name: str) -> list[Point]:
@@ -63,10 +63,10 @@ def score_point(score: Score, at: float = 0.0) -> Point:
     return Point(at, score.value, score.low, score.high)
 
 
-def _with_paper(chart: Chart, name: str) -> Chart:
+def _with_paper(chart: Chart, name: str, tables: Sequence[PaperTable]) -> Chart:
     """Add a column for each data set on which the paper reports its method by view angle."""
     columns: dict[str, dict[str, str]] = {}
-    for table in TABLES[:3]:
+    for table in tables[:3]:
         for f in table.figures:
             if f.metric == name and f.method == PAPER and f.view_angle is not None:
                 columns.setdefault(f"{PAPER} †, {f.data}", {})[str(f.view_angle)] = f.text

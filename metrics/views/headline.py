@@ -9,7 +9,7 @@ from metrics.scoring.metric_names import in_order, metric
 from metrics.scoring.records import GROUPINGS, Score, ScoreFile, Skill
 from metrics.views.by_angle import score_point
 from metrics.views.page import Lead, Section
-from metrics.views.paper import PAPER, PAPER_KIND, PEOPLE, REPORTED, SOURCE, TABLES
+from metrics.views.paper import PAPER, PAPER_KIND, PEOPLE, REPORTED, SOURCE, TABLES, tables_beside
 from metrics.views.plots import kind_of, strip
 from metrics.views.score_tables import (
     GROUP_TITLES,
@@ -47,7 +47,7 @@ def headline_lead(scores: ScoreFile) -> Lead:
         text = f"skill of {title}: {_verdict(skill)} (floor: {floor_text(scores, name)})"
     else:
         value, interval = interval_cells(scores.metrics[name])
-        text = f"{title} ({metric(name).unit}, {metric(name).direction}); no floor is known"
+        text = f"{title} ({scores.unit_of(name)}, {metric(name).direction}); no floor is known"
     return Lead(value, text if interval == "-" else f"{interval} {text}")
 
 
@@ -79,6 +79,8 @@ def headline_section(files: Sequence[ScoreFile]) -> Section:
     head = ("score", "skill", label, "on its scale", "floor", "paper †", *labels)
     rows = [_headline_row(scores, beside, name) for name in _main_scores(scores)]
     empty = {i for i in (1, 4) if all(row[i] == Cell() for row in rows)}
+    reported = tables_beside(scores)
+    empty |= set() if reported else {5}
     kept = [i for i in range(len(head)) if i not in empty]
     cells = ([row[i] for i in kept] for row in rows)
     table = make_table("Headline", [head[i] for i in kept], cells)
@@ -88,7 +90,7 @@ def headline_section(files: Sequence[ScoreFile]) -> Section:
     notes += [
         f"[low, high]: {INTERVAL} over {over}. On its scale: the dot is this method with its"
         " interval, the solid line its floor, and dashed lines are the methods beside it.",
-        PAPER_NOTE,
+        *([PAPER_NOTE] if reported else []),
         *(f"Warning: {text}." for text in few_clusters(scores)),
     ]
     return Section("", tables=[table], notes=notes)
@@ -98,7 +100,7 @@ def _headline_row(scores: ScoreFile, beside: Sequence[ScoreFile], name: str) -> 
     score, definition = scores.metrics[name], metric(name)
     skill, others = scores.skills.get(name), [file.metrics.get(name) for file in beside]
     marks = [] if skill is None else [("floor", skill.floor)]
-    unit = "" if definition.unit in ("fraction", "correlation") else f"{definition.unit}, "
+    unit = "" if definition.unit in ("fraction", "correlation") else f"{scores.unit_of(name)}, "
     return [
         Cell(definition.title, unit + definition.direction),
         score_cell(skill),

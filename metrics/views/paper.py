@@ -15,6 +15,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from metrics.scoring.records import ScoreFile
+
 PAPER, PEOPLE = "Pix2Shape", "Human Evaluation"  # of the paper's methods
 PAPER_KIND = "other"  # kind of the paper's questions
 SOURCE = "Pix2Shape (IJCV 2020, doi:10.1007/s11263-020-01322-1)"
@@ -213,3 +215,8 @@ TABLES: Sequence[PaperTable] = (
         ablation=True,
     ),
 )
+
+
+def tables_beside(scores: ScoreFile) -> Sequence[PaperTable]:
+    """Return the tables that stand beside scores: none in closed rooms, which are in metres."""
+    return () if scores.length == "metre" else TABLES

@@ -103,7 +103,7 @@ def _distributions(scores: ScoreFile) -> Iterator[Chart]:
     for name in (*HEADLINE[scores.task], "normal_mean_degrees", "derived_normal_mean_degrees"):
         if name in scores.items:
             values = np.asarray(scores.items[name], float)
-            chart = histogram(values, metric(name).title, metric(name).unit)
+            chart = histogram(values, metric(name).title, scores.unit_of(name))
             if chart:
                 yield chart
 

@@ -347,10 +347,10 @@ def what_the_floor_is(scores: ScoreFile) -> str:
     if scores.task == "rooms":
         return (
             "The floor of shape is a flat cut-out of each object at its median depth, or the empty"
-            " room where that is better. Of relief it"
-            " is the same prediction, held against the relief of another scene. Of what is behind"
-            " it is the best guess that was shown as much. Else it is the empty room: walls and"
-            " floor from the true camera, no objects."
+            " room, or in closed rooms a cut-out between both, whichever is best. Of relief it is"
+            " the same prediction, held against the relief of another scene. Of what is"
+            " behind it is the best guess that was shown as much. Else it is the empty room: walls"
+            " and floor from the true camera, no objects."
         )
     if scores.task == "measured":
         return (

@@ -20,6 +20,7 @@ from baselines.pix2shape.matching.search import (
     best_relief,
     joint_cost,
     matching_cost,
+    paper_rooms_only,
     semi_global,
 )
 from baselines.pix2shape.network.empty_rooms import Cameras
@@ -93,9 +94,10 @@ def relief_of_rows(
 
     Labels that the run's folder holds are read, the others found and written; None for no folder.
 
-    Raises SpecError as `matched_rows`; OSError; FileFormatError where the folder's labels are not
-    those of these rooms.
+    Raises SpecError as `matched_rows`, and for closed rooms; OSError; FileFormatError where the
+    folder's labels are not those of these rooms.
     """
+    paper_rooms_only(rooms.room_size)
     pairs = pairs_of(rooms)
     matched = _with_partner(pairs)
     folder = None if run_folder is None else Path(run_folder) / FOLDER

@@ -15,6 +15,7 @@ from torch import Tensor
 from torch.nn import functional
 
 from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms, half_slope, rays
+from scenegen.common.errors import SpecError
 
 NEAR = 0.05  # scene units; points nearer to the other camera than this, or behind it, are not seen
 STEPS, STEP = 32, 0.02  # reliefs that are tried: 0, STEP, ..., scene units
@@ -60,6 +61,13 @@ def reprojected(
 def reliefs(like: Tensor) -> Tensor:
     """Return the reliefs that are tried, (STEPS,), scene units."""
     return STEP * torch.arange(STEPS, dtype=like.dtype, device=like.device)
+
+
+def paper_rooms_only(room_size: Tensor | None) -> None:
+    """Raise SpecError for closed rooms, where more relief than STEPS * STEP is to be expected."""
+    if room_size is not None and room_size.isfinite().any():
+        expected = "the paper's rooms, for whose relief this search was made"
+        raise SpecError("rooms", "closed rooms in metres", expected)
 
 
 def matching_cost(

@@ -35,7 +35,7 @@ from metrics.views.leaderboard.rows import (
     skill_column,
 )
 from metrics.views.page import Section, html_page
-from metrics.views.paper import PAPER_KIND, TABLES, Figure
+from metrics.views.paper import PAPER_KIND, Figure, tables_beside
 from metrics.views.score_tables import (
     INTERVAL,
     SKILL,
@@ -182,7 +182,9 @@ def _columns(files: Sequence[ScoreFile], names: Sequence[str], headline: bool) -
     else:
         keys = [k for n in names for k in ((n, SKILL_OF + n) if n in skilled else (n,))]
     return {
-        key: skill_column(key.removeprefix(SKILL_OF)) if key not in names else score_column(key)
+        key: score_column(key, files[0].unit_of(key))
+        if key in names
+        else skill_column(key.removeprefix(SKILL_OF))
         for key in keys
     }
 
@@ -191,7 +193,7 @@ def _figures(files: Sequence[ScoreFile], columns: Mapping[str, Column]) -> list[
     """Return the paper's figures of the shown scores; none beside other kinds of questions."""
     if any(set(file.by_distractor) - {PAPER_KIND} for file in files):
         return []
-    figures = [f for table in TABLES if not table.ablation for f in table.figures]
+    figures = [f for table in tables_beside(files[0]) if not table.ablation for f in table.figures]
     return [f for f in figures if f.metric in columns and f.view_angle is None]
 
 

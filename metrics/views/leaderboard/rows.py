@@ -134,11 +134,11 @@ def _best(
     return first if is_better and differ(first, second, key) else None
 
 
-def score_column(name: str) -> Column:
+def score_column(name: str, unit: str) -> Column:
     """Return the column of a score: title, an arrow that tells which way is better, and unit."""
     score = metric(name)
     arrow = "↑" if score.higher_is_better else "↓"
-    return Column(f"{score.title} {arrow} ({score.unit})", score.higher_is_better)
+    return Column(f"{score.title} {arrow} ({unit})", score.higher_is_better)
 
 
 def skill_column(name: str) -> Column:

@@ -103,6 +103,7 @@ def test_the_reference_model_learns_from_streams(names, tmp_path, monkeypatch):
         ("depth-supervised --stream shapes --seed 1000", "rooms-1"),
         ("depth-supervised --stream shape", "shapes"),
         ("depth-supervised --stream shapes,near", "both"),
+        ("depth-supervised --stream shapes,interiors", "shapes,interiors"),
         ("depth-supervised --stream shapes --data rooms.h5", "one of them"),
         ("depth-supervised", "one of them"),
         ("cnn --stream near", "--stream"),

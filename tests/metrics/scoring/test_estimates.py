@@ -91,6 +91,7 @@ def test_the_floor_is_the_lowest_over_scenes_not_over_images():
     [
         ("shape_error", {"cut_out_": 0.4, "empty_room_": 0.2}, "empty_room_"),  # as in interiors
         ("shape_error", {"cut_out_": 0.2, "empty_room_": 0.4}, "cut_out_"),
+        ("shape_error", {"cut_out_": 0.3, "leaning_": 0.1, "empty_room_": 0.2}, "leaning_"),
         ("abs_rel", {"flat_": 0.2, "ramp_": 0.1}, "ramp_"),
         ("delta_1", {"flat_": 0.5, "ramp_": 0.7}, "ramp_"),  # higher is better
         ("delta_1", {"flat_": 0.5, "ramp_": 0.3}, "flat_"),

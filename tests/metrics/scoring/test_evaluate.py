@@ -14,6 +14,7 @@ from refusals import refused
 from scipy.spatial import cKDTree
 
 from baselines.trivial import write_room_baseline
+from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import read_scores, to_json, write_scores
 from metrics.scoring import rooms
@@ -311,3 +312,14 @@ def test_the_largest_depth_that_may_be_is_scored(folder, tmp_path):
     assert found.comparable
     for one in found.metrics.values():
         assert np.isfinite([one.value, one.low, one.high]).all()
+
+
+def test_half_the_depth_of_a_closed_room_has_the_shape_of_leaning_cut_outs(interior_path, tmp_path):
+    with RoomsFile(interior_path) as rooms:
+        pose, fov = (rooms.read(f"camera/{n}", 0) for n in ("world_from_camera", "fov_y_degrees"))
+        depth, _ = empty_room(pose, float(fov), 32, 32, rooms.room_size(0))
+        with RoomPredictionWriter(tmp_path / "x.h5", interior_path, method="half") as file:
+            file.add(0, 1.0 + 0.5 * depth)
+    items = score([tmp_path / "x.h5"], interior_path).items
+    assert items["shape_error"] == pytest.approx(items["leaning_shape_error"], rel=1e-5)
+    assert items["shape_error"] != pytest.approx(items["empty_room_shape_error"], rel=1e-2)

@@ -8,8 +8,10 @@ import pytest
 from made_scores import DIGEST, iqtt_scores, rooms_scores, stated
 from refusals import refused
 
+from baselines.trivial import write_room_baseline
 from iqtt.floors import CHANCE, Floor
-from metrics.score_file import Skill
+from metrics.score_file import Skill, read_scores, write_scores
+from metrics.scoring.evaluate import score
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
 from metrics.views.leaderboard.cards import HEAD, read_cards, unmatched
@@ -332,3 +334,14 @@ def test_methods_that_see_the_first_view_alone_are_ranked_apart():
     alone = [replace(file, columns={**file.columns, "view_index": 0 * file.ids}) for file in files]
     (together,) = rankings(alone, paper=False)
     assert len(together.entries) == 4
+
+
+def test_closed_rooms_are_in_metres_and_beside_no_figure_of_the_paper(interior_path, tmp_path):
+    write_room_baseline("empty-room", interior_path, tmp_path / "x.h5")
+    write_scores(score([tmp_path / "x.h5"], interior_path), tmp_path / "x.json")
+    file = read_scores(tmp_path / "x.json")
+    units = [file.metrics[name].unit for name in ("chamfer", "mse_depth", "relief_iou")]
+    assert units == ["metre", "metre squared", "fraction"]
+    assert leaderboard([file]) == leaderboard([file], paper=False)
+    other = replace(file, length="scene unit")
+    assert leaderboard([other]) != leaderboard([other], paper=False)
