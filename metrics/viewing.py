@@ -175,7 +175,9 @@ class MeasuredRooms:
         view, size = self._truth.view(row), self._truth.size(row)
         fov = 2.0 * np.degrees(np.arctan(0.5 * size[0] / matrix_of(self._truth, row)[1, 1]))
         none = np.full(size, -1), np.zeros((*size, 3), np.float32)
-        scene = cast("SceneSpec", SimpleNamespace(index=row, cameras=(fov,), objects=()))
+        scene = cast(
+            "SceneSpec", SimpleNamespace(index=row, cameras=(fov,), objects=(), interior=None)
+        )
         normal = none[1] if view.normal is None else view.normal
         return MeasuredRoom(
             row, 0, 0.0, self._truth.picture(row), view.depth, normal, none[0], np.eye(4),

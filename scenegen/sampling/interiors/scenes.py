@@ -5,7 +5,7 @@ Another attempt draws the furniture and the cameras again.
 """
 
 import zlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from functools import lru_cache
 from typing import Any
@@ -82,20 +82,22 @@ def sample_interiors(
     pairs = list(zip(index.tolist(), attempt.tolist(), strict=True))
     drawn = [draw_interior(spec, i, tried, objects) for i, tried in pairs]
     placed = np.array([found is not None for found in drawn], bool)
-    names = tuple(model for family in spec.shapes for model in objects.models[family])
     found = [scene for scene in drawn if scene is not None]
-    return placed, _arrays(spec, index[placed], found, names, objects.digest)
+    return placed, _arrays(spec, index[placed], found, objects)
+
+
+@lru_cache(maxsize=16)
+def _numbers(objects: Objects, classes: tuple[str, ...]) -> dict[str, int]:
+    """Return the numbers of models by name."""
+    names = (model for name in classes for model in objects.models[name])
+    return {name: i for i, name in enumerate(names)}
 
 
 def _arrays(
-    spec: DatasetSpec,
-    index: Array,
-    drawn: Sequence[_Drawn],
-    names: tuple[str, ...],
-    digest: Callable[[str], str],
+    spec: DatasetSpec, index: Array, drawn: Sequence[_Drawn], objects: Objects
 ) -> SceneArrays:
     count, slots, views = len(drawn), spec.object_slots, len(spec.views)
-    number = {name: i for i, name in enumerate(names)}
+    number = _numbers(objects, spec.shapes)
     shape, mesh = np.full((count, slots), -1, np.int32), np.full((count, slots), "", object)
     position, scale = np.zeros((count, slots, 3)), np.zeros((count, slots))
     rotation = np.zeros((count, slots, 4))
@@ -103,7 +105,8 @@ def _arrays(
     fov, interior = np.zeros((count, views)), np.full(count, "", object)
     for row, (room, things, places, at) in enumerate(drawn):
         for k, thing in enumerate(things):
-            shape[row, k], mesh[row, k] = number[thing.piece.name], digest(thing.piece.name)
+            name = thing.piece.name
+            shape[row, k], mesh[row, k] = number[name], objects.digest(name)
             box = thing.box
             position[row, k] = box.x, (box.bottom + box.top) / 2, box.z
             scale[row, k] = thing.piece.radius
@@ -125,7 +128,7 @@ def _arrays(
     rho = np.broadcast_to(np.array(spec.reflectance), (count, slots, 3))
     gloss = np.broadcast_to(np.array((0.0, 1.0)), (count, slots, 2))
     return SceneArrays(
-        names=names,
+        names=tuple(number),
         index=index,
         camera_position=camera,
         camera_target=target,
