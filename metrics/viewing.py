@@ -14,7 +14,7 @@ from metrics.measured.reader import Images, MeasuredFile, matrix_of, rays_of
 from metrics.score_file import read_scores
 from metrics.scoring.geometry import points_as_scored
 from metrics.scoring.measured_rows import PIXELS, points_as_declared
-from metrics.scoring.metric_names import HEADLINE, OF_TRUTH, OTHER_SCENE, in_order, metric
+from metrics.scoring.metric_names import HEADLINE, OF_TRUTH, OTHER_SCENE, in_order, metric, unit_in
 from metrics.scoring.records import ID_COLUMNS, OPTIONAL_COLUMNS, ScoreFile
 from metrics.scoring.rows import score_measured_rows, score_rows
 from metrics.scoring.runs import Progress, ScoringError, Settings, matched_rows
@@ -221,5 +221,5 @@ def _text(name: str, value: float, length: str) -> str:
     """Return a score with its unit; `length` is that of lengths."""
     if not np.isfinite(value):
         return "none"
-    unit = metric(name).unit.replace("scene unit", length)
+    unit = unit_in(name, length)
     return f"{value:.4g} {UNITS.get(unit, unit)}".rstrip()

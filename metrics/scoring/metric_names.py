@@ -7,7 +7,7 @@ import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 from scenegen.common.errors import SceneGenError
 from scenegen.common.names import did_you_mean
@@ -428,65 +428,47 @@ MEASURED = frozenset(
     if metric in (*_MORE_DEPTH, *_NORMALS)
     or metric.name.partition("_after_")[0] in {m.name for m in (*_DEPTH, *_POINT_MAPS)}
 )  # scores of truth that others measured
+
+
+def _held_against(begins: str, name: str, whose: str, definition: str, **more: Any) -> Metric:
+    """Return a score that a prediction's score `name` is held against."""
+    title, text = f"{ALL[name].title}, {whose}", f"`{name}` {definition}"
+    return replace(ALL[name], name=begins + name, title=title, definition=text, **more)
+
+
+_OF_EMPTY = "of the empty room, drawn from the true camera."
+_BLIND = (
+    "of a guess that sees no picture ({}), fitted as predictions are, in least squares for L1, and"
+    " by scale and shift where nothing is."
+)
+_OTHER = "of the same prediction with the relief of another scene."
 ALL |= {
-    EMPTY_ROOM + name: replace(
-        ALL[name],
-        name=EMPTY_ROOM + name,
-        title=f"{ALL[name].title}, empty room",
-        definition=f"`{name}` of the empty room, drawn from the true camera.",
+    one.name: one
+    for one in (
+        *(_held_against(EMPTY_ROOM, name, "empty room", _OF_EMPTY) for name in OF_EMPTY_ROOM),
+        *(_held_against(CUT_OUT, name, "cut-out", f"{of}.") for name, of in OF_CUT_OUT.items()),
+        *(_held_against(LEANING, name, WHOSE[LEANING], f"{_LEAN}.") for name in OF_LEANING),
+        *(
+            _held_against(guess, name, WHOSE[guess], _BLIND.format(WHOSE[guess]), task="measured")
+            for guess in (FLAT, RAMP)
+            for name in HEADLINE["measured"]
+        ),
+        *(
+            _held_against(
+                guess, BEHIND, WHOSE[guess],
+                f"of {WHOSE[guess]} in place of the first view's objects.",
+            )
+            for guess in (BALLS, BLOCKS)
+        ),
+        *(_held_against(OTHER_SCENE, n, "other scene", _OTHER, lacking="partner") for n in RELIEF),
     )
-    for name in OF_EMPTY_ROOM
-}
-ALL |= {
-    CUT_OUT + name: replace(
-        ALL[name],
-        name=CUT_OUT + name,
-        title=f"{ALL[name].title}, cut-out",
-        definition=f"`{name}` {whose}.",
-    )
-    for name, whose in OF_CUT_OUT.items()
-}
-ALL |= {
-    LEANING + name: replace(
-        ALL[name],
-        name=LEANING + name,
-        title=f"{ALL[name].title}, {WHOSE[LEANING]}",
-        definition=f"`{name}` {_LEAN}.",
-    )
-    for name in OF_LEANING
-}
-ALL |= {
-    guess + name: replace(
-        ALL[name],
-        name=guess + name,
-        task="measured",
-        title=f"{ALL[name].title}, {WHOSE[guess]}",
-        definition=f"`{name}` of a guess that sees no picture ({WHOSE[guess]}), fitted as"
-        " predictions are, in least squares for L1, and by scale and shift where nothing is.",
-    )
-    for guess in (FLAT, RAMP)
-    for name in HEADLINE["measured"]
-}
-ALL |= {
-    guess + BEHIND: replace(
-        ALL[BEHIND],
-        name=guess + BEHIND,
-        title=f"{ALL[BEHIND].title}, {WHOSE[guess]}",
-        definition=f"`{BEHIND}` of {WHOSE[guess]} in place of the first view's objects.",
-    )
-    for guess in (BALLS, BLOCKS)
-}
-ALL |= {
-    OTHER_SCENE + name: replace(
-        ALL[name],
-        name=OTHER_SCENE + name,
-        title=f"{ALL[name].title}, other scene",
-        definition=f"`{name}` of the same prediction with the relief of another scene.",
-        lacking="partner",
-    )
-    for name in RELIEF
-}
+}  # fmt: skip
 _PLACES = {name: place for place, name in enumerate(ALL)}
+
+
+def unit_in(name: str, length: str) -> str:
+    """Return the unit of a score; `length` is that of lengths, "scene unit" or "metre"."""
+    return metric(name).unit.replace("scene unit", length)
 
 
 def metric(name: str) -> Metric:

@@ -36,7 +36,7 @@ from metrics.scoring.estimates import (
     skills,
 )
 from metrics.scoring.known_tests import Task, known_test
-from metrics.scoring.metric_names import BEHIND, HEADLINE, OBJECT_SCORES, OF_TRUTH, metric
+from metrics.scoring.metric_names import BEHIND, HEADLINE, OBJECT_SCORES, OF_TRUTH, metric, unit_in
 from metrics.submissions.layout import Shown
 from metrics.submissions.strict_json import LARGEST_WHOLE
 
@@ -249,7 +249,7 @@ class ScoreFile:
 
     def unit_of(self, name: str) -> str:
         """Return the unit of a score."""
-        return metric(name).unit.replace("scene unit", self.length)
+        return unit_in(name, self.length)
 
     @property
     def weights(self) -> Array | None:
