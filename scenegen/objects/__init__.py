@@ -2,7 +2,7 @@
 
 - `solids.UnitShape` is what every object is made of: a surface and a convex body, of radius 1.
 - `basic_shapes` makes boxes, spheres, teapots and the like, `families` makes everyday objects, and
-  `meshes` reads models from files.
+  `meshes` reads models from files. `furniture` makes both fit into closed rooms, with the shell.
 - `basic_hulls` holds the hulls of basic shapes as data.
 - `cache` keeps on disk what takes long to make.
 - `cast_meshes` turns shapes into what the ray caster takes; `coarse_hulls` makes fewer corners

@@ -12,13 +12,13 @@ from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families.members import MEMBERS, member_shape
 from scenegen.objects.families.store import MEMBER_STORE
-from scenegen.objects.furnishing import MESH, furnishing
-from scenegen.objects.furniture import furniture_shape
+from scenegen.objects.furniture.furnishing import MESH, furnishing
+from scenegen.objects.furniture.room_shell import PREFIX, shell_shape
+from scenegen.objects.furniture.shapes import furniture_shape
 from scenegen.objects.meshes.as_furniture import family_like, mesh_furniture
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import object_split
 from scenegen.objects.meshes.store import MeshStore
-from scenegen.objects.room_shell import PREFIX, shell_shape
 from scenegen.objects.solids import Mesh, UnitShape, without_triangles
 
 

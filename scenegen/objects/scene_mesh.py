@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scenes import SceneSpec
 from scenegen.objects.basic_shapes import unit_shape
-from scenegen.objects.room_shell import shell
+from scenegen.objects.furniture.room_shell import shell
 from scenegen.objects.solids import UnitShape
 
 

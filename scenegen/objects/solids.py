@@ -13,7 +13,7 @@ from scenegen.objects.basic_hulls import kept
 from scenegen.objects.exact_surfaces import Surface, polyhedron_of
 
 if TYPE_CHECKING:
-    from scenegen.objects.furniture import Furnished
+    from scenegen.objects.furniture.shapes import Furnished
 
 Array = NDArray[Any]
 SEGMENTS = 512  # around an axis

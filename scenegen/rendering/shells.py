@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.room_shell import shell_name
+from scenegen.objects.furniture.room_shell import shell_name
 from scenegen.rendering.packing import SceneBatch
 
 Array = NDArray[Any]

@@ -7,7 +7,7 @@ import numpy as np
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
 from scenegen.objects.families.members import MEMBERS
 from scenegen.objects.families.parts.surfaces import Part
-from scenegen.objects.furnishing import (
+from scenegen.objects.furniture.furnishing import (
     FAMILIES_FACTS,
     MESH,
     WHOLE,
@@ -16,10 +16,10 @@ from scenegen.objects.furnishing import (
     furnishing,
     whole_kind,
 )
-from scenegen.objects.furniture import furniture_shape
+from scenegen.objects.furniture.shapes import furniture_shape
+from scenegen.objects.furniture.unwrapping import corner_uv
 from scenegen.objects.meshes.store import MeshStore
 from scenegen.objects.solids import Array, UnitShape
-from scenegen.objects.unwrapping import corner_uv
 
 OBJECT = "object"  # stands for families of which nothing is known
 SMALLEST, LARGEST = 0.15, 0.4  # metres of their models' diagonals

@@ -11,7 +11,7 @@ import numpy as np
 
 from scenegen.common.recent import Recent
 from scenegen.objects.cache import DiskCache
-from scenegen.objects.furnishing import Paint
+from scenegen.objects.furniture.furnishing import Paint
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFolder
 from scenegen.objects.meshes.models import Model, load_model

@@ -14,7 +14,7 @@ import trimesh
 from PIL import Image
 
 from scenegen.common.srgb import decoded
-from scenegen.objects.furnishing import Paint, Texture
+from scenegen.objects.furniture.furnishing import Paint, Texture
 from scenegen.objects.meshes.clean import MOST_COORDINATE
 from scenegen.objects.meshes.colors import colors_of, matched, read_triangles
 from scenegen.objects.meshes.errors import BadMeshError

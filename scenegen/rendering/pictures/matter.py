@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.rotations import product
 from scenegen.description.interiors import WALLS
-from scenegen.objects.furnishing import Texture
-from scenegen.objects.room_shell import PARTS, shell_name, shell_of
+from scenegen.objects.furniture.furnishing import Texture
+from scenegen.objects.furniture.room_shell import PARTS, shell_name, shell_of
 from scenegen.rendering.materials.folders import MapFiles
 from scenegen.rendering.materials.kinds import material
 from scenegen.rendering.materials.material import SLOPE_STEPS, Material

@@ -17,7 +17,7 @@ from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import from_json
 from scenegen.description.interiors import Interior
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.room_shell import REVEAL
+from scenegen.objects.furniture.room_shell import REVEAL
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pictures.assets import environment_of, materials_of
 from scenegen.rendering.pictures.denoiser import denoised

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from scenegen.description.interiors import WALLS, Opening, wall_length
-from scenegen.objects.furniture import Piece
+from scenegen.objects.furniture.shapes import Piece
 from scenegen.sampling.interiors.draws import Draws
 from scenegen.sampling.interiors.rooms import Room
 from scenegen.sampling.interiors.spaces import (

@@ -20,7 +20,7 @@ from scenegen.description.interiors import Interior
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, furniture_models
-from scenegen.objects.furniture import Piece, piece
+from scenegen.objects.furniture.shapes import Piece, piece
 from scenegen.objects.meshes.as_furniture import OBJECT
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.sampling.interiors.arranging import Arranger

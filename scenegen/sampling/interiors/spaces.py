@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from scenegen.common.rotations import cos_sin
-from scenegen.objects.furniture import Piece
+from scenegen.objects.furniture.shapes import Piece
 
 GAP = 0.004  # metres between two objects side by side
 ON = 2.0**-12  # metres between an object and what it stands on

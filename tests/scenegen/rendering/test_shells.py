@@ -7,7 +7,7 @@ from scenegen.camera import Camera, pixel_directions
 from scenegen.description.interiors import WALLS, Interior, Opening
 from scenegen.description.presets import preset_spec
 from scenegen.description.scenes import SceneSpec
-from scenegen.objects.room_shell import REVEAL, shell
+from scenegen.objects.furniture.room_shell import REVEAL, shell
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import launch_fields
 

@@ -16,8 +16,8 @@ from scenegen import open_rooms
 from scenegen.common.srgb import encoded
 from scenegen.objects.catalogue import changed_meshes, furniture_models
 from scenegen.objects.families.members import MEMBERS
-from scenegen.objects.furnishing import furnishing
-from scenegen.objects.furniture import piece
+from scenegen.objects.furniture.furnishing import furnishing
+from scenegen.objects.furniture.shapes import piece
 from scenegen.objects.meshes import limits, textures
 from scenegen.objects.meshes.as_furniture import family_like, mesh_furniture
 from scenegen.objects.meshes.errors import BadMeshError

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from scenegen.common.errors import SpecError
-from scenegen.objects.furnishing import FAMILIES_FACTS, WHOLE, furnishing
+from scenegen.objects.furniture.furnishing import FAMILIES_FACTS, WHOLE, furnishing
 from scenegen.rendering.materials.kinds import KINDS, material
 from scenegen.rendering.materials.material import SLOPE_STEPS, Material, slopes_of
 from scenegen.rendering.materials.palettes import palette

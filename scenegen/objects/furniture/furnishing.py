@@ -13,8 +13,8 @@ from scenegen.objects.coarse_hulls import POINT_STEP, rounded
 from scenegen.objects.families.members import member_parts, member_rng
 from scenegen.objects.families.parts.draws import pick, span
 from scenegen.objects.families.parts.surfaces import Part, joined
+from scenegen.objects.furniture.unwrapping import corner_uv
 from scenegen.objects.solids import Array
-from scenegen.objects.unwrapping import corner_uv
 
 WHOLE = ("picture", "screen", "dial", "rug", "leaf")  # materials whose map covers a piece once
 

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
-from scenegen.objects.furnishing import MESH, Furnishing, supports
-from scenegen.objects.room_shell import box_hull
+from scenegen.objects.furniture.furnishing import MESH, Furnishing, supports
+from scenegen.objects.furniture.room_shell import box_hull
 from scenegen.objects.solids import Mesh, UnitShape
 
 Array = NDArray[Any]

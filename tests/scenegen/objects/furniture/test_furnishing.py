@@ -9,9 +9,9 @@ from embreex.mesh_construction import TriangleMesh
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import FAMILY_NAMES
 from scenegen.objects.families.members import member_shape
-from scenegen.objects.furnishing import CLEAR, FAMILIES_FACTS, WHOLE, furnishing, supports
+from scenegen.objects.furniture.furnishing import CLEAR, FAMILIES_FACTS, WHOLE, furnishing, supports
+from scenegen.objects.furniture.unwrapping import stretches
 from scenegen.objects.meshes.listing import object_split
-from scenegen.objects.unwrapping import stretches
 
 FAMILIES = pytest.mark.parametrize("family", FAMILIES_FACTS)
 NEW = pytest.mark.parametrize("family", [f for f in FAMILIES_FACTS if f not in FAMILY_NAMES])
