@@ -139,7 +139,7 @@ def rooms_plan(
 
 def rooms_part(spec: DatasetSpec, count: int, marks: tuple[Mark, ...] = ()) -> Part:
     """Return the rows of so many scenes."""
-    return Part("", "", count, [Sheet(columns(spec))], marks, len(spec.views))
+    return Part("", "", count, [Sheet(columns(spec))], marks, len(spec.views), "scenes")
 
 
 def merge_rooms(

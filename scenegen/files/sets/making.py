@@ -14,9 +14,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
+from scenegen.common.cgroup import processors
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.files.new_file import check_writable
 from scenegen.files.places import check_store, is_remote, listing
+from scenegen.files.pool import LostWorkerError
 from scenegen.files.sets.cluster import Cluster, threads_of_worker
 from scenegen.files.sets.manifest import (
     FileRecord,
@@ -28,7 +30,7 @@ from scenegen.files.sets.manifest import (
 from scenegen.files.sets.plan import Block, Piece, Plan
 from scenegen.files.sets.sets import Packed, Progress, write_piece, write_views
 from scenegen.files.sets.shards import name_of_set
-from scenegen.files.sets.workers import in_order, processors
+from scenegen.files.sets.workers import in_order
 from scenegen.files.sets.workspace import remove_leftovers, run_lock
 
 SHARE = 0.05  # of the time that writing manifests may take; that of 10,000 shards has 3 MB
@@ -100,11 +102,18 @@ def make_set(
             made = _made_here(place.parent, missing, plan, work, workers, True, progress, note)
         else:
             call = partial(_made_on_worker, place, request, missing, plan, work)
-            made = _noted(cluster.in_any_order(call, range(len(missing))), progress, note)
-        with ledger.kept(), closing(made):
-            progress(sum(ledger.rows(piece) for piece in pieces))
-            for records in made:
-                ledger.add(records)
+            named = partial(_named, missing)
+            results = cluster.results(call, range(len(missing)), named, in_order=False)
+            made = _noted(results, progress, note)
+        try:
+            with ledger.kept(), closing(made):
+                progress(sum(ledger.rows(piece) for piece in pieces))
+                for records in made:
+                    ledger.add(records)
+        except LostWorkerError as error:
+            kept = f"{len(ledger.records)} complete files are kept; the same command goes on"
+            hint = "; ".join(filter(None, (error.hint, kept)))
+            raise LostWorkerError(error.where, error.found, "", hint) from error
         for bundle in plan.bundles:
             shards = [piece for piece in pieces if piece.is_shard and piece.bundle is bundle]
             if shards:
@@ -199,6 +208,10 @@ def _made_on_worker(
         records = write_piece(place.parent, pieces[number], rows, plan.compression)
         next(rows, None)
     return records, ends
+
+
+def _named(pieces: Sequence[Piece], number: int) -> str:
+    return ", ".join(str(block) for block in pieces[number].blocks if block.items)
 
 
 def _noted(

@@ -12,12 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scenegen.common.cgroup import processors
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check, from_json
 from scenegen.files.new_file import written_beside
 from scenegen.files.places import as_place
 from scenegen.files.sets.shards import name_of_set
-from scenegen.files.sets.workers import in_threads, processors
+from scenegen.files.sets.workers import in_threads
 
 ENDING = ".manifest.json"
 FORMAT = "pix2shape-bench manifest 1"

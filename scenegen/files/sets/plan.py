@@ -69,6 +69,7 @@ class Part:
         sheets: the tables.
         marks: what follows from the rows.
         item_rows: rows of an item in each table.
+        noun: what items are, for errors.
     """
 
     bundle: str
@@ -77,6 +78,7 @@ class Part:
     sheets: Sequence[Sheet]
     marks: Sequence[Mark] = ()
     item_rows: int = 1
+    noun: str = "questions"
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,10 @@ class Block:
     def rows(self) -> int:
         """Number of rows in each table."""
         return len(self.items) * self.part.item_rows
+
+    def __str__(self) -> str:
+        of_part = " ".join(filter(None, (self.part.bundle, self.part.name, self.part.noun)))
+        return f"{of_part} {self.items[0]} to {self.items[-1]}"
 
     def cut(self, size: int) -> Iterator["Block"]:
         """Yield blocks of at most `size` items."""

@@ -72,7 +72,7 @@ def slow_square(folder, number):
 
 def test_tasks_of_workers_that_die_go_to_others(cluster, tmp_path):
     """One of two is killed in the midst of it."""
-    squares = cluster.in_order(partial(slow_square, tmp_path), range(12))
+    squares = cluster.results(partial(slow_square, tmp_path), range(12))
     assert next(squares) == 0
     os.kill(int((tmp_path / "0").read_text()), signal.SIGKILL)
     assert [*squares] == [number * number for number in range(1, 12)]
@@ -84,7 +84,7 @@ def fail(number):
 
 def test_errors_of_workers_are_raised_here(cluster):
     with pytest.raises(SceneGenError) as raised:
-        list(cluster.in_any_order(fail, range(3)))
+        list(cluster.results(fail, range(3)))
     assert raised.value.found == "a task that fails"
 
 
@@ -101,7 +101,7 @@ def test_workers_with_other_versions_are_refused(cluster):
     here = partial(version_by_process, os.getpid())
     address = cluster.client.scheduler.address
     with pytest.raises(SceneGenError) as refused, connected(address, 0, here) as other:
-        list(other.in_any_order(len, ["a"]))
+        list(other.results(len, ["a"]))
     assert "mitsuba_version 3.8.0, not 3.9.1" in refused.value.found
 
 
@@ -114,19 +114,19 @@ def test_a_folder_that_workers_do_not_see_is_named(cluster, tmp_path):
     place = tmp_path / "rooms.manifest.json"
     asked = Manifest(FORMAT, "", ("rooms.h5",), "{}", 1, 1, ())
     with pytest.raises(SceneGenError) as refused:
-        list(cluster.in_any_order(shared, [(place, asked)]))
+        list(cluster.results(shared, [(place, asked)]))
     assert str(place) in refused.value.where
     write_manifest(place, asked)
-    list(cluster.in_any_order(shared, [(place, asked)]))
+    list(cluster.results(shared, [(place, asked)]))
     with pytest.raises(SceneGenError) as refused:
-        list(cluster.in_any_order(shared, [(place, replace(asked, count=2))]))
+        list(cluster.results(shared, [(place, replace(asked, count=2))]))
     assert "n 1, not 2" in refused.value.found
 
 
 @pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_one_line(tmp_path):
     with connected(LOCAL, 1, scorer_versions) as found:
-        results = found.in_order(partial(slow_square, tmp_path), range(50))
+        results = found.results(partial(slow_square, tmp_path), range(50))
         next(results)
         found.client.cluster.close()
         with pytest.raises(SceneGenError) as lost:
@@ -148,7 +148,7 @@ PLAIN = """
 print("once")
 from scenegen.files.sets.cluster import LOCAL, connected
 with connected(LOCAL, 2, dict) as cluster:
-    print(list(cluster.in_order(abs, [-1, 2, -3])))
+    print(list(cluster.results(abs, [-1, 2, -3])))
 """
 
 
