@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from iqtt.files.reader import QuestionsFile
-from iqtt.files.split import MANIFEST, split_part, split_plan
+from iqtt.files.split import ALL_FILES, split_part, split_plan
 from iqtt.files.work import QuestionsWork
 from iqtt.questions.distractors import Pools, make_pools
 from iqtt.questions.specs import SUITE, SplitSpec
@@ -78,7 +78,7 @@ def make_split(
     with _folder(as_place(folder)) as place:
         work = QuestionsWork(pools or make_pools(spec), batch, device, compression)
         make_set(
-            place / MANIFEST, plan, work, shard_size,
+            place, plan, work, shard_size,
             workers=workers or useful_workers(count * (1 + spec.answers), variant),
             cluster=cluster, overwrite=overwrite, progress=progress, note=tally.add,
         )  # fmt: skip
@@ -121,7 +121,7 @@ def make_suite(
 def _folder(folder: Path) -> Iterator[Path]:
     """Make a folder unless it is there; it goes again if nothing is in it when the block ends."""
     if is_remote(folder):
-        check_store(folder / MANIFEST)
+        check_store(folder / ALL_FILES[0])
         yield folder
         return
     check_place(folder)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from scenegen.common.records import check
 from scenegen.common.text_table import printable
-from scenegen.files.sets.manifest import file_sha256
+from scenegen.files.content import file_sha256
 
 ADDRESS = r"https?://[^\s<>\"'`]+"
 SPDX = r"[A-Za-z0-9.+-]{1,60}"

@@ -8,7 +8,6 @@ from typing import Any
 from scenegen.common.records import check
 from scenegen.description.specs import BUILT_IN
 from scenegen.files.schema import Column
-from scenegen.files.sets.manifest import manifest_path
 from scenegen.layout import columns, fields, markdown_table
 from scenegen.rooms.reader import RoomsFile
 from scenegen.sharing.card import NAMES, with_shards, write_card
@@ -136,9 +135,6 @@ def make_rooms_card(
     files: list[tuple[Path, str]] = []
     for file in rooms:
         files += with_shards(file.opened, "rooms with ground truth", "shows its shards as one file")
-        manifest = manifest_path(file.path)
-        if file.opened.shards and manifest.is_file():
-            files.append((manifest, f"manifest of {file.path.name}"))
     interior = [file.spec.interior for file in rooms]
     check(len(set(interior)) < 2, "files", "interiors and other rooms", "a card for each kind")
     task = INTERIORS if interior[0] else ROOMS

@@ -95,7 +95,7 @@ def test_files_and_their_sha256(croissant, made, holey_set, float_path):
     folders = (made, holey_set.parent, float_path.parent)
     files = {f.name: f for f in croissant.metadata.file_objects}
     shards = [f"set-0000{i}-of-00003.h5" for i in range(3)]
-    assert set(files) == {"set.h5", *shards, "set.manifest.json", "float.h5", "index.parquet"}
+    assert set(files) == {"set.h5", *shards, "float.h5", "index.parquet"}
     for name, told in files.items():
         data = next(f / name for f in folders if (f / name).exists()).read_bytes()
         assert told.sha256 == hashlib.sha256(data).hexdigest()

@@ -6,7 +6,6 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -19,9 +18,9 @@ from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.scoring.runs import scorer_versions
 from scenegen.common.errors import SceneGenError
+from scenegen.files.pool import LostWorkerError
 from scenegen.files.sets.cluster import LOCAL, connected
-from scenegen.files.sets.making import check_shared
-from scenegen.files.sets.manifest import FORMAT, Manifest, write_manifest
+from scenegen.files.sets.making import REQUEST, check_shared
 from scenegen.rendering.sameness import renderer_identity
 
 pytest.importorskip("distributed")
@@ -36,6 +35,12 @@ def cluster():
     """Return a cluster of two worker processes."""
     with connected(LOCAL, 2, renderer_identity) as found:
         yield found
+
+
+@pytest.fixture(scope="module")
+def plain(cluster):
+    """Return the same cluster, whose processes need not render a picture to be compared."""
+    return replace(cluster, versions=dict)
 
 
 def contents(folder):
@@ -70,21 +75,38 @@ def slow_square(folder, number):
     return number * number
 
 
-def test_tasks_of_workers_that_die_go_to_others(cluster, tmp_path):
+def test_tasks_of_workers_that_die_go_to_others(plain, tmp_path):
     """One of two is killed in the midst of it."""
-    squares = cluster.results(partial(slow_square, tmp_path), range(12))
+    squares = plain.results(partial(slow_square, tmp_path), range(12))
     assert next(squares) == 0
     os.kill(int((tmp_path / "0").read_text()), signal.SIGKILL)
     assert [*squares] == [number * number for number in range(1, 12)]
+
+
+def crash(folder, always, number):
+    """Return the number; at 3 a signal ends the process, once or always."""
+    if number == 3 and (always or not (folder / "tried").exists()):
+        (folder / "tried").touch()
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return number
+
+
+def test_a_crash_is_tried_again_and_named(plain, tmp_path):
+    once = plain.results(partial(crash, tmp_path, False), range(5))
+    assert list(once) == [0, 1, 2, 3, 4]
+    with pytest.raises(LostWorkerError) as lost:
+        list(plain.results(partial(crash, tmp_path, True), range(5), "part {}".format))
+    assert lost.value.where.startswith("part 3:")
+    assert lost.value.found == "signal 11, SIGSEGV"
 
 
 def fail(number):
     raise SceneGenError("row 3", "a task that fails", "one that does not", "mend it")
 
 
-def test_errors_of_workers_are_raised_here(cluster):
+def test_errors_of_workers_are_raised_here(plain):
     with pytest.raises(SceneGenError) as raised:
-        list(cluster.results(fail, range(3)))
+        list(plain.results(fail, range(3)))
     assert raised.value.found == "a task that fails"
 
 
@@ -109,17 +131,17 @@ def shared(task):
     check_shared(*task)
 
 
-def test_a_folder_that_workers_do_not_see_is_named(cluster, tmp_path):
+def test_a_folder_that_workers_do_not_see_is_named(plain, tmp_path):
     """Or one in which another run has begun."""
-    place = tmp_path / "rooms.manifest.json"
-    asked = Manifest(FORMAT, "", ("rooms.h5",), "{}", 1, 1, ())
+    home, asked = tmp_path / ".rooms.h5.parts", {"n": 1}
     with pytest.raises(SceneGenError) as refused:
-        list(cluster.results(shared, [(place, asked)]))
-    assert str(place) in refused.value.where
-    write_manifest(place, asked)
-    list(cluster.results(shared, [(place, asked)]))
+        list(plain.results(shared, [(home, asked)]))
+    assert str(home) in refused.value.where
+    home.mkdir()
+    (home / REQUEST).write_text('{"n": 1}')
+    list(plain.results(shared, [(home, asked)]))
     with pytest.raises(SceneGenError) as refused:
-        list(cluster.results(shared, [(place, replace(asked, count=2))]))
+        list(plain.results(shared, [(home, {"n": 2})]))
     assert "n 1, not 2" in refused.value.found
 
 
