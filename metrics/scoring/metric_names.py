@@ -176,7 +176,7 @@ def _share(name: str, title: str, definition: str, **more: Any) -> Metric:
 
 
 def _correlation(name: str, title: str, definition: str, **more: Any) -> Metric:
-    limits = {"largest": 1.0, "smallest": -1.0}
+    limits: dict[str, Any] = {"largest": 1.0, "smallest": -1.0}
     return Metric(name, title, "correlation", definition, higher_is_better=True, **limits, **more)
 
 

@@ -46,7 +46,7 @@ GROUP_TITLES = {
     "by_circle": "circular: right in every order of the answers",
 }
 ALIGNMENT_SCORES = ("abs_rel", "rmse", "delta_1")
-GROUP_SCORES = HEADLINE | {"iqtt": ("iqtt_accuracy",)}
+GROUP_SCORES = HEADLINE
 
 
 def text_report(
