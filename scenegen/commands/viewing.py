@@ -14,6 +14,7 @@ from scenegen.command_line.paths import InputPath, OutputPath, refuse_command_in
 if TYPE_CHECKING:
     from scenegen.viewing import RecordedScene
 
+
 def host_options(port: int) -> Callable[[Command], Command]:
     """Return what adds the options that say where pages are served; `port` is the default."""
     return together(
