@@ -247,9 +247,9 @@ def _of_inspect(path: Path) -> Log:
         raise FileFormatError(path, f"no sample: {_reason(log.error.message)}", "samples")
     settings = log.eval.model_generate_config.model_dump(exclude_none=True)
     settings |= log.plan.config.model_dump(exclude_none=True)
-    kept = {name: settings[name] for name in ("temperature", "max_tokens") if name in settings}
-    told = log.eval.task_args_passed  # how pictures were made
-    kept |= {name: told[name] for name in ("layout", "size", "control") if name in told}
+    settings |= log.eval.task_args_passed  # how pictures were made
+    names = ("temperature", "max_tokens", "layout", "size", "control")
+    kept = {name: settings[name] for name in names if name in settings}
     usage = log.stats.model_usage.values()
     tokens = sum(u.input_tokens for u in usage), sum(u.output_tokens for u in usage)
     how = f"asked with Inspect, {json.dumps(kept)}"
