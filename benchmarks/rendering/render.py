@@ -84,6 +84,7 @@ def bare_cast(rooms: str, count: int, repeats: int, size: int) -> dict[str, Any]
     from scenegen.rendering.drjit_renderer import upload_scenes
     from scenegen.rendering.packing import SceneBatch, pack
     from scenegen.rendering.rays import closest_hit
+    from scenegen.rendering.tables import upload
     from scenegen.rooms.reader import RoomsFile
 
     variant = select_variant("cpu")
@@ -97,7 +98,7 @@ def bare_cast(rooms: str, count: int, repeats: int, size: int) -> dict[str, Any]
         table = np.zeros((len(batch), 16), np.float32)
         table[:, :12] = batch.world_from_camera[:, :3].reshape(-1, 12)
         table[:, 12] = [pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()]
-        return mi.Float(table.ravel())
+        return upload(table)
 
     def cast(batch: SceneBatch, uploaded: Any, table: Any) -> None:
         pixels = spec.height * spec.width
