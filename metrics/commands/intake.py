@@ -129,17 +129,9 @@ def read_as(
 @OVERWRITE
 @click.argument("expanded", nargs=-1, metavar="")
 def import_(
-<<<<<<< HEAD
-    pattern: str | None, kind: Any, unit: str | None, scale: float | None,
-    alignment: Any, invalid: tuple[float, ...], missing: Any, normals: str | None, frame: Any,
-    array: str | None, match: Any, shown: Any, answers: str | None, people: str | None,
-    truth: str, out: str, method: str | None, run_name: str, notes: str, overwrite: bool,
-    expanded: tuple[str, ...],
-=======
     pattern: str | None, alignment: Any, missing: Any, normals: str | None, shown: Any,
-    answers: str | None, truth: str, out: str, method: str | None, run_name: str, notes: str,
-    overwrite: bool, expanded: tuple[str, ...], **numbers: Any,
->>>>>>> main
+    answers: str | None, people: str | None, truth: str, out: str, method: str | None,
+    run_name: str, notes: str, overwrite: bool, expanded: tuple[str, ...], **numbers: Any,
 ) -> None:
     """Make a submission of predictions that lie in files.
 
@@ -155,7 +147,7 @@ def import_(
     if sum(source is not None for source in (pattern, answers, people)) != 1:
         raise click.UsageError("give --depth for rooms, or --answers or --quiz for questions")
     if people is not None:
-        from metrics.intake.matching import files_of
+        from metrics.intake.folders import files_of
         from metrics.intake.quiz_answers import import_quiz
 
         made = import_quiz(
