@@ -86,7 +86,7 @@ def make_set(
     home, request = parts_folder(first), plan.request(shard_size)
     if len(pieces) == 1 and cluster is None:  # after a kill there is nothing to go on with
         with suppress(OSError):  # a name that is too long
-            _check_request(home, request, overwrite)
+            check_request(home, request, overwrite)
         _check_free(folder, plan.files, overwrite)
         progress(0)
         with ExitStack() as naming:
@@ -99,7 +99,7 @@ def make_set(
         return
     lock = first.with_name(f".{first.name}.lock")
     with nullcontext() if is_remote(folder) else run_lock(lock, first):
-        _check_request(home, request, overwrite)
+        check_request(home, request, overwrite)
         if (home / COMPLETE).exists():
             progress(sum(piece.rows for piece in pieces))
         else:
@@ -232,10 +232,10 @@ def _differences(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> str:
     )
 
 
-def _check_request(home: Path, request: Mapping[str, Any], overwrite: bool) -> None:
-    """Raise SpecError where parts answer another request; with `overwrite` these are removed.
+def check_request(home: Path, request: Mapping[str, Any], overwrite: bool) -> bool:
+    """Return whether parts of this request are there; remove what is of no request.
 
-    So is what has no request, as its run was killed while it began or ended.
+    Raises SpecError where parts answer another request; with `overwrite` these are removed.
     """
     older = _read_request(home)
     differences = "" if older is None else _differences(older, request)
@@ -245,6 +245,15 @@ def _check_request(home: Path, request: Mapping[str, Any], overwrite: bool) -> N
         raise SpecError(where, differences, expected, hint)
     if older is None or differences:
         remove_folder(home)
+    return older is not None and not differences
+
+
+def write_request(home: Path, request: Mapping[str, Any]) -> None:
+    """Make a folder of parts for a request, if it is not there."""
+    if not is_remote(home):
+        home.mkdir(exist_ok=True)
+    with written_beside(home / REQUEST, overwrite=True) as path:
+        path.write_text(json.dumps(request, indent=1), encoding="utf-8")
 
 
 def _check_free(folder: Path, names: Sequence[str], overwrite: bool) -> None:
@@ -257,11 +266,7 @@ def _check_free(folder: Path, names: Sequence[str], overwrite: bool) -> None:
 def _kept(home: Path, request: Mapping[str, Any]) -> Iterator[None]:
     """Make the folder of parts for the block; where that raises, it goes unless it has some."""
     try:
-        if not is_remote(home):
-            home.mkdir(exist_ok=True)
-        text = json.dumps(request, indent=1)
-        with written_beside(home / REQUEST, overwrite=True) as path:
-            path.write_text(text, encoding="utf-8")
+        write_request(home, request)
         yield
     except LostWorkerError as error:
         kept = f"{len(complete_parts(home))} complete files are kept; the same command goes on"
