@@ -14,7 +14,8 @@ import numpy as np
 from baselines.rezende.images import Pictures
 from baselines.rezende.rasteriser import Views
 from baselines.training.images import Array, channels_first
-from scenegen.camera import Camera, Vector3
+from scenegen.camera import Camera
+from scenegen.common.records import Vector3
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
 from scenegen.common.random.seeding import Purpose, item_rng

@@ -6,7 +6,7 @@ the box from the origin to `Interior.size`.
 
 from dataclasses import dataclass
 
-from scenegen.camera import Vector3
+from scenegen.common.records import Vector3
 from scenegen.common.names import check_choice
 from scenegen.common.records import check
 

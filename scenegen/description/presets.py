@@ -5,7 +5,7 @@ from typing import Any
 
 from scenegen.common.names import check_choice
 from scenegen.common.records import check
-from scenegen.description.scenes import FAMILY_NAMES, FURNITURE_NAMES
+from scenegen.description.names import FAMILY_NAMES, FURNITURE_NAMES
 from scenegen.description.specs import DatasetSpec
 
 VESSELS = ("bag", "bottle", "bowl", "can", "cap", "lamp", "mug")

@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
 from scenegen.description.presets import preset_spec
-from scenegen.description.scenes import SHAPE_NAMES, Light, PlacedObject, SceneSpec
+from scenegen.description.names import SHAPE_NAMES
+from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.sampling.scenes import sample_scene
 

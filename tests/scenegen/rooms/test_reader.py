@@ -12,7 +12,8 @@ import pytest
 
 from scenegen import RoomsDataset, open_rooms
 from scenegen.common.errors import SpecError
-from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
+from scenegen.description.names import SHAPE_NAMES
+from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import LATER, DatasetSpec
 from scenegen.files.content import datasets
 from scenegen.layout import FIELDS
