@@ -6,9 +6,9 @@ Lengths are in scene units (the room's edge; metres in closed rooms), frames as 
 from dataclasses import dataclass
 
 from scenegen.camera import Camera
-from scenegen.common.records import Vector3
-from scenegen.common.records import check, from_json, to_json
+from scenegen.common.records import Vector3, check, from_json, to_json
 from scenegen.description.interiors import Interior
+from scenegen.description.names import SHAPE_NAMES
 
 
 @dataclass(frozen=True)

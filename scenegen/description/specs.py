@@ -206,9 +206,7 @@ class DatasetSpec(RoomSpec):
         "Whether objects lie as they would stay, or are turned at random",
         choices=("resting", "any"),
     )
-    lights: tuple[int, int] = setting(
-        (1, 3), "Number of lights in a scene", limits=(0, MAX_LIGHTS)
-    )
+    lights: tuple[int, int] = setting((1, 3), "Number of lights in a scene", limits=(0, MAX_LIGHTS))
     shading: str = setting(
         "paper",
         "The paper's shading equation, or path tracing, with shadows and indirect light; slower",
@@ -226,16 +224,14 @@ class DatasetSpec(RoomSpec):
     )
     ambient: Vector3 = setting((0.1, 0.1, 0.1), "Ambient light L_a")
     attenuation: tuple[float, float] = setting(
-        (0.5, 0.5), "k_l,k_q: how light falls off with distance and its square"
+        (0.5, 0.5),
+        "k_l,k_q: how light falls off with distance and its square",
+        shown="0.5,0.5",
     )
     light_saturation: float = setting(
         0.7, "How coloured lights are, from 0 (white) to 1", limits=(0.0, 1.0)
     )
-    reflectance: Vector3 = setting(
-        (0.8, 0.8, 0.8),
-        "Reflectance of objects; also of the room, without --room-reflectance. With own, meshes"
-        " from a folder keep their colours, times 0.8",
-    )
+    reflectance: Vector3 = setting((0.8, 0.8, 0.8))
     room_reflectance: Vector3 = setting((0.8, 0.8, 0.8), "Reflectance of floor and walls")
     random_reflectance: bool = setting(
         False,

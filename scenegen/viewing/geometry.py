@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scenegen.camera import pixel_size, transform_points, transform_vectors
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.description.scenes import PlacedObject, SceneSpec
-from scenegen.description.specs import BUILT_IN, DatasetSpec
+from scenegen.description.specs import BUILT_IN, Request
 from scenegen.objects.scene_mesh import world_from_object
 from scenegen.objects.sources import file_objects
 from scenegen.rooms.preview import depth_bytes, id_colors, normal_bytes, srgb_bytes
@@ -137,7 +137,7 @@ class Mesh:
     color: Array
 
 
-def shapes_of(spec: DatasetSpec, **folder: Any) -> ShapeOf:
+def shapes_of(spec: Request, **folder: Any) -> ShapeOf:
     """Return the function that finds the triangles, (F, 3, 3), of an object's unit shape.
 
     `folder` are the options of `file_objects`. The function raises SpecError where the objects are
