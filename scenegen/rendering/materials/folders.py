@@ -4,7 +4,6 @@ import re
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TypeVar
 
@@ -13,6 +12,7 @@ import OpenEXR
 from PIL import Image
 
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.recent import recent
 from scenegen.common.srgb import decoded
 from scenegen.rendering.materials.material import Array, Material, slopes_of
 
@@ -161,7 +161,7 @@ def _exr(path: Path) -> Array:
     return np.asarray(pixels, np.float32)
 
 
-@lru_cache(maxsize=32)
+@recent(400_000_000)
 def read_maps(maps: MapFiles) -> Material:
     """Return a material from its files. Raises FileFormatError where one cannot be read."""
     fields = {kind: _opened(path, _pixels) for kind, path in maps.files}

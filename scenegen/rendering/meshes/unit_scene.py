@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scenegen.common.records import check
 from scenegen.objects.cast_meshes import corner_table, normal_table, overlapping
 from scenegen.objects.solids import UnitShape
-from scenegen.rendering.tables import upload_table
+from scenegen.rendering.tables import padded, upload_table
 
 Array = NDArray[Any]
 LATTICE = 4.0  # distance between the shapes' origins; their bounding radius is 1
@@ -92,9 +92,9 @@ def triangle_mesh(
         properties["bsdf"] = bsdf
     mesh = mi.Mesh(name, count, len(triangles), properties, has_vertex_normals=normals is not None)
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = triangles.astype(np.float32, copy=False).ravel()
-    parameters["faces"] = np.arange(count, dtype=np.uint32)
+    parameters["vertex_positions"] = padded(triangles)
+    parameters["faces"] = padded(np.arange(count), np.uint32)
     if normals is not None:
-        parameters["vertex_normals"] = normals.astype(np.float32).ravel()
+        parameters["vertex_normals"] = padded(normals)
     parameters.update()
     return mesh

@@ -26,7 +26,7 @@ from scenegen.rendering.meshes.unit_scene import triangle_mesh
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.path_tracing.phong_material import phong_bsdf
 from scenegen.rendering.pixel_samples import sample_positions
-from scenegen.rendering.tables import unit
+from scenegen.rendering.tables import unit, upload
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -84,8 +84,8 @@ def camera_rays(batch: SceneBatch, b: int, camera: Sequence[Any]) -> Iterator[tu
         sampler.seed(seed, pixels * count)
         index = dr.arange(mi.UInt32, pixels * count)
         pixel, sample = index // count, index % count
-        x = mi.Float(pixel % spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 0]), sample)
-        y = mi.Float(pixel // spec.width) + dr.gather(mi.Float, mi.Float(positions[:, 1]), sample)
+        across, down = (dr.gather(mi.Float, upload(axis), sample) for axis in positions.T)
+        x, y = mi.Float(pixel % spec.width) + across, mi.Float(pixel // spec.width) + down
         d = right * ((x - spec.width / 2) * size) + up * ((spec.height / 2 - y) * size) - back
         yield mi.RayDifferential3f(mi.Point3f(origin), unit(d)), sampler, count
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.rendering.pictures.matter import Matter
-from scenegen.rendering.tables import aligned, gather_row, unit, upload_table
+from scenegen.rendering.tables import gather_row, padded, unit, upload, upload_table
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -76,11 +76,11 @@ def surfaces_of(matter: Matter, by_area: Array) -> Surfaces:
     faces[:, 30], faces[:, 31] = tables.of_face, by_area
     mesh = mi.Mesh("room", 3 * len(corners), len(corners))
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = aligned(corners)
-    parameters["faces"] = aligned(np.arange(3 * len(corners)), np.uint32)
+    parameters["vertex_positions"] = padded(corners)
+    parameters["faces"] = padded(np.arange(3 * len(corners)), np.uint32)
     parameters.update()
     scene = mi.load_dict({"type": "scene", "room": mesh})
-    texels, slopes = (mi.UInt32(x) for x in (tables.texels, tables.slopes))
+    texels, slopes = (upload(x, np.uint32) for x in (tables.texels, tables.slopes))
     return Surfaces(scene, upload_table(faces), upload_table(tables.rows), texels, slopes)
 
 

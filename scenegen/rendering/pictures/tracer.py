@@ -28,7 +28,7 @@ from scenegen.rendering.pictures.paths import Camera, trace_paths
 from scenegen.rendering.pictures.sky import SUNLESS, Outside, outside, sun_height
 from scenegen.rendering.pictures.surfaces import Surfaces, lobes_at, meet, surfaces_of
 from scenegen.rendering.pixel_samples import sample_positions
-from scenegen.rendering.tables import aligned
+from scenegen.rendering.tables import upload
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -82,7 +82,7 @@ def _trace_one(
     first, last = lane * at_once, (lane + 1) * at_once
     dr.eval(x, y, first, last)  # so that all pictures share a kernel
     sums = trace_paths(
-        surfaces, lights, camera, x, y, mi.Float(aligned(places)), first, last,
+        surfaces, lights, camera, x, y, upload(places), first, last,
         dr.opaque(mi.UInt64, seed), dr.opaque(mi.Float, BRIGHTEST * mean),
     )  # fmt: skip
     planes = [*sums.radiance, *sums.albedo, *sums.normal, sums.hit]

@@ -135,9 +135,9 @@ def test_scores_never_replace_the_truth_that_a_submission_names(
     assert (folder / "rooms.h5").read_bytes() == before
 
 
-def test_what_cannot_be_viewed(truths, folder, check_refusal):
-    """What can is in `tests/metrics/test_viewing.py`; here no page is ever served."""
-    pytest.importorskip("viser")
+def test_what_is_viewed(truths, folder, check_refusal):
+    pytest.importorskip("rerun")
+    from recordings import recorded
     from submissions import good_answers, good_rooms
 
     path = good_rooms(folder, truths.rooms)
@@ -149,10 +149,11 @@ def test_what_cannot_be_viewed(truths, folder, check_refusal):
         ((path, "--truth", truths.iqtt), (truths.iqtt.name,)),
         ((path, *truth, "--items", "2,9"), ("--items", "row 9")),
         ((path, *truth, "--scores", "s.json"), ("s.json",)),
-        ((path, *truth, "--host", "192.0.2.1"), ("--host", "--public")),
     ):
         result = bench("view", *arguments)
         check_refusal(result.exit_code, result.stdout, result.stderr, words)
+    assert bench("view", path, *truth, "--out", "x.rrd").exit_code == 0
+    assert len(recorded("x.rrd", "scene")["/about"]) > 1
 
 
 def test_score_gives_the_hints_of_validate(truths, folder):
