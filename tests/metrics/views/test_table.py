@@ -38,7 +38,7 @@ HOSTILE = [
     "",
     "</title></style><!--",
 ]
-TAGS = {"h3", "html", "head", "meta", "title", "style", "body", "h1", "div", "bdi", "small", "main"}
+TAGS = {"h2", "html", "head", "meta", "title", "style", "body", "h1", "div", "bdi", "small", "main"}
 TAGS |= {"table", "thead", "tbody", "tr", "th", "td", "ul", "li", "link"}
 ATTRIBUTES = {"lang", "charset", "name", "content", "class", "scope", "http-equiv", "rel", "href"}
 ATTRIBUTES |= {"role", "aria-label", "tabindex"}
