@@ -122,9 +122,9 @@ def draw_groups(
     keys.sort(key=_by_number)
     floors = [_group_floor(files[0], by, key, name) for key in keys]
     with _figure(path, overwrite, width, 0.62 * width) as axes:
-        for place, (group, label) in enumerate(zip(groups, labels_of(files), strict=True)):
-            color, marker = LOOKS[place % len(LOOKS)]
-            aside = 0.12 * (place - (len(files) - 1) / 2)
+        for i, (group, label) in enumerate(zip(groups, labels_of(files), strict=True)):
+            color, marker = LOOKS[i % len(LOOKS)]
+            aside = 0.12 * (i - (len(files) - 1) / 2)
             for at, key in enumerate(keys):
                 _dot(axes, group[key][name], at + aside, color, marker, along="x")
             values = [group[key][name].value for key in keys]

@@ -240,6 +240,8 @@ def paper_table(figures: Sequence[Figure]) -> Table:
         about = (f.method, f.data, angle, labels, str(f.table))
         rows.setdefault(about, {})[f.metric] = Cell(f.text, f"± {f.spread}" if f.spread else "")
     head = ("method", "data", "view angle", "labels", "table", *names)
-    cells = ((*about, *(row.get(name, Cell()) for name in names)) for about, row in rows.items())
+    cells: list[list[Cell | str]] = [
+        [*about, *(row.get(name, Cell()) for name in names)] for about, row in rows.items()
+    ]
     note = f"{SOURCE}, {REPORTED}, whose unit of length the paper does not state"
     return replace(make_table("as the paper reports", head, cells), notes=(note,))

@@ -10,7 +10,7 @@ from metrics.measured.reader import Images
 from metrics.score_file import read_scores
 from metrics.scoring.evaluate import Runs
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
-from metrics.scoring.records import ScoreFile
+from metrics.scoring.records import ScoreFile, Scores
 from metrics.scoring.truth_digests import require_truth, stated_truth
 from metrics.views.examples import examples_of
 from metrics.views.figures import draw_groups, draw_histogram, svg_url
@@ -103,7 +103,7 @@ def group_charts(files: Sequence[ScoreFile]) -> list[Section]:
     return [Section(title, charts=charts)] if charts else []
 
 
-def _group(file: ScoreFile, grouping: str, key: str) -> object:
+def _group(file: ScoreFile, grouping: str, key: str) -> Scores:
     groups = file.by_view_angle if grouping == "angle" else file.by_distractor
     return groups.get(key, {})
 

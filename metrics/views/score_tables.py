@@ -68,7 +68,8 @@ def text_report(
         kinds = scores.by_distractor if scores.task == "iqtt" else {}
         tables += [t for t in group_tables(scores) if t.title == BY_KIND and len(kinds) > 1]
         missing = _not_scored(scores)
-        notes.append(f"more: --all ({len(scores.metrics)} metrics), --json, --html{missing}")
+        count = f"{len(scores.metrics)} metrics, " * (len(scores.metrics) > 1)
+        notes.append(f"more: --all ({count}by group), --json, --html{missing}")
     return (to_markdown if as_markdown else to_text)(title, tables, notes, width)
 
 
@@ -130,14 +131,13 @@ def _beside(reference: float, score: Score) -> str:
 
 def alignment_tables(scores: ScoreFile) -> Iterator[Table]:
     """Yield the scores of depth under each alignment side by side, the one that ranks first."""
-    rows = []
+    rows: list[Sequence[Cell | str]] = []
     for alignment, shown in _by_alignment(scores):
         ranks = alignment == scores.alignment
         label = f"{alignment} (ranks)" if ranks else alignment
-        rows.append((not ranks, [label, *map(score_cell, shown)]))
+        rows.insert(0 if ranks else len(rows), (label, *map(score_cell, shown)))
     if rows:
-        table = [row for _, row in sorted(rows, key=lambda row: row[0])]
-        yield make_table("depth after each alignment", ("alignment", *ALIGNMENT_SCORES), table)
+        yield make_table("depth after each alignment", ("alignment", *ALIGNMENT_SCORES), rows)
 
 
 def _by_alignment(scores: ScoreFile) -> Iterator[tuple[str, list[Score | None]]]:
@@ -266,9 +266,8 @@ def title_of(scores: ScoreFile) -> str:
     """Return method, truth and size; of images also what was fitted, the protocol and the unit."""
     texts = [f"{plain(scores.method)} on {plain(_truth_name(scores.meta))}: {size_of(scores)}"]
     if scores.task != "iqtt":
-        fitted = "none (metric)" if scores.alignment == "none" else scores.alignment
-        fitted += "" if scores.alignment == "none" else " (fitted to the truth of each image)"
-        texts += [f"alignment: {fitted}"]
+        how = "metric" if scores.alignment == "none" else "fitted to the truth of each image"
+        texts += [f"alignment: {scores.alignment} ({how})"]
         texts += [f"protocol: {scores.protocol}"] if scores.protocol else []
         unit = "metre" if scores.task == "measured" else scores.length
         texts += [f"unit: {unit}"]

@@ -185,8 +185,10 @@ def _wrapped(text: str, width: int | None) -> list[str]:
     line = printable(text)
     if width is None:
         return [line]
-    whole = {"break_long_words": False, "break_on_hyphens": False}
-    return textwrap.wrap(line, max(width, 20), subsequent_indent="  ", **whole) or [""]
+    return textwrap.wrap(
+        line, max(width, 20), subsequent_indent="  ", break_long_words=False,
+        break_on_hyphens=False,
+    )  # fmt: skip
 
 
 def _markdown(text: str) -> str:
