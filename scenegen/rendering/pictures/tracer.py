@@ -1,7 +1,7 @@
-"""Path-traced pictures of closed rooms.
+"""Path-traced pictures: of closed rooms one at a time, of the paper's rooms many at once.
 
-Images are traced one at a time, with samples at `pixel_samples.sample_positions`, and a pixel's
-samples are added in a fixed order, so that the same command gives the same bytes.
+Samples are at `pixel_samples.sample_positions`, and a pixel's samples are added in a fixed order,
+so that the same command gives the same bytes.
 """
 
 from collections.abc import Sequence
@@ -17,18 +17,23 @@ from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import from_json
 from scenegen.description.interiors import Interior
 from scenegen.description.specs import DatasetSpec
+from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.furniture.room_shell import REVEAL
+from scenegen.rendering.drjit_renderer import padded_rays, upload_scenes
+from scenegen.rendering.ground_truth import encode_image
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pictures.assets import environment_of, materials_of
+from scenegen.rendering.pictures.closed_rooms import ClosedRoom
 from scenegen.rendering.pictures.denoiser import denoised
 from scenegen.rendering.pictures.development import develop
-from scenegen.rendering.pictures.lights import Lights, Window, lights_of
+from scenegen.rendering.pictures.lights import Window, lights_of
 from scenegen.rendering.pictures.matter import gather_matter
-from scenegen.rendering.pictures.paths import Camera, trace_paths
+from scenegen.rendering.pictures.paper_rooms import PaperRooms, with_intensities
+from scenegen.rendering.pictures.paths import Camera, Room, Samples, trace_paths
 from scenegen.rendering.pictures.sky import SUNLESS, Outside, outside, sun_height
 from scenegen.rendering.pictures.surfaces import Surfaces, lobes_at, meet, surfaces_of
 from scenegen.rendering.pixel_samples import sample_positions
-from scenegen.rendering.tables import aligned
+from scenegen.rendering.tables import aligned, gather_row
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -38,19 +43,46 @@ BRIGHTEST = 60.0  # radiance that indirect light may add at once, in units of th
 LANES = 2  # of a pixel, at most
 
 
+def trace_images(batch: SceneBatch, variant: str) -> Array:
+    """Return images of the paper's rooms, (B, H, W, 3), in the spec's image type, at once."""
+    mi.set_variant(variant)
+    spec, count = batch.spec, len(batch)
+    models = [mesh_to_cast(batch.shape_of, x) for x in batch.names if spec.source != "shapes"]
+    scenes, cameras = upload_scenes(with_intensities(batch), variant, models)
+    pixels, lanes = padded_rays(spec), lanes_of(spec)
+    index = dr.arange(mi.UInt32, count * pixels * lanes)
+    item, pixel = index // (pixels * lanes), index // lanes % pixels
+    row = gather_row(cameras, item, 13)
+    axes = (mi.Vector3f(*row[i:12:4]) for i in range(4))
+    camera = Camera(*axes, row[12], *(dr.opaque(mi.Float, n) for n in (spec.width, spec.height)))
+    seeds = np.zeros(count + 1, np.uint64)  # one more, as tables of one value get another kernel
+    for b in range(count):
+        seeds[b] = path_seed(batch, b)
+    seed = dr.gather(mi.UInt64, mi.UInt64(aligned(seeds, np.uint64)), item)
+    room = PaperRooms(scenes, item, spec.source != "shapes" or "teapot" in spec.shapes)
+    start = mi.PCG32(1, seed, mi.UInt64(pixel + pixels * lanes))
+    even = mi.Vector4f(*(start.next_float32() for _ in range(4)))
+    sums = _sums(spec, room, camera, pixel, index % lanes, (seed, index % (pixels * lanes)), np.inf, even)
+    dr.eval(sums.radiance)
+    values = np.stack([np.asarray(plane) for plane in sums.radiance], -1)
+    values = values.reshape(count, pixels, lanes, 3)[:, : spec.height * spec.width]
+    images = values.sum(axis=2, dtype=np.float64) / spec.spp
+    return encode_image(images.reshape(count, spec.height, spec.width, 3), spec.image_dtype)
+
+
 def trace_pictures(batch: SceneBatch, names: Sequence[str], variant: str) -> dict[str, Array]:
     """Return pictures, (B, H, W, 3), in the spec's image type, and what else `names` ask for."""
     mi.set_variant(variant)
     found: list[dict[str, Array]] = []
     for b in range(len(batch)):
         if b == 0 or batch.index[b] != batch.index[b - 1]:  # views of a room share it
-            room = _lit_room(batch, b)
-        found.append(_trace_one(batch, b, room, names))
+            room, mean = _lit_room(batch, b)
+        found.append(_trace_one(batch, b, room, mean, names))
     return {name: np.stack([one[name] for one in found]) for name in names}
 
 
-def _lit_room(batch: SceneBatch, b: int) -> tuple[Surfaces, Lights, float]:
-    """Return what an image's room holds, its lights, and the mean radiance of its walls."""
+def _lit_room(batch: SceneBatch, b: int) -> tuple[ClosedRoom, float]:
+    """Return what an image's room holds, with its lights, and the mean radiance of its walls."""
     assert batch.interior is not None
     spec = batch.spec
     interior = from_json(Interior, batch.interior[b], "interior")
@@ -61,30 +93,20 @@ def _lit_room(batch: SceneBatch, b: int) -> tuple[Surfaces, Lights, float]:
     share = NIGHT_SHARE if night else DAY_SHARE
     radiance = matter.tables.rows[matter.tables.of_face, 12:15]
     lights = lights_of(beyond, windows_of(interior), matter.soup.corners, radiance, share)
-    surfaces = surfaces_of(matter, lights.by_area)
     x, y, z = interior.size
     # Of walls that reflect half of the light, the mean radiance in all directions.
-    return surfaces, lights, lights.flux / (2 * np.pi * (x * y + y * z + z * x))
+    mean = lights.flux / (2 * np.pi * (x * y + y * z + z * x))
+    return ClosedRoom(surfaces_of(matter, lights.by_area), lights), mean
 
 
 def _trace_one(
-    batch: SceneBatch, b: int, room: tuple[Surfaces, Lights, float], names: Sequence[str]
+    batch: SceneBatch, b: int, room: ClosedRoom, mean: float, names: Sequence[str]
 ) -> dict[str, Array]:
-    spec, (surfaces, lights, mean) = batch.spec, room
+    spec, lanes = batch.spec, lanes_of(batch.spec)
     camera = device_camera(batch, b)
-    seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, int(batch.view[b]))
-    places = sample_positions(spec.spp)
-    lanes = max(n for n in range(1, LANES + 1) if spec.spp % n == 0)
     index = dr.arange(mi.UInt32, spec.height * spec.width * lanes)
-    lane, pixel = index % lanes, index // lanes
-    x, y = mi.Float(pixel % spec.width), mi.Float(pixel // spec.width)
-    at_once = spec.spp // lanes
-    first, last = lane * at_once, (lane + 1) * at_once
-    dr.eval(x, y, first, last)  # so that all pictures share a kernel
-    sums = trace_paths(
-        surfaces, lights, camera, x, y, mi.Float(aligned(places)), first, last,
-        dr.opaque(mi.UInt64, seed), dr.opaque(mi.Float, BRIGHTEST * mean),
-    )  # fmt: skip
+    stream = dr.opaque(mi.UInt64, path_seed(batch, b)), index
+    sums = _sums(spec, room, camera, index // lanes, index % lanes, stream, BRIGHTEST * mean)
     planes = [*sums.radiance, *sums.albedo, *sums.normal, sums.hit]
     dr.eval(planes)  # at once: each would trace the paths again
     values = np.stack([np.asarray(plane) for plane in planes], -1)
@@ -100,8 +122,33 @@ def _trace_one(
     image, exposure = develop(radiance, albedo, hit[..., 0] > 0.5, spec.image_dtype, noise)
     found = {"image": image, "exposure": exposure}
     if "albedo" in names:
-        found["albedo"] = _albedo(spec, surfaces, camera)
+        found["albedo"] = _albedo(spec, room.surfaces, camera)
     return found
+
+
+def path_seed(batch: SceneBatch, b: int) -> int:
+    """Return the seed of an image's random numbers."""
+    return item_seed(batch.spec.seed, int(batch.index[b]), Purpose.PATHS, int(batch.view[b]))
+
+
+def lanes_of(spec: DatasetSpec) -> int:
+    """Return how many lanes share the samples of a pixel."""
+    return max(n for n in range(1, LANES + 1) if spec.spp % n == 0)
+
+
+def _sums(
+    spec: DatasetSpec, room: Room, camera: Camera, pixel: Any, lane: Any, stream: tuple[Any, Any],
+    ceiling: float, even=None,
+) -> Samples:  # fmt: skip
+    """Trace the samples of lanes of pixels, whose random numbers have a seed and a number."""
+    x, y = mi.Float(pixel % spec.width), mi.Float(pixel // spec.width)
+    at_once = spec.spp // lanes_of(spec)
+    first, last = lane * at_once, (lane + 1) * at_once
+    dr.eval(x, y, first, last)  # so that all pictures share a kernel
+    rng = mi.PCG32(1, stream[0], mi.UInt64(stream[1]))
+    places = mi.Float(aligned(sample_positions(spec.spp)))
+    ceiling = dr.opaque(mi.Float, ceiling)
+    return trace_paths(room, camera, x, y, places, first, last, rng, ceiling, even)
 
 
 def device_camera(batch: SceneBatch, b: int) -> Camera:
