@@ -107,7 +107,6 @@ check: $(VENV)/.dev
 
 bench: $(VENV)/.test
 	$(BIN)/python -m benchmarks.rendering.render
-	$(BIN)/python -m benchmarks.rendering.shapes
 	$(BIN)/python -m benchmarks.rendering.questions
 	$(BIN)/python -m benchmarks.rendering.stream
 	$(BIN)/python -m benchmarks.rendering.interiors_speed

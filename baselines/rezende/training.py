@@ -191,8 +191,8 @@ def windows(model: Model, offsets: Tensor, pictures: Pictures) -> tuple[Array, .
 
     A vertex only changes the pixels of its triangles, and, as offsets are smoothed, those of its
     neighbours. What happens elsewhere is noise to it. Smoothing reaches a little beyond the
-    windows, so they bias the gradient a little; docs/baselines.md has the figures. A vertex on the
-    far side, none of whose triangles faces the camera, changes no pixel: its window is empty.
+    windows, so they bias the gradient a little. A vertex on the far side, none of whose triangles
+    faces the camera, changes no pixel: its window is empty.
     """
     size = pictures.views.size
     vertices = pictures.radius * model.vertices(offsets.detach()).numpy()

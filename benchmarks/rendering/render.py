@@ -12,7 +12,6 @@ import argparse
 import shutil
 import statistics
 import tempfile
-import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -71,63 +70,6 @@ def end_to_end(
     return {**record, "workers": used, "note": f"{used} workers"}
 
 
-def stage(rooms: str, count: int, repeats: int) -> dict[str, Any]:
-    """Time pack, launch and fetch of scenes that were proposed before, as arrays.
-
-    As in make_dataset, a batch is packed while the one before is cast.
-    """
-    import numpy as np
-
-    from scenegen.objects.sources import file_objects
-    from scenegen.rendering.packing import SceneBatch, pack_arrays
-    from scenegen.rendering.renderer import launch
-    from scenegen.rooms.make import DEFAULT_BATCH
-    from scenegen.rooms.reader import RoomsFile
-    from scenegen.sampling.scenes import sample_scenes
-
-    with RoomsFile(rooms) as file:
-        spec = file.spec
-    objects = file_objects(spec)
-    _, scenes = sample_scenes(spec, np.arange(2 * count), np.zeros(2 * count, int), objects)
-    rows = np.arange(count)  # of these; a few proposals find no room
-    parts = [scenes.take(rows[i : i + DEFAULT_BATCH]) for i in range(0, count, DEFAULT_BATCH)]
-
-    def packed(part: Any) -> SceneBatch:
-        return pack_arrays(spec, part, range(len(spec.views)), objects)
-
-    def render_all() -> None:
-        batch = packed(parts[0])
-        for following in [*parts[1:], None]:
-            fetch = launch(batch)
-            if following is not None:
-                batch = packed(following)
-            fetch()
-
-    return {**measured(render_all, repeats), "images": count}
-
-
-def proposing(count: int, repeats: int) -> dict[str, Any]:
-    """Take the processor time of proposing scenes that all find room for their objects."""
-    from scenegen.description.specs import DatasetSpec
-    from scenegen.objects.catalogue import objects_of
-    from scenegen.rooms.make import DEFAULT_BATCH
-    from scenegen.sampling.proposals import ProposalQueue
-
-    spec = DatasetSpec()
-
-    def propose_all() -> float:
-        start = time.process_time()
-        queue = ProposalQueue(spec, range(count), objects_of(spec))
-        while (scenes := queue.take(DEFAULT_BATCH, count)) is not None:
-            for item in scenes.index.tolist():
-                queue.accept(item)
-        return time.process_time() - start
-
-    propose_all()
-    seconds = [propose_all() for _ in range(repeats)]
-    return {"seconds": seconds, "images": count, "busy": 1.0, "note": "processor time"}
-
-
 def bare_cast(rooms: str, count: int, repeats: int, size: int) -> dict[str, Any]:
     """Time the nearest hits of the primary rays alone, in batches of a size.
 
@@ -142,6 +84,7 @@ def bare_cast(rooms: str, count: int, repeats: int, size: int) -> dict[str, Any]
     from scenegen.rendering.drjit_renderer import upload_scenes
     from scenegen.rendering.packing import SceneBatch, pack
     from scenegen.rendering.rays import closest_hit
+    from scenegen.rendering.tables import upload
     from scenegen.rooms.reader import RoomsFile
 
     variant = select_variant("cpu")
@@ -155,7 +98,7 @@ def bare_cast(rooms: str, count: int, repeats: int, size: int) -> dict[str, Any]
         table = np.zeros((len(batch), 16), np.float32)
         table[:, :12] = batch.world_from_camera[:, :3].reshape(-1, 12)
         table[:, 12] = [pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()]
-        return mi.Float(table.ravel())
+        return upload(table)
 
     def cast(batch: SceneBatch, uploaded: Any, table: Any) -> None:
         pixels = spec.height * spec.width
@@ -203,12 +146,6 @@ def basic_shapes(folder: str, quick: bool) -> Iterator[Row]:
     whole = {"rooms": rooms, "repeats": repeats}
     yield f"(b) end to end, N = {first:,}", "rendering.render:end_to_end", {**whole, "count": first}
     shared = {"rooms": rooms, "count": scenes, "repeats": repeats}
-    yield "(b) rendering stage alone", "rendering.render:stage", shared
-    yield (
-        "(b) proposing scenes alone",
-        "rendering.render:proposing",
-        {"count": second, "repeats": repeats},
-    )
     yield "(c) bare cast", "rendering.render:bare_cast", {**shared, "size": 256}
     plain = {"path": rooms, "count": few, "repeats": repeats}
     for coarse, meshes in ((False, "the same"), (True, "coarse")):
@@ -220,10 +157,13 @@ def basic_shapes(folder: str, quick: bool) -> Iterator[Row]:
     yield name, "rendering.render:end_to_end", how
     how = {**whole, "count": largest, "repeats": 1}
     yield f"(b) end to end, N = {largest:,}", "rendering.render:end_to_end", how
+    traced = {"shading": "path", "height": 32, "width": 32, "spp": 16, "workers": 2}
+    how = {"rooms": rooms, "count": first // 2, "repeats": repeats, **traced}
+    yield "--shading path, 32 pixels, 16 samples", "rendering.render:end_to_end", how
 
 
 def built_in_objects(folder: str, quick: bool) -> Iterator[Row]:
-    """Yield the rows of built-in objects, and of the two ways of shading."""
+    """Yield the rows of built-in objects."""
     rooms = f"{folder}/objects.h5"
     count, largest, repeats = (500, 1000, 2) if quick else (5000, 20000, 3)
     # Two workers, as what one process keeps in memory would be neither empty nor on disk.
@@ -233,15 +173,9 @@ def built_in_objects(folder: str, quick: bool) -> Iterator[Row]:
     yield f"{name}, warm cache", "rendering.render:end_to_end", how
     how = {**whole, "count": largest, "repeats": 1}
     yield f"(b) end to end, N = {largest:,}, warm cache", "rendering.render:end_to_end", how
-    stage = {"rooms": rooms, "count": 128 if quick else 512, "repeats": repeats}
-    yield "(b) rendering stage alone", "rendering.render:stage", stage
     plain = {"path": rooms, "count": 8 if quick else 60, "repeats": repeats, "coarse": False}
     for variant in VARIANTS:
         yield f"(a) {variant}", "rendering.plain_mitsuba:rooms", {**plain, "variant": variant}
-    few = {"rooms": rooms, "count": 16 if quick else 64, "repeats": 1, "workers": 1}
-    for shading in ("paper", "path"):
-        name = f"basic shapes, --shading {shading}"
-        yield name, "rendering.render:end_to_end", {**few, "shading": shading}
 
 
 def folder_of_meshes(folder: str, quick: bool) -> Iterator[Row]:
@@ -268,7 +202,6 @@ def main() -> None:
         print_ratio("end to end / (a), the same meshes", whole, fastest(shapes, "(a) the same"), 6)
         print_ratio("end to end / (a), coarse meshes", whole, fastest(shapes, "(a) coarse"), 6)
         print_ratio("end to end / (c)", whole, cast, 0.3)
-        print_ratio("rendering stage / (c)", fastest(shapes, "(b) rendering"), cast, 0.75)
         print()
         objects = print_table("built-in objects", built_in_objects(folder, quick), folder)
         plain = fastest(objects, "(a)")

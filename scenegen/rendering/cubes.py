@@ -14,7 +14,7 @@ import numpy as np
 
 from scenegen.common.rotations import product
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.tables import gather_row, unit, upload_table
+from scenegen.rendering.tables import gather_row, unit, upload, upload_table
 
 SMALLEST = 1e-20  # least component of a direction, to avoid a division by zero
 
@@ -46,7 +46,7 @@ def upload_cubes(batch: SceneBatch) -> Cubes:
     center = product(batch.world_from_object[..., :3, 3], np.swapaxes(frame, 1, 2))
     return Cubes(
         slots=batch.spec.object_slots,
-        count=mi.UInt32(batch.object_count),
+        count=upload(batch.object_count, np.uint32),
         frame=upload_table(frame.reshape(-1, 9)),
         center=upload_table(center),
     )

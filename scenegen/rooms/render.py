@@ -191,7 +191,8 @@ def _shown(
     """
     spec = batch.spec
     visible = visible_pixels(truth["object_id"], spec.object_slots)
-    enough = spec.seen_enough(visible, batch.object_count).reshape(len(scenes), -1).all(axis=1)
+    seen = spec.seen_enough(visible, batch.object_count)
+    enough = np.asarray(seen.reshape(len(scenes), -1).all(axis=1))
     traced = _traced(batch, np.flatnonzero(enough), pictures, device)
     for row, first in enumerate(range(0, len(batch), len(spec.views))):
         images = slice(first, first + len(spec.views))

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from benchmarks.experiments.public_sets import SETS, questions
+from benchmarks.public_sets import SETS, questions
 from iqtt.audit.strangers import audit_strangers
 
 

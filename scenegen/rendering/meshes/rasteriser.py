@@ -24,7 +24,7 @@ from scenegen.camera import pixel_size
 from scenegen.common.rotations import product
 from scenegen.objects.solids import Mesh
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.tables import gather_packet, gather_row, upload_rows, upload_table
+from scenegen.rendering.tables import gather_packet, gather_row, upload, upload_rows, upload_table
 
 Array = NDArray[Any]
 NOTHING = 0xFFFFFFFF_FFFFFFFF  # the key of a pixel that no triangle covers
@@ -105,9 +105,6 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
     pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
     placed[: len(model), 12] = pixel[image]
 
-    def numbers(values: Array) -> Any:
-        return mi.UInt32(values.astype(np.uint32) if len(values) else np.zeros(1, np.uint32))
-
     shift = (first_face[model] - first_thread) % 2**32
     starts = np.stack([image, shift, first_vertex[model], first_normal[model]], axis=1)
     return Triangles(
@@ -119,10 +116,10 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
         vertices=vertices,
         faces=faces,
         normals=normals,
-        draw=numbers(np.repeat(np.arange(len(model)), threads)),
+        draw=upload(np.repeat(np.arange(len(model)), threads), np.uint32),
         placed=upload_table(placed),
         starts=upload_rows([starts], np.uint32)[0],
-        slot=numbers(slot),
+        slot=upload(slot, np.uint32),
     )
 
 
@@ -143,8 +140,8 @@ def rasterise(triangles: Triangles, x: Any, y: Any) -> Any:
         more = -(-dr.gather(mi.UInt32, area, large).numpy().astype(np.int64) // CHUNK) - 1
         rest = np.repeat(large.numpy(), more)
         chunk = 1 + np.arange(len(rest)) - np.repeat(np.cumsum(more) - more, more)
-        start = mi.UInt32((chunk * CHUNK).astype(np.uint32))
-        dr.eval(keys, _cover(triangles, keys, mi.UInt32(rest), start, x, y))
+        threads, start = upload(rest, np.uint32), upload(chunk * CHUNK, np.uint32)
+        dr.eval(keys, _cover(triangles, keys, threads, start, x, y))
     return keys
 
 

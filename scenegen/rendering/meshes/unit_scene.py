@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scenegen.common.records import check
 from scenegen.objects.cast_meshes import corner_table, normal_table, overlapping
 from scenegen.objects.solids import UnitShape
-from scenegen.rendering.tables import upload_table
+from scenegen.rendering.tables import padded, upload_table
 
 Array = NDArray[Any]
 LATTICE = 4.0  # distance between the shapes' origins; their bounding radius is 1
@@ -82,19 +82,11 @@ def mitsuba_shape(shape: UnitShape, place: Array) -> Any:
     return triangle_mesh(shape.name, overlapping(shape.triangles) + place)
 
 
-def triangle_mesh(
-    name: str, triangles: Array, normals: Array | None = None, bsdf: Any = None
-) -> Any:
-    """Return triangles, (F, 3, 3), as a Mitsuba mesh, with corner normals or flat."""
-    count = 3 * len(triangles)
-    properties = mi.Properties()
-    if bsdf is not None:
-        properties["bsdf"] = bsdf
-    mesh = mi.Mesh(name, count, len(triangles), properties, has_vertex_normals=normals is not None)
+def triangle_mesh(name: str, triangles: Array) -> Any:
+    """Return triangles, (F, 3, 3), as a Mitsuba mesh."""
+    mesh = mi.Mesh(name, 3 * len(triangles), len(triangles))
     parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = triangles.astype(np.float32, copy=False).ravel()
-    parameters["faces"] = np.arange(count, dtype=np.uint32)
-    if normals is not None:
-        parameters["vertex_normals"] = normals.astype(np.float32).ravel()
+    parameters["vertex_positions"] = padded(triangles)
+    parameters["faces"] = padded(np.arange(3 * len(triangles)), np.uint32)
     parameters.update()
     return mesh

@@ -26,7 +26,8 @@ class ClosedRoom:
 
     surfaces: Surfaces
     lights: Lights
-    max_depth: int = 12  # in closed rooms light bounces often
+    max_depth: int = 12  # light bounces often
+    roulette_depth: int = 3
 
     def meet(self, o: Any, d: Any, active: Any) -> tuple[Any, Meeting]:
         """Return whether rays meet a surface, and where."""

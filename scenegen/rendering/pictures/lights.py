@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.rendering.pictures.sky import Outside
-from scenegen.rendering.tables import aligned, gather_row, unit, upload_table
+from scenegen.rendering.tables import gather_row, unit, upload, upload_table
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -94,7 +94,7 @@ def lights_of(
     ]
     rows, columns = map(_number, outside.radiance.shape[:2])
     return Lights(
-        map=mi.Float(aligned(outside.radiance)),
+        map=upload(outside.radiance),
         rows=rows,
         columns=columns,
         sun=[_number(value) for value in sun],

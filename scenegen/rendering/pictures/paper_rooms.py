@@ -16,7 +16,7 @@ import mitsuba
 import numpy as np
 
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.pictures.paths import Meeting
+from scenegen.rendering.pictures.paths import Lobes, Meeting
 from scenegen.rendering.rays import (
     BEFORE_LIGHTS,
     Scenes,
@@ -26,6 +26,7 @@ from scenegen.rendering.rays import (
     occluded,
     visible_normal,
 )
+from scenegen.rendering.surfaces.in_kernel import MESH
 from scenegen.rendering.tables import gather_row, unit
 
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -37,9 +38,7 @@ def with_intensities(batch: SceneBatch) -> SceneBatch:
     to_target = batch.light_position - batch.spec.camera_target
     distance = np.sqrt((to_target**2).sum(axis=-1, keepdims=True))
     k_l, k_q = batch.attenuation[:, None, :1], batch.attenuation[:, None, 1:]
-    return replace(
-        batch, light_color=np.pi * batch.light_color * distance / (k_l + k_q * distance)
-    )
+    return replace(batch, light_color=np.pi * batch.light_color * distance / (k_l + k_q * distance))
 
 
 class Phong(NamedTuple):
@@ -96,15 +95,13 @@ class Phong(NamedTuple):
 class PaperRooms:
     """A `paths.Room` for each lane, from a batch that has the intensities of lights.
 
-    Attributes:
-        item: number of each lane's scene.
-        meshes: whether surfaces may have other normals than their triangles.
+    `item` is the number of each lane's scene.
     """
 
     scenes: Scenes
     item: Any
-    meshes: bool
     max_depth: int = 8
+    roulette_depth: int = 8  # never: most paths leave the room soon
 
     def meet(self, o: Any, d: Any, _active: Any) -> tuple[Any, Meeting]:
         """Return whether rays meet a surface, and where."""
@@ -113,7 +110,10 @@ class PaperRooms:
         p = o + dr.select(object_id >= 0, t, 0) * d
         flat, smooth = normals_at(scenes, item, p, d, object_id, face, uv)
         n = visible_normal(scenes, item, p, d, object_id, (flat, smooth))
-        flat = visible_normal(scenes, item, p, d, object_id, (flat, flat)) if self.meshes else n
+        if MESH in scenes.surfaces.kinds:
+            flat = visible_normal(scenes, item, p, d, object_id, (flat, flat))
+        else:
+            flat = n
         row = item * (1 + scenes.slots) + mi.UInt32(dr.maximum(object_id, 0))
         material = gather_row(scenes.materials, row, 5 if scenes.glossy else 3)
         rho, mirrored = mi.Color3f(*material[:3]), unit(d - 2 * dr.dot(d, n) * n)
@@ -127,24 +127,24 @@ class PaperRooms:
         ambient, background = mi.Color3f(*about[:3]), mi.Color3f(*about[8:BEFORE_LIGHTS])
         return dr.select(direct, background, ambient), mi.Float(0)
 
-    def sample_light(self, lobes: Phong, p: Any, which: Any, _place: Any) -> tuple[Any, ...]:
+    def sample_light(self, lobes: Lobes, p: Any, which: Any, _place: Any) -> tuple[Any, ...]:
         """Draw one of the lights by what the surface reflects of it, shadows apart."""
-        about = self._about()
-        lights = []
-        total = mi.Float(0)
+        about, total, lights = self._about(), mi.Float(0), []
         for j in range(self.scenes.light_slots):
             light = about[BEFORE_LIGHTS + 6 * j :][:6]
             to_light = mi.Vector3f(*light[:3]) - p
             squared = dr.maximum(dr.dot(to_light, to_light), 1e-12)
-            distance = dr.sqrt(squared)
-            toward, radiance = to_light / distance, mi.Color3f(*light[3:]) / squared
+            distance, radiance = dr.sqrt(squared), mi.Color3f(*light[3:]) / squared
+            toward = to_light / distance
             weight = dr.sum(lobes.reflected(toward)[0] * radiance)
-            total = total + weight  # not in place: each end is kept
-            lights.append((toward, distance, radiance / weight, total))
-        chosen = mi.Vector3f(0, 1, 0), mi.Float(1), mi.Color3f(0)
-        for *light, end in reversed(lights):
-            chosen = [dr.select(which * total < end, a, b) for a, b in zip(light, chosen)]
-        return *chosen[:2], chosen[2] * total, mi.Float(dr.inf)
+            total = total + weight  # not in place: it is kept
+            lights.append((total, toward, distance, radiance / weight))
+        d, far, value = mi.Vector3f(0, 1, 0), mi.Float(1), mi.Color3f(0)
+        for end, toward, distance, radiance in reversed(lights):
+            chosen = which * total < end
+            d, far = dr.select(chosen, toward, d), dr.select(chosen, distance, far)
+            value = dr.select(chosen, radiance, value)
+        return d, far, value * total, mi.Float(dr.inf)
 
     def blocked(self, p: Any, d: Any, distance: Any, active: Any) -> Any:
         """Return whether a surface is nearer than `distance`."""
@@ -154,4 +154,6 @@ class PaperRooms:
         return ~active | occluded(scenes, item, p, d * distance, active)
 
     def _about(self) -> list[Any]:
-        return gather_row(self.scenes.scenes, self.item, BEFORE_LIGHTS + 6 * self.scenes.light_slots)
+        return gather_row(
+            self.scenes.scenes, self.item, BEFORE_LIGHTS + 6 * self.scenes.light_slots
+        )

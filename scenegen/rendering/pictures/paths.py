@@ -17,7 +17,7 @@ from scenegen.rendering.tables import unit
 
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
-ROULETTE_DEPTH = 3  # segments after which a path may end at random
+# Of a sequence whose points fill four dimensions evenly (M. Roberts' R4).
 STEPS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)
 OFF = 1e-4  # of a surface's distance, in units of length, at which rays start
 
@@ -60,7 +60,13 @@ class Meeting(NamedTuple):
 class Room(Protocol):
     """What paths meet; a room for each lane, or one for all."""
 
-    max_depth: int  # segments of a path
+    @property
+    def max_depth(self) -> int:
+        """Most segments of a path."""
+
+    @property
+    def roulette_depth(self) -> int:
+        """Segments after which a path may end at random."""
 
     def meet(self, o: Any, d: Any, active: Any) -> tuple[Any, Meeting]:
         """Return whether rays along unit vectors meet a surface, and where."""
@@ -124,6 +130,9 @@ def trace_paths(
         rng: random numbers of the lanes.
         ceiling: greatest radiance of indirect light that a sample may find at once; few brighter
             ones would make specks.
+        even: four random numbers of each pixel, the same for all its lanes, from which those of its
+            samples' first surfaces are spread evenly; None for numbers that know nothing of each
+            other.
     """
     k = mi.UInt32(first)
     place = dr.gather(mi.Point2f, places, k, k < last)
@@ -148,12 +157,10 @@ def trace_paths(
 
         goes_on = found & ~hit.shines & (depth + 1 < room.max_depth)
         start = mi.Point3f(hit.p + OFF * hit.flat)
-        which, a, b = rng.next_float32(), rng.next_float32(), rng.next_float32()
-        if dr.hint(False, mode="scalar"):
-            spread = even + mi.Float(k) * mi.Vector4f(*STEPS)
-            spread -= dr.floor(spread)
-            which = dr.select(direct, spread.x, which)
-        wo, distance, light, other = room.sample_light(hit.lobes, start, which, mi.Point2f(a, b))
+        numbers = _numbers(rng, even, k, direct)
+        wo, distance, light, other = room.sample_light(
+            hit.lobes, start, numbers[0], mi.Point2f(*numbers[1:3])
+        )
         value, own = hit.lobes.reflected(wo)
         light *= beta * value * dr.select(dr.isfinite(other), _weight(other, own), 1)
         asked = goes_on & (dr.max(light) > 0)
@@ -161,16 +168,11 @@ def trace_paths(
         light = dr.select(direct, light, dr.minimum(light, ceiling))
         radiance += dr.select(asked & ~blocked, light, 0)
 
-        which, a, b = rng.next_float32(), rng.next_float32(), rng.next_float32()
-        if dr.hint(False, mode="scalar"):
-            which = dr.select(direct, spread.y, which)
-            a = dr.select(direct, spread.z, a)
-            b = dr.select(direct, spread.w, b)
-        wo, value, density = hit.lobes.sampled(which, mi.Point2f(a, b))
+        wo, value, density = hit.lobes.sampled(numbers[3], mi.Point2f(*numbers[4:]))
         beta *= value
         depth += 1
         survives = dr.minimum(dr.max(beta), 0.95)
-        late = depth >= 8
+        late = depth >= room.roulette_depth
         goes_on &= (dr.max(beta) > 0) & (~late | (rng.next_float32() < survives))
         beta *= dr.select(late, dr.rcp(dr.maximum(survives, 1e-6)), 1)
 
@@ -182,6 +184,16 @@ def trace_paths(
         beta = dr.select(goes_on, beta, 1)
         depth = dr.select(goes_on, depth, 0)
     return Samples(radiance, albedo, normal, hits)
+
+
+def _numbers(rng: Any, even: Any, k: Any, direct: Any) -> list[Any]:
+    """Return random numbers of surfaces: of a light, two of a place on it, of a lobe, two of it."""
+    numbers = [rng.next_float32() for _ in range(6)]
+    if even is not None:
+        spread = even + mi.Float(k) * mi.Vector4f(*STEPS)
+        for i, value in zip((0, 3, 4, 5), spread - dr.floor(spread), strict=True):
+            numbers[i] = dr.select(direct, value, numbers[i])
+    return numbers
 
 
 def _weight(own: Any, other: Any) -> Any:

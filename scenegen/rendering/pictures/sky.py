@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.description.interiors import Interior
+from scenegen.rendering.tables import upload
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -132,7 +133,8 @@ def _sky(sun: tuple[float, float, float]) -> Array:
     view = directions(ROWS, COLUMNS).reshape(-1, 3).astype(np.float32)
     si = dr.zeros(mi.SurfaceInteraction3f, len(view))
     # Its z is up, and `wi` points back.
-    si.wi = mi.Vector3f(-view[:, 0], view[:, 2], -np.abs(view[:, 1]))
+    back = np.stack([-view[:, 0], view[:, 2], -np.abs(view[:, 1])])
+    si.wi = mi.Vector3f(*(upload(axis) for axis in back))
     channels = [*emitter.eval(si)]
     dr.eval(channels)
     found = np.stack([np.asarray(channel, np.float32) for channel in channels], -1)

@@ -13,8 +13,9 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.rendering.meshes.unit_scene import triangle_mesh
 from scenegen.rendering.pictures.matter import Matter
-from scenegen.rendering.tables import aligned, gather_row, unit, upload_table
+from scenegen.rendering.tables import gather_row, unit, upload, upload_table
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -74,13 +75,8 @@ def surfaces_of(matter: Matter, by_area: Array) -> Surfaces:
         first, second = faces[:, 20 + axis, None], faces[:, 22 + axis, None]
         faces[:, 24 + 3 * axis : 27 + 3 * axis] = first * duals[0] + second * duals[1]
     faces[:, 30], faces[:, 31] = tables.of_face, by_area
-    mesh = mi.Mesh("room", 3 * len(corners), len(corners))
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = aligned(corners)
-    parameters["faces"] = aligned(np.arange(3 * len(corners)), np.uint32)
-    parameters.update()
-    scene = mi.load_dict({"type": "scene", "room": mesh})
-    texels, slopes = (mi.UInt32(x) for x in (tables.texels, tables.slopes))
+    scene = mi.load_dict({"type": "scene", "room": triangle_mesh("room", corners)})
+    texels, slopes = (upload(x, np.uint32) for x in (tables.texels, tables.slopes))
     return Surfaces(scene, upload_table(faces), upload_table(tables.rows), texels, slopes)
 
 

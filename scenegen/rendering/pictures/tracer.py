@@ -33,7 +33,7 @@ from scenegen.rendering.pictures.paths import Camera, Room, Samples, trace_paths
 from scenegen.rendering.pictures.sky import SUNLESS, Outside, outside, sun_height
 from scenegen.rendering.pictures.surfaces import Surfaces, lobes_at, meet, surfaces_of
 from scenegen.rendering.pixel_samples import sample_positions
-from scenegen.rendering.tables import aligned, gather_row
+from scenegen.rendering.tables import gather_row, upload
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -53,16 +53,17 @@ def trace_images(batch: SceneBatch, variant: str) -> Array:
     index = dr.arange(mi.UInt32, count * pixels * lanes)
     item, pixel = index // (pixels * lanes), index // lanes % pixels
     row = gather_row(cameras, item, 13)
-    axes = (mi.Vector3f(*row[i:12:4]) for i in range(4))
-    camera = Camera(*axes, row[12], *(dr.opaque(mi.Float, n) for n in (spec.width, spec.height)))
-    seeds = np.zeros(count + 1, np.uint64)  # one more, as tables of one value get another kernel
-    for b in range(count):
-        seeds[b] = path_seed(batch, b)
-    seed = dr.gather(mi.UInt64, mi.UInt64(aligned(seeds, np.uint64)), item)
-    room = PaperRooms(scenes, item, spec.source != "shapes" or "teapot" in spec.shapes)
-    start = mi.PCG32(1, seed, mi.UInt64(pixel + pixels * lanes))
-    even = mi.Vector4f(*(start.next_float32() for _ in range(4)))
-    sums = _sums(spec, room, camera, pixel, index % lanes, (seed, index % (pixels * lanes)), np.inf, even)
+    right, up, back, origin = (mi.Vector3f(*row[i:12:4]) for i in range(4))
+    width, height = (dr.opaque(mi.Float, n) for n in (spec.width, spec.height))
+    camera = Camera(right, up, back, origin, row[12], width, height)
+    seeds = np.array([path_seed(batch, b) for b in range(count)], np.uint64)
+    halves = upload(seeds.astype("<u8").view("<u4"), np.uint32)
+    low, high = (mi.UInt64(dr.gather(mi.UInt32, halves, 2 * item + i)) for i in range(2))
+    seed = low | high << 32
+    ahead = mi.PCG32(1, seed, mi.UInt64(pixel + pixels * lanes))  # a stream that no lane has
+    even = mi.Vector4f(*(ahead.next_float32() for _ in range(4)))
+    rng = mi.PCG32(1, seed, mi.UInt64(index % (pixels * lanes)))
+    sums = _sums(spec, PaperRooms(scenes, item), camera, pixel, index % lanes, rng, np.inf, even)
     dr.eval(sums.radiance)
     values = np.stack([np.asarray(plane) for plane in sums.radiance], -1)
     values = values.reshape(count, pixels, lanes, 3)[:, : spec.height * spec.width]
@@ -105,8 +106,8 @@ def _trace_one(
     spec, lanes = batch.spec, lanes_of(batch.spec)
     camera = device_camera(batch, b)
     index = dr.arange(mi.UInt32, spec.height * spec.width * lanes)
-    stream = dr.opaque(mi.UInt64, path_seed(batch, b)), index
-    sums = _sums(spec, room, camera, index // lanes, index % lanes, stream, BRIGHTEST * mean)
+    rng = mi.PCG32(1, dr.opaque(mi.UInt64, path_seed(batch, b)), mi.UInt64(index))
+    sums = _sums(spec, room, camera, index // lanes, index % lanes, rng, BRIGHTEST * mean)
     planes = [*sums.radiance, *sums.albedo, *sums.normal, sums.hit]
     dr.eval(planes)  # at once: each would trace the paths again
     values = np.stack([np.asarray(plane) for plane in planes], -1)
@@ -137,18 +138,16 @@ def lanes_of(spec: DatasetSpec) -> int:
 
 
 def _sums(
-    spec: DatasetSpec, room: Room, camera: Camera, pixel: Any, lane: Any, stream: tuple[Any, Any],
-    ceiling: float, even=None,
+    spec: DatasetSpec, room: Room, camera: Camera, pixel: Any, lane: Any, rng: Any, ceiling: float,
+    even: Any = None,
 ) -> Samples:  # fmt: skip
-    """Trace the samples of lanes of pixels, whose random numbers have a seed and a number."""
+    """Trace the samples of pixels, of which each lane takes its share."""
     x, y = mi.Float(pixel % spec.width), mi.Float(pixel // spec.width)
     at_once = spec.spp // lanes_of(spec)
     first, last = lane * at_once, (lane + 1) * at_once
     dr.eval(x, y, first, last)  # so that all pictures share a kernel
-    rng = mi.PCG32(1, stream[0], mi.UInt64(stream[1]))
-    places = mi.Float(aligned(sample_positions(spec.spp)))
-    ceiling = dr.opaque(mi.Float, ceiling)
-    return trace_paths(room, camera, x, y, places, first, last, rng, ceiling, even)
+    places, most = upload(sample_positions(spec.spp)), dr.opaque(mi.Float, ceiling)
+    return trace_paths(room, camera, x, y, places, first, last, rng, most, even)
 
 
 def device_camera(batch: SceneBatch, b: int) -> Camera:

@@ -1,6 +1,6 @@
 """Questions as public generators draw them, for `iqtt audit --cubes`.
 
-    python -m benchmarks.experiments.public_sets spatialviz --out spatialviz.json
+    python -m benchmarks.public_sets spatialviz --out spatialviz.json
 
 The generators are simulated from what their code does, not run; docs/public-sets.md names their
 sources and what is simulated. Random numbers are ours, so that shares agree and questions do not.

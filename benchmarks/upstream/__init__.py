@@ -1,0 +1,1 @@
+"""Minimal examples of faults in libraries, for reports to their authors."""
