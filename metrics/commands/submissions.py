@@ -1,16 +1,16 @@
 """The `bench` commands on submissions: check, score and show them, and tell their format."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import click
 
 from metrics.commands.options import MARKDOWN, SEED
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import MESHES, MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
+from scenegen.command_line.options import MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
 from scenegen.command_line.output import line_width, on_scheduler, print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputPath, refuse_inputs
-from scenegen.commands.viewing import OPEN, host_options
+from scenegen.commands.viewing import RECORDING, record
 
 TRUTH = click.option(
     "--truth",
@@ -183,73 +183,48 @@ def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
     ctx.exit(2 if wrong else 0)
 
 
-@click.command(epilog=EXAMPLE + "bench view predictions.h5 --truth rooms.h5 --open")
+@click.command(epilog=EXAMPLE + "bench view predictions.h5 --truth rooms.h5")
 @click.argument("submission", type=InputPath(), metavar="PREDICTIONS")
 @TRUTH
 @click.option(
     "--scores", "scores_path", type=InputPath(),
-    help="Score file of the submission, from `bench score --json` [default: the rows are scored].",
+    help="Score file of the submission, from `bench score --json` [default: it is scored].",
 )  # fmt: skip
 @click.option(
     "--items", type=Items(),
-    help="Rows of the truth to show [default: all of --scores, or the first 100].",
+    help="Rows of the truth to show [default: the scenes with the worst scores, 100 rows].",
 )  # fmt: skip
-@host_options(8080)
-@OPEN
-@MESHES
+@RECORDING
+@OVERWRITE
 def view(
     submission: str,
     truth: str | None,
     scores_path: str | None,
     items: list[int] | None,
-    port: int,
-    host: str | None,
-    public: bool,
-    names: tuple[str, ...],
-    open_browser: bool,
-    **meshes: Any,
+    out: str | None,
+    overwrite: bool,
 ) -> None:
-    """Show predictions of rooms in 3D, in the browser: the worst scenes first, by any score.
+    """Write a recording of predictions of rooms beside the truth, for the 3D viewer Rerun.
 
-    Predicted surfels are beside the true ones, coloured by the error of their depth; a click on one
-    tells both depths. The page asks for nothing outside this machine. Ctrl-C ends it.
+    The scenes with the worst scores come first; each timeline is another score. Predicted points
+    have the colour of the error of their depth.
     """
-    needs("bench view", ("viser",), "view")
-    from metrics.measured.reader import MeasuredFile, open_images
-    from metrics.submissions.reader import open_predictions
-    from metrics.submissions.truths import find_truth
-    from metrics.viewing import (
-        MOST_SCORED,
-        MeasuredRooms,
-        no_shape,
-        predicted_rooms,
-        require_rooms,
-        shown_scores,
-    )
-    from scenegen.common.web_hosts import hosts_of
-    from scenegen.viewing.geometry import shapes_of
-    from scenegen.viewing.page import RoomsPage
-    from scenegen.viewing.server import serve, started
+    needs("bench view", ("rerun",), "view")
+    from metrics.measured.reader import Images
+    from metrics.scoring.evaluate import open_runs, score_runs
+    from metrics.scoring.runs import Settings
+    from metrics.viewing import predicted_scenes, require_rooms, scores_of
 
-    hosts = hosts_of(host, public, names)
-    with open_predictions(submission) as opened:
-        predictions = require_rooms(opened)
-        rooms = open_images(find_truth(predictions, truth).path)
-        with rooms:
-            if isinstance(rooms, MeasuredFile):
-                drawn: Any = MeasuredRooms(rooms), no_shape
-            else:
-                drawn = rooms, shapes_of(rooms.spec, **meshes)
-            if not items and not scores_path and len(predictions) > MOST_SCORED:
-                note = f"note: the first {MOST_SCORED} of {len(predictions)} rows are shown"
-                print_line(f"{note}; --items or --scores shows others", err=True)
-            count = len(items) if items else min(len(predictions), MOST_SCORED)
-            with progress_bar(count, "image") as bar:
-                scores = shown_scores(predictions, rooms, items, scores_path, bar.update)
-            shown = predicted_rooms(predictions, rooms, scores)
-            with started(f"{predictions.method}: {submission}", hosts, port) as server:
-                RoomsPage(server, drawn[0], drawn[1], *shown)
-                serve(server, hosts, print_line, open_browser)
+    with open_runs([submission], truth) as runs:
+        predictions, true = require_rooms(runs.files[0]), cast("Images", runs.truth)
+        if scores_path:
+            scores = scores_of(scores_path, predictions, true)
+        else:
+            settings = Settings(allow_partial=True, non_finite="penalise")
+            with progress_bar(len(predictions), "image") as bar:
+                scores = score_runs(runs, settings, bar.update)
+        scenes = predicted_scenes(predictions, true, scores, items)
+        record(submission, f"{predictions.method}: {submission}", scenes, out, overwrite)
 
 
 @click.command("describe-format", epilog=EXAMPLE + "bench describe-format")

@@ -1,14 +1,18 @@
-"""The command that shows rooms in 3D, in the browser, and options of all that serve pages."""
+"""The command that shows rooms in 3D, and what it shares with `bench view`."""
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import MESHES, Command, Items, together
+from scenegen.command_line.options import OVERWRITE, Command, Items, together
 from scenegen.command_line.output import print_line
-from scenegen.command_line.paths import InputPath
+from scenegen.command_line.paths import InputPath, OutputPath, refuse_command_inputs
+
+if TYPE_CHECKING:
+    from scenegen.viewing import RecordedScene
 
 
 def host_options(port: int) -> Callable[[Command], Command]:
@@ -27,47 +31,42 @@ def host_options(port: int) -> Callable[[Command], Command]:
     )  # fmt: skip
 
 
-OPEN = click.option(
-    "--open/--no-open", "open_browser", default=False, show_default=True,
-    help="Open the page in a browser.",
+RECORDING = click.option(
+    "--out", type=OutputPath(), metavar="FILE.rrd",
+    help="Recording to write [rooms.rrd of rooms.h5].",
 )  # fmt: skip
 
 
-@click.command(epilog=f"{EXAMPLE}scenegen view rooms.h5 --open")
-@click.argument("file", type=InputPath())
-@click.option("--items", type=Items(), help="Rows to show [default: all].")
-@host_options(8080)
-@OPEN
-@MESHES
-def view(
-    file: str,
-    items: list[int] | None,
-    port: int,
-    host: str | None,
-    public: bool,
-    names: tuple[str, ...],
-    open_browser: bool,
-    **meshes: Any,
+def record(
+    source: str, title: str, scenes: "Iterable[RecordedScene]", out: str | None, overwrite: bool
 ) -> None:
-    """Show the scenes of a file in 3D, in the browser.
+    """Write a recording of scenes, by default in this folder and named after `source`."""
+    from scenegen.viewing import write_recording
 
-    The page has the true surfels of every view, the meshes of the objects, and cameras. It asks for
-    nothing outside this machine. Ctrl-C ends it.
+    path = Path(out or f"{Path(source).stem}.rrd")
+    refuse_command_inputs([path])
+    count = write_recording(path, title, scenes, overwrite)
+    megabytes = path.stat().st_size / 1e6
+    print_line(f"{path}: {count} images, {megabytes:.1f} MB; show them with `rerun {path}`")
+
+
+@click.command(epilog=f"{EXAMPLE}scenegen view rooms.h5")
+@click.argument("file", type=InputPath())
+@click.option("--items", type=Items(), help="Rows to show [default: the first 100].")
+@RECORDING
+@OVERWRITE
+def view(file: str, items: list[int] | None, out: str | None, overwrite: bool) -> None:
+    """Write a recording of the scenes of a file, for the 3D viewer Rerun.
+
+    It has points, cameras, image, depth, normals and object ids of every view; the viewer tells
+    their values under the mouse. Whoever has Rerun can open it.
     """
-    needs("scenegen view", ("viser",), "view")
-    from scenegen.common.web_hosts import hosts_of
+    needs("scenegen view", ("rerun",), "view")
     from scenegen.rooms.reader import RoomsFile
-    from scenegen.viewing.geometry import shapes_of
-    from scenegen.viewing.page import RoomsPage, scene_rows
-    from scenegen.viewing.server import serve, started
+    from scenegen.viewing import room_scenes, scene_rows
 
-    hosts = hosts_of(host, public, names)
     with RoomsFile(file) as rooms:
-        scenes = scene_rows(rooms, items)
-        shape_of = shapes_of(rooms.spec, **meshes)
-        with started(file, hosts, port) as server:
-            RoomsPage(server, rooms, shape_of, scenes)
-            serve(server, hosts, print_line, open_browser)
+        record(file, file, room_scenes(rooms, scene_rows(rooms, items)), out, overwrite)
 
 
 COMMANDS = (view,)

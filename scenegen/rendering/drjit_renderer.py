@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
 from scenegen.common.rotations import product
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.objects.cast_meshes import normal_table
 from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.exact_surfaces import Surface
@@ -98,10 +98,13 @@ def launch_pixels(
     return fetch
 
 
-def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tuple[Scenes, Any]:
+def upload_scenes(
+    batch: SceneBatch, variant: str, models: Sequence[Mesh], bounced: bool = False
+) -> tuple[Scenes, Any]:
     """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel size.
 
-    `models` are those of the batch's names, unless these are basic shapes.
+    `models` are those of the batch's names, unless these are basic shapes. If rays are `bounced`
+    off models, `rays.closest_hit` meets these, too.
     """
     spec, count = batch.spec, len(batch)
     surfaces: list[Surface | None] = [None]
@@ -111,9 +114,9 @@ def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tu
     else:
         tree, offset, normals = None, np.zeros((max(1, len(models)), 3)), None
         first = np.zeros(len(offset), np.uint32)
-        if spec.shadows or spec.shading == "path":
+        if spec.shadows or bounced:
             tree, offset = model_scene(variant, batch.shape_of, batch.names, models)
-        if spec.shading == "path":
+        if bounced:
             first, normals = stacked([normal_table(batch.shape_of(x)) for x in batch.names])
         unit = UnitScene(tree, offset, first, GRID, normals, None)
     mi.set_variant(variant)
@@ -159,7 +162,7 @@ def _converted(kind: Any, values: Any) -> Any:
     return kind(values)
 
 
-def padded_rays(spec: DatasetSpec) -> int:
+def padded_rays(spec: Request) -> int:
     """Return the number of rays of an image, padded to a multiple of LANES."""
     return -(-spec.height * spec.width // LANES) * LANES
 

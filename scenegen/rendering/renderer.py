@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import BackendError
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.files.sets.workers import processors
 from scenegen.objects.catalogue import face_count
 from scenegen.objects.solids import UnitShape
@@ -67,13 +67,13 @@ def launch(batch: SceneBatch, device: str = "auto") -> Callable[[], GroundTruth]
     return lambda: GroundTruth(**fetch())
 
 
-def truth_fields(spec: DatasetSpec) -> list[str]:
+def truth_fields(spec: Request) -> list[str]:
     """Return the fields of `GroundTruth` that come from the ray through each pixel's centre."""
     own = ["albedo"] if spec.own_reflectance else []
     return ["depth", "normal", "object_id", *own]
 
 
-def picture_fields(spec: DatasetSpec) -> list[str]:
+def picture_fields(spec: Request) -> list[str]:
     """Return the other ones, which path tracing computes for pictures."""
     if not spec.interior:
         return ["image"]
@@ -149,7 +149,7 @@ def trace(batch: SceneBatch, names: Sequence[str], device: str = "auto") -> dict
     return {"image": np.concatenate(images)}
 
 
-def traced_at_once(spec: DatasetSpec) -> int:
+def traced_at_once(spec: Request) -> int:
     """Return how many images should be traced in one go."""
     views = len(spec.views)
     at_once = 1 if spec.interior else MOST_PATHS // (spec.height * spec.width * spec.spp * views)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.description.scene_arrays import SceneArrays
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.files.sets.plan import Block
 from scenegen.files.sets.sets import Packed
 from scenegen.files.sets.workers import in_threads
@@ -60,7 +60,7 @@ class RoomsWork:
         assets: places of materials and surroundings, as `pictures.places.Places.use` takes them.
     """
 
-    spec: DatasetSpec
+    spec: Request
     batch: int
     device: str
     objects: Objects
@@ -103,7 +103,7 @@ class RoomsWork:
 
 
 def render_items(
-    spec: DatasetSpec,
+    spec: Request,
     indices: Sequence[int],
     batch: int,
     device: str = "auto",

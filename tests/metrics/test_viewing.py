@@ -1,6 +1,5 @@
-"""Predictions on the 3D page: which rows, in which order, where, and what a click tells."""
+"""Predictions in recordings: which scenes, in which orders, where, and in which colours."""
 
-import re
 from types import SimpleNamespace
 
 import h5py
@@ -8,151 +7,121 @@ import numpy as np
 import pytest
 from submissions import good_answers, good_rooms
 
+pytest.importorskip("rerun")
+
+from recordings import pixels_of, points_of, recorded
+
+from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import write_scores
-from metrics.scoring.evaluate import score
+from metrics.scoring.evaluate import open_runs, score, score_runs
 from metrics.scoring.runs import ScoringError, Settings
 from metrics.submissions.reader import open_predictions
-from metrics.viewing import (
-    RowScores,
-    predicted_rooms,
-    require_rooms,
-    shown_scores,
-    worst_first,
-)
+from metrics.viewing import predicted_scenes, require_rooms, scores_of, worst_first
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
-from scenegen.common.web_hosts import Hosts
-from scenegen.viewing.geometry import RIGHT, TOO_FAR, aside, shapes_of
+from scenegen.viewing import error_colors, write_recording
 
 NAN = float("nan")
-SCENES = [(0, 1), (2, 3), (4,), (5,)]
-VALUES = {
-    "chamfer": np.array([0.1, 0.5, 0.4, 0.4, 0.2, 0.2]),
-    "relief_iou": np.array([0.1, 0.5, 0.4, 0.4, NAN, 0.2]),
-    "empty_room_chamfer": np.ones(6),
-    "rmse": np.full(6, NAN),
-}
+PARTIAL = Settings(allow_partial=True, non_finite="penalise", resamples=100)
+WORST = 5
+FACTORS = {3: 1.001, WORST: 1.1, 6: 1.02}  # of the true depth, by row; WORST is written second
 
 
 def test_the_worst_come_first():
-    scores = RowScores(np.arange(6), VALUES)
-    lower_is_better = worst_first(scores, "chamfer", SCENES)
-    assert lower_is_better == [(2, 3), (1, 0), (4,), (5,)], "by means; equals in their order"
-    assert worst_first(scores, "relief_iou", SCENES) == [(5,), (0, 1), (2, 3), (4,)]
+    items = {"chamfer": np.array([0.1, 0.5, 0.4, 0.4, 0.2, 0.2]),
+             "relief_iou": np.array([0.1, 0.5, 0.4, 0.4, NAN, 0.2])}  # fmt: skip
+    scores, scenes = SimpleNamespace(ids=np.arange(6), items=items), [(0, 1), (2, 3), (4,), (5,)]
+    in_order = worst_first(scores, "chamfer", scenes)
+    assert in_order == [(2, 3), (0, 1), (4,), (5,)], "by means; equals in their order"
+    assert worst_first(scores, "relief_iou", scenes) == [(5,), (0, 1), (2, 3), (4,)]
 
 
-@pytest.fixture
-def noisy(truths, tmp_path):
-    """Rows 6 to 1 of the truth, in that order; the higher the row, the worse, and one is broken."""
-    from metrics.prediction_writer import RoomPredictionWriter
-
+@pytest.fixture(params=["depth", "points"])
+def predicted(request, truths, tmp_path):
+    """A submission of three rows, whose worst has three pixels without a depth."""
+    path, kind = tmp_path / "p.h5", request.param
     with open_rooms(truths.rooms) as rooms:
-        path = tmp_path / "predictions.h5"
-        with RoomPredictionWriter(path, truths.rooms, method="noise", allow_partial=True) as out:
-            for row in range(6, 0, -1):
-                out.add(row, rooms[row].depth * (1 + 0.01 * row))
+        with RoomPredictionWriter(path, truths.rooms, method="m", allow_partial=True) as out:
+            for row, factor in sorted(FACTORS.items(), reverse=True):
+                room = rooms[row]
+                out.add(row, normal=2 * room.normal, **{kind: getattr(room, kind) * factor})
+        with h5py.File(path, "r+") as file:
+            file[kind][1, 0, :3] = np.nan
         yield rooms, path
 
 
-def test_rows_that_are_predicted_are_scored(noisy, tmp_path):
-    rooms, path = noisy
-    with open_predictions(path) as predictions:
-        scores = shown_scores(predictions, rooms)
-        assert scores.rows.tolist() == [1, 2, 3, 4, 5, 6]
-        assert worst_first(scores, "abs_rel", [(row,) for row in range(1, 7)])[0] == (6,)
-        assert scores.values["abs_rel"][2] == pytest.approx(0.03, rel=1e-3)
-        assert shown_scores(predictions, rooms, [5, 2]).rows.tolist() == [2, 5]
-        with pytest.raises(SpecError) as error:
-            shown_scores(predictions, rooms, [2, 7])
-        assert (error.value.where, error.value.found) == ("items", "row 7")
-        stored = score([path], rooms.path, Settings(allow_partial=True, resamples=100))
-        write_scores(stored, tmp_path / "s.json")
-        same = shown_scores(predictions, rooms, [4], tmp_path / "s.json")
-        assert same.values["chamfer"].tolist() == scores.values["chamfer"][3:4].tolist()
+def test_predictions_are_recorded_beside_the_truth(predicted, truths, tmp_path):
+    rooms, path = predicted
+    with open_runs([path], truths.rooms) as runs:
+        scores = score_runs(runs, PARTIAL, lambda done: None)
+        scenes = predicted_scenes(runs.files[0], rooms, scores)
+        assert write_recording(tmp_path / "x.rrd", "x", scenes) == len(FACTORS)
+    by_score, by_scene = (recorded(tmp_path / "x.rrd", t) for t in ("worst AbsRel first", "scene"))
+    index = {row: rooms[row].scene.index for row in FACTORS}
+    assert sorted(by_scene["/about"]) == sorted(index.values())
+    order = sorted(FACTORS, key=FACTORS.get, reverse=True)
+    for place, row in enumerate(order):
+        room, step = rooms[row], index[row]
+        view, shape = f"view_{room.view_index}", room.depth.shape
+        there = {name: values[step] for name, values in by_scene.items() if step in values}
+        assert by_score["/about"][place] == there["/about"]
+        absent = 3 if row == WORST else 0
+        points, colors = points_of(there[f"/world/prediction/{view}"])
+        eye = room.world_from_camera[:3, 3]
+        expected = eye + FACTORS[row] * (room.points_world.reshape(-1, 3) - eye)
+        np.testing.assert_allclose(points, expected[absent:], atol=1e-5)
+        error = (FACTORS[row] - 1) * room.depth
+        off = colors[:, :3].astype(int) - error_colors(error.reshape(-1)[absent:])
+        assert np.abs(off).max() <= 2
+        pixels = there[f"/pixels/{view}/prediction_depth"]
+        depth = pixels_of(pixels, "DepthImage", np.float32, shape).ravel()
+        np.testing.assert_allclose(depth[absent:], (room.depth + error).ravel()[absent:], rtol=1e-5)
+        assert np.isnan(depth[:absent]).all()
+        text = there["/about"]["TextDocument:text"][0]
+        assert f"| pixels without a point | {absent} |" in text
+        truth, _ = points_of(there[f"/world/truth/{view}"])
+        moved = np.array(there["/world/prediction"]["Transform3D:translation"][0])
+        right = room.world_from_camera[:3, 0]
+        assert np.linalg.norm(np.cross(moved, right)) < 1e-6
+        assert moved @ right == pytest.approx(1.1 * np.ptp(truth @ right), rel=1e-4)
+        normals = [there[f"/pixels/{view}/{side}_normal"] for side in ("truth", "prediction")]
+        first, second = (pixels_of(n, "Image", np.uint8, (*shape, 3)).astype(int) for n in normals)
+        assert np.abs(first - second).max() <= 1, "predicted ones are made unit"
 
 
-def test_scores_of_others_are_refused(noisy, truths, tmp_path):
-    rooms, path = noisy
+def test_colours_of_errors_tell_sign_and_size():
+    near, right, far, unknown = error_colors(np.array([-9.0, 0.0, 9.0, NAN])).astype(int)
+    assert near[2] > near[0] + 100
+    assert far[0] > far[2] + 100
+    assert np.ptp(right) < 5
+    assert unknown.tolist() == [0, 0, 0]
+    assert error_colors(np.array([0.05])).tolist() == [far.tolist()]
+
+
+def test_only_rows_and_scores_of_the_submission_are_shown(predicted, truths, tmp_path):
+    rooms, path = predicted
+    write_scores(score([path], truths.rooms, PARTIAL), tmp_path / "s.json")
     other = good_rooms(tmp_path, truths.rooms, "other.h5")
-    write_scores(score([other], rooms.path, Settings(resamples=100)), tmp_path / "s.json")
-    with open_predictions(path) as predictions, pytest.raises(ScoringError) as error:
-        shown_scores(predictions, rooms, None, tmp_path / "s.json")
-    assert (error.value.where, "other.h5" in error.value.found) == (str(tmp_path / "s.json"), True)
-
-
-def test_answers_are_refused(truths, tmp_path):
+    with open_runs([path], truths.rooms) as runs:
+        scores = scores_of(tmp_path / "s.json", runs.files[0], rooms)
+        shown = [view.row for scene in predicted_scenes(runs.files[0], rooms, scores, [6, 3])
+                 for view in scene.views]  # fmt: skip
+        assert shown == [6, 3]
+        with pytest.raises(SpecError) as error:
+            next(predicted_scenes(runs.files[0], rooms, scores, [3, 4]))
+        assert (error.value.where, error.value.found) == ("items", "row 4")
+    with open_runs([other], truths.rooms) as runs, pytest.raises(ScoringError) as error:
+        scores_of(tmp_path / "s.json", runs.files[0], rooms)
+    assert error.value.where == str(tmp_path / "s.json")
     path = good_answers(tmp_path, truths.iqtt)
     with open_predictions(path) as answers, pytest.raises(ScoringError):
         require_rooms(answers)
 
 
-SIZE = 32  # of the truths' images
-WORST = 5
-FACTORS = {3: 1.001, WORST: 1.1, 6: 1.02}  # of the true depth, by row
-
-
-@pytest.fixture
-def served(truths, tmp_path):
-    """A page of three rows, of one of which the left half is too near and three pixels are none."""
-    pytest.importorskip("viser")
-    from metrics.prediction_writer import RoomPredictionWriter
-    from scenegen.viewing.page import RoomsPage
-    from scenegen.viewing.server import started
-
-    path = tmp_path / "predictions.h5"
-    with open_rooms(truths.rooms) as rooms:
-        with RoomPredictionWriter(path, truths.rooms, method="m", allow_partial=True) as out:
-            for row, factor in FACTORS.items():
-                depth = rooms[row].depth * factor
-                if row == WORST:
-                    depth[:, : SIZE // 2] *= 0.8
-                out.add(row, depth, rooms[row].normal)
-        with h5py.File(path, "r+") as file:
-            file["depth"][1, 0, :3] = np.nan, np.inf, -1
-        with open_predictions(path) as found, started("test", Hosts(), 0) as server:
-            shown = predicted_rooms(found, rooms, shown_scores(found, rooms))
-            yield rooms, RoomsPage(server, rooms, shapes_of(rooms.spec), *shown), server
-
-
-def clouds(page):
-    return {(cloud.kind, cloud.room.index): cloud for cloud in page.clouds}
-
-
-def test_surfels_are_beside_the_truth(served):
-    from views_in_3d import switch
-
-    rooms, page, server = served
-    switch(page, sort="AbsRel")
-    assert f"row {WORST}" in page.text
-    assert "3 pixels" in page.text
-    made, room = clouds(page), rooms[WORST]
-    truth, predicted = made["/truth", WORST], made["/prediction", WORST]
-    assert len(predicted.surfels.points) == SIZE**2 - 3
-    right, eye = room.world_from_camera[:3, 0], room.world_from_camera[:3, 3]
-    gap = (predicted.surfels.points @ right).min() - (truth.surfels.points @ right).max()
-    assert gap > -0.1, "hardly any overlap"
-    colors = predicted.colors[predicted.surfels.pixels[:, 1] >= SIZE // 2]
-    assert {tuple(color) for color in colors.tolist()} == {TOO_FAR}
-    for i, marks in ((0, 1), (40, 2)):  # the first pixels have no prediction
-        way = truth.surfels.points[i] - eye
-        client = SimpleNamespace(camera=SimpleNamespace(fov=1.0, image_height=10_000))
-        ray = {"ray_origin": eye, "ray_direction": way / np.linalg.norm(way)}
-        page._click(SimpleNamespace(client=client, **ray))
-        depth = float(room.depth.ravel()[i])
-        assert f"<td>{depth:.5f}</td>" in page.clicked
-        names = [f"/mark/{k}" for k in range(3)]
-        handles = [server.scene.get_handle_by_name(name) for name in names]
-        assert sum(handle is not None for handle in handles) == marks
-        assert np.allclose(handles[0].position, truth.surfels.points[i])
-    told = re.search("predicted depth</th><td>([0-9.]+)<", page.clicked)
-    assert float(told[1]) == pytest.approx(depth * 1.1 * 0.8, abs=1e-4), "the left half"
-    switch(page, beside=False)
-    moved = predicted.surfels.points - clouds(page)["/prediction", WORST].surfels.points
-    np.testing.assert_allclose(moved, np.broadcast_to(aside(room), moved.shape), atol=1e-5)
-    switch(page, truth=False, beside=True)
-    assert list(clouds(page)) == [("/prediction", WORST)]
-    switch(page, scene=2)
-    assert "row 3" in page.text
-    assert np.abs(clouds(page)["/prediction", 3].colors - np.array(RIGHT, float)).max() < 12
-    switch(page, sort="delta 1")
-    assert page.controls["scene"].value == 0
+def test_no_more_scenes_than_fit(predicted, truths, monkeypatch):
+    monkeypatch.setattr("metrics.viewing.MOST_ROWS", 1)
+    rooms, path = predicted
+    with open_runs([path], truths.rooms) as runs:
+        scores = score_runs(runs, PARTIAL, lambda done: None)
+        (scene,) = predicted_scenes(runs.files[0], rooms, scores)
+    assert next(iter(scene.steps.values())) == 0

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import InteriorSpec
+from scenegen.files.places import files_below
 from scenegen.rendering.backend import point_to_llvm
 from scenegen.rendering.materials.folders import MapFiles, check_maps, from_folder
 from scenegen.rendering.pictures.places import ASSETS
@@ -24,7 +25,7 @@ MEAN = 0.09  # radiance that the upper half of the surroundings is scaled to, th
 MOST_COLUMNS = 4096
 
 
-def materials_of(spec: DatasetSpec) -> Mapping[str, tuple[MapFiles, ...]] | None:
+def materials_of(spec: InteriorSpec) -> Mapping[str, tuple[MapFiles, ...]] | None:
     """Return the folder of materials that a data set names; None if it has none.
 
     Raises SpecError where its place is not told, or it is another one.
@@ -34,7 +35,7 @@ def materials_of(spec: DatasetSpec) -> Mapping[str, tuple[MapFiles, ...]] | None
     return _folder(_checked("materials", spec.materials, ASSETS.materials))
 
 
-def environment_of(spec: DatasetSpec) -> Array | None:
+def environment_of(spec: InteriorSpec) -> Array | None:
     """Return radiance by direction, (H, W, 3), of the surroundings that a data set names.
 
     None if it has none. Raises as `materials_of`, and FileFormatError.
@@ -63,7 +64,7 @@ def digest_of(place: Path) -> str:
 
     Raises OSError where it cannot be read.
     """
-    files = sorted(p for p in place.rglob("*") if p.is_file()) if place.is_dir() else [place]
+    files = files_below(place) if place.is_dir() else [place]
     digest = hashlib.sha256()
     for path in files:
         name = path.relative_to(place).as_posix()

@@ -15,6 +15,7 @@ import drjit
 import mitsuba
 import numpy as np
 
+from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pictures.paths import Lobes, Meeting
 from scenegen.rendering.rays import (
@@ -35,6 +36,7 @@ mi: Any = mitsuba
 
 def with_intensities(batch: SceneBatch) -> SceneBatch:
     """Return a batch whose lights have their intensities as colours."""
+    assert isinstance(batch.spec, DatasetSpec)
     to_target = batch.light_position - batch.spec.camera_target
     distance = np.sqrt((to_target**2).sum(axis=-1, keepdims=True))
     k_l, k_q = batch.attenuation[:, None, :1], batch.attenuation[:, None, 1:]

@@ -16,7 +16,7 @@ from scenegen.camera import pixel_size
 from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import from_json
 from scenegen.description.interiors import Interior
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import InteriorSpec, Request
 from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.furniture.room_shell import REVEAL
 from scenegen.rendering.drjit_renderer import padded_rays, upload_scenes
@@ -48,7 +48,7 @@ def trace_images(batch: SceneBatch, variant: str) -> Array:
     mi.set_variant(variant)
     spec, count = batch.spec, len(batch)
     models = [mesh_to_cast(batch.shape_of, x) for x in batch.names if spec.source != "shapes"]
-    scenes, cameras = upload_scenes(with_intensities(batch), variant, models)
+    scenes, cameras = upload_scenes(with_intensities(batch), variant, models, bounced=True)
     pixels, lanes = padded_rays(spec), lanes_of(spec)
     index = dr.arange(mi.UInt32, count * pixels * lanes)
     item, pixel = index // (pixels * lanes), index // lanes % pixels
@@ -84,8 +84,9 @@ def trace_pictures(batch: SceneBatch, names: Sequence[str], variant: str) -> dic
 
 def _lit_room(batch: SceneBatch, b: int) -> tuple[ClosedRoom, float]:
     """Return what an image's room holds, with its lights, and the mean radiance of its walls."""
-    assert batch.interior is not None
     spec = batch.spec
+    assert isinstance(spec, InteriorSpec)
+    assert batch.interior is not None
     interior = from_json(Interior, batch.interior[b], "interior")
     matter = gather_matter(batch, b, interior.lit, materials_of(spec))
     around = environment_of(spec)
@@ -104,6 +105,7 @@ def _trace_one(
     batch: SceneBatch, b: int, room: ClosedRoom, mean: float, names: Sequence[str]
 ) -> dict[str, Array]:
     spec, lanes = batch.spec, lanes_of(batch.spec)
+    assert isinstance(spec, InteriorSpec)
     camera = device_camera(batch, b)
     index = dr.arange(mi.UInt32, spec.height * spec.width * lanes)
     rng = mi.PCG32(1, dr.opaque(mi.UInt64, path_seed(batch, b)), mi.UInt64(index))
@@ -132,13 +134,13 @@ def path_seed(batch: SceneBatch, b: int) -> int:
     return item_seed(batch.spec.seed, int(batch.index[b]), Purpose.PATHS, int(batch.view[b]))
 
 
-def lanes_of(spec: DatasetSpec) -> int:
+def lanes_of(spec: Request) -> int:
     """Return how many lanes share the samples of a pixel."""
     return max(n for n in range(1, LANES + 1) if spec.spp % n == 0)
 
 
 def _sums(
-    spec: DatasetSpec, room: Room, camera: Camera, pixel: Any, lane: Any, rng: Any, ceiling: float,
+    spec: Request, room: Room, camera: Camera, pixel: Any, lane: Any, rng: Any, ceiling: float,
     even: Any = None,
 ) -> Samples:  # fmt: skip
     """Trace the samples of pixels, of which each lane takes its share."""
@@ -159,7 +161,7 @@ def device_camera(batch: SceneBatch, b: int) -> Camera:
     return Camera(*(mi.Vector3f(*values[i : i + 3]) for i in (0, 3, 6, 9)), *values[12:])
 
 
-def _albedo(spec: DatasetSpec, surfaces: Surfaces, camera: Camera) -> Array:
+def _albedo(spec: InteriorSpec, surfaces: Surfaces, camera: Camera) -> Array:
     """Return the base colour where the ray through each pixel's centre hits; NaN for nothing."""
     index = dr.arange(mi.UInt32, spec.height * spec.width)
     d = camera.ray(mi.Float(index % spec.width) + 0.5, mi.Float(index // spec.width) + 0.5)

@@ -10,22 +10,19 @@ import pytest
 from metrics.measured.protocols import ProtocolError
 from metrics.measured.reader import MeasuredFile
 from metrics.score_file import read_scores, write_scores
-from metrics.scoring.evaluate import open_runs, score, score_protocols
+from metrics.scoring.evaluate import open_runs, score, score_protocols, score_runs
 from metrics.scoring.runs import ScoringError, Settings
 from metrics.scoring.truth_digests import OtherTruthError
 from metrics.submissions.problems import JsonError
-from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from metrics.submissions.writer import RoomPredictionWriter
-from metrics.viewing import MeasuredRooms, no_shape, predicted_rooms, shown_scores
+from metrics.viewing import predicted_scenes
 from metrics.views.compare.compare import compare
-from metrics.views.leaderboard.ranking import rankings
+from metrics.views.leaderboard import rankings
 from metrics.views.protocols import protocols_report
 from metrics.views.report import html_report
 from metrics.views.score_tables import text_report
-from scenegen.common.web_hosts import Hosts
 from scenegen.rooms.reader import RoomsFile
-from scenegen.viewing.geometry import pixel_colors
 
 
 def noisy(depth, rng):
@@ -116,7 +113,7 @@ def test_two_protocols_never_share_a_table(measured, predicted, tmp_path):
     assert compare([first, second]).differences[0].difference < 0.0
     with pytest.raises(OtherTruthError):
         compare([first, other])
-    assert [len(r.entries) for r in rankings([first, second, other])] == [2, 1]
+    assert [len(r.files) for r in rankings([first, second, other])] == [2, 1]
     with pytest.raises(OtherTruthError):
         html_report(first, beside=[other])
 
@@ -162,7 +159,7 @@ def test_truth_of_twenty_points_has_depth_alone(measured, predicted):
     names = [name for name in scores.metrics if "boundary" in name or "normal" in name]
     assert not names
     lines = " ".join(text_report(scores).split())
-    assert (lines.count("boundaries: none"), lines.count("normals: none")) == (1, 1)
+    assert (lines.count("boundaries, as"), lines.count("normals, unless")) == (1, 1)
 
 
 def test_points_are_scored_on_the_rays_of_the_matrix(measured, predicted):
@@ -210,24 +207,24 @@ def test_a_score_file_with_a_wrong_protocol_is_refused(measured, predicted, tmp_
         read_scores(path)
 
 
-def test_images_are_views_of_the_3d_page(measured, predicted):
+def test_images_are_recorded_in_3d(measured, predicted, tmp_path):
     """Each a scene of its own, with points on the rays of its matrix, the worst image first."""
-    pytest.importorskip("viser")
-    from scenegen.viewing.page import RoomsPage
-    from scenegen.viewing.server import started
+    pytest.importorskip("rerun")
+    from recordings import points_of, recorded
 
-    truth = measured()
-    worst = iter(range(12))
+    from scenegen.viewing import write_recording
+
+    truth, worst = measured(), iter(range(12))
     path = predicted(truth, lambda d, rng: d * (1.5 if next(worst) == 7 else 1.1))
-    with open_predictions(path) as file, MeasuredFile(truth) as opened:
-        shown = predicted_rooms(file, opened, shown_scores(file, opened))
-        with started("test", Hosts(), 0) as server:
-            page = RoomsPage(server, MeasuredRooms(opened), no_shape, *shown)
-            clouds = {cloud.kind: cloud for cloud in page.clouds}
-        view = opened.view(7)
-        points = (view.rays * view.depth[..., None])[view.mask]
-        np.testing.assert_allclose(clouds["/truth"].surfels.points, points, rtol=1e-6)
-        aside = clouds["/prediction"].surfels.points - 1.5 * points
-        np.testing.assert_allclose(np.ptp(aside, axis=0), 0.0, atol=1e-4)
-        colors = pixel_colors(clouds["/truth"].room, "Image").astype(int)
-        assert np.abs(colors - opened.picture(7)).max() < 2
+    with open_runs([path], truth) as runs:
+        scores = score_runs(runs, Settings(resamples=100), lambda done: None)
+        scenes = predicted_scenes(runs.files[0], runs.truth, scores)
+        write_recording(tmp_path / "x.rrd", "x", scenes)
+        view, picture = runs.truth.view(7), runs.truth.picture(7)
+    there = recorded(tmp_path / "x.rrd", "worst AbsRel first")
+    points, colors = points_of(there["/world/truth/view_0"][0])
+    expected = (view.rays * view.depth[..., None])[view.mask]
+    np.testing.assert_allclose(points, expected, rtol=1e-6)
+    np.testing.assert_array_equal(colors[:, :3], picture[view.mask])
+    points, _ = points_of(there["/world/prediction/view_0"][0])
+    np.testing.assert_allclose(points, 1.5 * expected, rtol=1e-5)
