@@ -7,7 +7,7 @@ from typing import Any
 
 from iqtt.files.layout import answer_column, question_columns, truth_columns
 from iqtt.files.reader import QuestionsFile
-from iqtt.questions.specs import DISTRACTOR_KINDS
+from iqtt.questions.kinds import DISTRACTOR_KINDS
 from iqtt.sharing.published import handed_out
 from scenegen.common.text_table import piped
 from scenegen.files.schema import Column
