@@ -240,7 +240,7 @@ def _layout(panels: Mapping[str, Sequence[str]], timeline: str) -> "Blueprint":
             rrb.Spatial3DView(origin="world", name="points and cameras"),
             rrb.Vertical(rrb.Tabs(*tabs), about, row_shares=[3, 1]),
         ),
-        rrb.TimePanel(timeline=timeline, state="collapsed"),
+        rrb.TimePanel(timeline=timeline, state="collapsed", play_state="paused"),
         collapse_panels=True,
         auto_views=False,
     )
