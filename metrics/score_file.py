@@ -381,7 +381,7 @@ def _known_metric(place: str, name: str, task: str) -> Metric:
         score = metric(name)
     except UnknownMetricError:
         score = None
-    if score is None or not score.suits(task):
+    if score is None or task not in score.tasks:
         raise refusal(place, f"no score of task {task!r}", "a name listed in docs/scores.md")
     return score
 

@@ -9,11 +9,13 @@ import argparse
 import sys
 import tempfile
 from collections import Counter
+from functools import partial
 from pathlib import Path
 
 from benchmarks.markdown import table
 from benchmarks.torture import cases
 from benchmarks.torture.growth import growth
+from benchmarks.torture.jobs import JOBS, job
 from benchmarks.torture.runs import Torture
 
 PARTS = {
@@ -25,6 +27,7 @@ PARTS = {
     "streams": cases.streams,
     "cluster": cases.cluster,
     "growth": growth,
+    **{name: partial(job, name) for name in JOBS},
 }
 
 

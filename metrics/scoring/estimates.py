@@ -18,14 +18,7 @@ from metrics.measures.statistics import (
     pooled_means,
     wilson_interval,
 )
-from metrics.scoring.metric_names import (
-    BEHIND,
-    OBJECT_SCORES,
-    OTHER_SCENE,
-    SHOWN_AS_MUCH,
-    SKILLED,
-    metric,
-)
+from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE, SKILLED, metric
 from metrics.submissions.layout import Shown
 
 Array = NDArray[Any]
@@ -142,13 +135,10 @@ def estimates(scores: Mapping[str, Array], scene: Array, bootstrap: Bootstrap) -
     return {name: means_of[name] for name in scores if name in means_of}
 
 
-ROOTS = ("rmse", "rmse_log", "irmse", "normal_rmse_degrees")  # of means of squares
-
-
 def pooled_means_of(name: str, values: Array, clusters: Array, weights: Array) -> Array:
     """Return `pooled_means` of a score (N,): over pixels, a root is one of all of them."""
     over_pixels = bool((weights != 1.0).any())
-    return pooled_means(values, clusters, weights, over_pixels and name in ROOTS)
+    return pooled_means(values, clusters, weights, over_pixels and metric(name).is_root)
 
 
 def pooled_estimates(
@@ -209,12 +199,8 @@ def floor_column(
     Of several that were shown as much as the method, it is that of the best mean over scenes,
     (N,).
     """
-    begins = [
-        begin
-        for begin in SKILLED.get(name, ())
-        if begin + name in items and (name != BEHIND or begin in SHOWN_AS_MUCH[shown])
-    ]
-    columns = [begin + name for begin in begins if np.isfinite(items[begin + name]).any()]
+    columns = [begins + name for begins in metric(name).baselines_shown(shown)]
+    columns = [c for c in columns if c in items and np.isfinite(items[c]).any()]
 
     def mean(column: str) -> float:
         there = np.isfinite(items[column])

@@ -48,8 +48,8 @@ from metrics.scoring.metric_names import (
     EMPTY_ROOM,
     LEANING,
     OBJECT_SCORES,
-    OF_EMPTY_ROOM,
     OTHER_SCENE,
+    SKILLED,
     metric,
 )
 from metrics.submissions.problems import PredictionError
@@ -145,7 +145,8 @@ def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
         "shape_normal_degrees": _mean_angle(facing, truth.normal, at),
         "derived_shape_normal_degrees": _mean_angle(walls, normals, derived_at),
     }
-    floors = {EMPTY_ROOM + name: scores[name] for name in OF_EMPTY_ROOM if name in scores} | behind
+    of_empty = [name for name in scores if EMPTY_ROOM in SKILLED.get(name, ())]
+    floors = {EMPTY_ROOM + name: scores[name] for name in of_empty} | behind
     floors |= {
         f"{CUT_OUT}shape_error": flat_error(truth.depth[at].astype(np.float64), inside[at]),
         f"{CUT_OUT}shape_normal_degrees": one_normal_degrees(truth.normal[at], inside[at]),

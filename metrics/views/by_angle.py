@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from metrics.measures.statistics import cluster_means
-from metrics.scoring.metric_names import HEADLINE, WHOSE, metric
+from metrics.scoring.metric_names import BASELINES, HEADLINE, metric
 from metrics.scoring.records import Score, ScoreFile
 from metrics.views.paper import PAPER, PaperTable, tables_beside
 from metrics.views.plots import COLOURS, LINE, Chart, Point, Series, curves, kind_of
@@ -45,7 +45,9 @@ def view_curves(files: Sequence[ScoreFile], labels: Sequence[str]) -> Iterator[C
         floors = angle_floors(files[0], name)
         points = [Point(float(key), floors[key]) for key in sorted(floors, key=int)]
         if points:
-            series.append(Series(f"floor: {WHOSE[str(files[0].floor_of(name))]}", points, LINE))
+            series.append(
+                Series(f"floor: {BASELINES[str(files[0].floor_of(name))].name}", points, LINE)
+            )
         if len({point.at for line in series for point in line.points}) >= 2:
             chart = curves(series, metric(name).title, files[0].unit_of(name))
             assert chart is not None

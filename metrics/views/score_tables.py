@@ -15,9 +15,9 @@ from metrics.measures.statistics import FEW_CLUSTERS
 from metrics.scoring.estimates import CONFIDENCE, question_skill
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
+    BASELINES,
     HEADLINE,
     OTHER_SCENE,
-    WHOSE,
     in_order,
     metric,
 )
@@ -46,7 +46,7 @@ GROUP_TITLES = {
     "by_circle": "circular: right in every order of the answers",
 }
 ALIGNMENT_SCORES = ("abs_rel", "rmse", "delta_1")
-GROUP_SCORES = HEADLINE | {"iqtt": ("iqtt_accuracy",)}
+GROUP_SCORES = HEADLINE
 
 
 def text_report(
@@ -99,7 +99,7 @@ def headline_rows(scores: ScoreFile) -> Table:
 def floor_text(scores: ScoreFile, name: str) -> str:
     """Return the name of the floor of a score that has a skill."""
     if scores.task != "iqtt":
-        return WHOSE[scores.skills[name].floor_name[: -len(name)]]
+        return BASELINES[scores.skills[name].floor_name[: -len(name)]].name
     return scores.skills[name].floor_name
 
 

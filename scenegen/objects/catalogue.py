@@ -5,21 +5,21 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from scenegen.common.errors import SpecError
-from scenegen.common.recent import Recent
+from scenegen.common.recent import recent
 from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families.members import MEMBERS, member_shape
 from scenegen.objects.families.store import MEMBER_STORE
-from scenegen.objects.furniture.furnishing import MESH, furnishing
+from scenegen.objects.furniture.furnishing import furnishing
 from scenegen.objects.furniture.room_shell import PREFIX, shell_shape
 from scenegen.objects.furniture.shapes import furniture_shape
 from scenegen.objects.meshes.as_furniture import family_like, mesh_furniture
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import object_split
 from scenegen.objects.meshes.store import MeshStore
-from scenegen.objects.solids import Mesh, UnitShape, without_triangles
+from scenegen.objects.solids import Mesh, UnitShape, outline_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,24 +95,14 @@ class _Furniture:
         return name.partition("/")[0] in self.store.folder.models
 
 
-_FURNITURE: Recent[UnitShape] = Recent(400_000_000)  # bytes, about
-_FACE, _TEXEL = 100, 12  # bytes; a member's face, whose normals are smooth, takes 4 times as many
-
-
+@recent(400_000_000)
 def _kept(furniture: _Furniture | None, name: str) -> UnitShape:
     """Return a piece of furniture, of a folder's models or of a family's members."""
-    key = furniture, name
-    shape = _FURNITURE.get(key)
-    if shape is None:
-        if furniture is None:
-            shape = furniture_shape(name, furnishing(*_family_and_number(name)))
-        else:
-            shape = mesh_furniture(furniture.store, name)
-        assert shape.furnished is not None
-        thing = shape.furnished.thing
-        texels = sum(texture.color[..., 0].size for texture in thing.textures)
-        faces = len(thing.faces) * (1 if thing.number == MESH else 4)
-        _FURNITURE.put(key, shape, _FACE * faces + _TEXEL * texels)
+    if furniture is None:
+        shape = furniture_shape(name, furnishing(*_family_and_number(name)))
+    else:
+        shape = mesh_furniture(furniture.store, name)
+    _ = shape.mesh  # made now, so that it counts
     return shape
 
 
@@ -150,12 +140,14 @@ def _family_and_number(name: str) -> tuple[str, int]:
 
 
 def outline(shape_of: Callable[[str], UnitShape], name: str) -> UnitShape:
-    """Return a unit shape without its triangles. Placement needs no more, and it can be cached."""
+    """Return a unit shape's outline, as from `outline_of`; that of a basic shape is all of it."""
     return _known(shape_of, name)[0]
 
 
 def face_count(shape_of: Callable[[str], UnitShape], name: str) -> int:
     """Return how many triangles of a unit shape are cast, without keeping them in memory."""
+    if name.startswith(PREFIX):  # each room has a shell of its own, which is not asked for again
+        return len(shape_of(name).mesh.faces)
     return _known(shape_of, name)[1]
 
 
@@ -170,14 +162,14 @@ def _is_member(shape_of: Callable[[str], UnitShape], name: str) -> bool:
     return shape_of is built_in_shape and name not in SHAPE_NAMES
 
 
-@lru_cache(maxsize=20_000)
+@recent(100_000_000)
 def _known(shape_of: Callable[[str], UnitShape], name: str) -> tuple[UnitShape, int]:
     if _is_member(shape_of, name):
         return MEMBER_STORE.outline(*_family_and_number(name))
     shape = shape_of(name)
     if name in SHAPE_NAMES:
         return shape, 0 if shape.surface else len(shape.mesh.faces)
-    return without_triangles(shape), len(shape.mesh.faces)
+    return outline_of(shape), len(shape.mesh.faces)
 
 
 @lru_cache(maxsize=16)

@@ -1,7 +1,7 @@
 """The type of all shapes, `UnitShape`, and its making from polyhedra and from turned profiles."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -79,25 +79,32 @@ class UnitShape:
         """The triangles and their normals."""
         return self.make_mesh()
 
-    @cached_property
+    @property
     def triangles(self) -> Array:
         """Corners, (F, 3, 3) float64, counter-clockwise seen from outside."""
         return self.mesh.vertices.astype(np.float64)[self.mesh.faces]
 
-    @cached_property
+    @property
     def normals(self) -> Array:
         """Unit normals of the surface at those corners, (F, 3, 3)."""
         if self.mesh.normals is not None:
             return np.asarray(self.mesh.normals[self.mesh.faces])
-        a, b, c = self.triangles.swapaxes(0, 1)
+        triangles = self.triangles
+        a, b, c = triangles.swapaxes(0, 1)
         normals = np.cross(b - a, c - a)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-        return np.broadcast_to(normals[:, None], self.triangles.shape)  # one copy for the corners
+        return np.broadcast_to(normals[:, None], triangles.shape)  # one copy for the corners
 
 
-def without_triangles(shape: UnitShape) -> UnitShape:
-    """Return a shape without its triangles: the outline, which is all that placement needs."""
-    return replace(shape, make_mesh=no_mesh)
+def outline_of(shape: UnitShape) -> UnitShape:
+    """Return what placement reads of a shape, and nothing else.
+
+    The arrays are copies, as views keep alive what they are views of.
+    """
+    coarse = shape.coarse and (shape.coarse[0].copy(), shape.coarse[1])
+    hull = shape.hull_points.copy(), shape.hull_discs.copy()
+    resting = shape.resting_directions.copy()
+    return UnitShape(shape.name, no_mesh, *hull, shape.rounding, resting, coarse=coarse)
 
 
 def no_mesh() -> Mesh:

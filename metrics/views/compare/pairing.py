@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.checks import LARGEST_MAGNITUDE
-from metrics.scoring.metric_names import EMPTY_ROOM, HEADLINE, OF_TRUTH, changed, metric
+from metrics.scoring.metric_names import EMPTY_ROOM, HEADLINE, OF_TRUTH, metric
 from metrics.scoring.records import ID_COLUMNS, ScoreFile
 from metrics.scoring.truth_digests import require_truth
 from scenegen.common.errors import SceneGenError
@@ -46,10 +46,10 @@ def require_same_test(
 
     names = tuple(dict.fromkeys(metrics or shown() or HEADLINE[first.task]))
     for name in names:
-        if not metric(name).suits(first.task):
+        if first.task not in metric(name).tasks:
             raise ComparisonError("metric", name, f"a score of task {first.task!r}")
     older = [file for file in files if file.older]
-    others = [name for name in names if changed(name)]
+    others = [name for name in names if metric(name).redefined]
     if 0 < len(older) < len(files) and others:
         found, hint = f"format 1.0, in which {', '.join(others)} are defined otherwise", SCORE_AGAIN
         raise ComparisonError(older[0].place, found, "files of one format", hint)
@@ -101,7 +101,9 @@ def _require_same_floors(files: Sequence[ScoreFile], orders: Sequence[NDArray[np
             for name in first
             if name.startswith(OF_TRUTH)
             and name in file.items
-            and not (changed(name.removeprefix(EMPTY_ROOM)) and file.older != files[0].older)
+            and not (
+                metric(name.removeprefix(EMPTY_ROOM)).redefined and file.older != files[0].older
+            )
         ]:
             ours, theirs = first[name][orders[0]], file.items[name][order]
             same = np.isclose(theirs, ours, FLOOR_AGREEMENT, FLOOR_AGREEMENT**2, equal_nan=True)

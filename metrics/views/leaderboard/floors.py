@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from metrics.score_file import SCORE_AGAIN
-from metrics.scoring.metric_names import EMPTY_ROOM, RELIEF, WHOSE
+from metrics.scoring.metric_names import BASELINES, EMPTY_ROOM, OTHER_SCENE, SKILLED
 from metrics.scoring.records import ScoreFile
 from metrics.views.leaderboard.rows import Cells
 from metrics.views.score_tables import floor_text
@@ -29,7 +29,7 @@ def floor_cells(file: ScoreFile, names: Sequence[str]) -> Cells:
     rows: dict[str, dict[str, float]] = {}
     for name in names:
         if name in file.skills:
-            text = floor_text(file, name) if is_shared(name) else WHOSE[EMPTY_ROOM]
+            text = floor_text(file, name) if is_shared(name) else BASELINES[EMPTY_ROOM].name
             row = rows.setdefault(FLOOR + " ".join(text.split()), {})
             row[SKILL_OF + name] = 0.0
             if is_shared(name):
@@ -49,7 +49,7 @@ def own_floors(file: ScoreFile) -> dict[str, float]:
 
 def is_shared(name: str) -> bool:
     """Return whether all files of one test set have the same floor of this score."""
-    return name not in RELIEF
+    return SKILLED.get(name) != (OTHER_SCENE,)
 
 
 def require_same_floors(files: Sequence[ScoreFile]) -> None:

@@ -136,7 +136,7 @@ def rankings(
         together = [f for f in files if (*f.truth, f.protocol, f.older) == (*truth, older)]
         _require_same_rows(together)
         require_same_floors(together)
-        names = [name for name, score in wanted.items() if score.suits(task)]
+        names = [name for name, score in wanted.items() if task in score.tasks]
         behind_first = sorted(HEADLINE[task], key=lambda name: name != BEHIND)
         headline = [n for n in behind_first if n != BEHIND or seen in ("first_view", "no_view")]
         there = [n for n in headline if any(n in file.metrics for file in members)]

@@ -13,9 +13,9 @@ from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
 from scenegen.objects.families.members import check_member, make_member
 from scenegen.objects.families.parts.assembly import UPRIGHT
-from scenegen.objects.solids import Array, Mesh, UnitShape, no_mesh
+from scenegen.objects.solids import Array, Mesh, UnitShape, no_mesh, outline_of
 
-MOST_FACES_KEPT = 4_000_000  # of the meshes in memory; a face takes some 20 bytes
+MOST_KEPT = 100_000_000  # bytes of the meshes in memory
 _SOURCES = (
     "common/rotations.py",
     *(f"objects/{name}.py" for name in ("solids", "cast_meshes", "coarse_hulls")),
@@ -28,7 +28,7 @@ class MemberStore:
 
     def __init__(self, folder: str | Path | None = None) -> None:
         self._disk = DiskCache(folder)
-        self._meshes: Recent[Mesh] = Recent(MOST_FACES_KEPT)
+        self._meshes: Recent[Mesh] = Recent(MOST_KEPT)
 
     @property
     def folder(self) -> Path | None:
@@ -40,11 +40,15 @@ class MemberStore:
         self._disk = DiskCache(folder)
 
     def outline(self, family: str, number: int) -> tuple[UnitShape, int]:
-        """Return a member without its triangles, and their number. Raises as `make_member`."""
+        """Return a member's outline, as from `outline_of`, and its number of triangles.
+
+        Raises as `make_member`.
+        """
         arrays = self._arrays(family, number)
         points, discs = (arrays[name] for name in _OUTLINE)
         name = f"{family}/{number:04d}"
-        return UnitShape(name, no_mesh, points, discs, 0.0, UPRIGHT), len(arrays["faces"])
+        shape = UnitShape(name, no_mesh, points, discs, 0.0, UPRIGHT)
+        return outline_of(shape), len(arrays["faces"])
 
     def mesh(self, family: str, number: int) -> Mesh:
         """Return a member's mesh. Raises as `make_member`."""
@@ -55,7 +59,7 @@ class MemberStore:
         check_member(family, number)
         key = f"{family}-{number:04d}-{code_version()}"
         arrays = self._disk.read(key, _OUTLINE + _MESH) or self._made(family, number, key)
-        self._meshes.put((family, number), _mesh(arrays), len(arrays["faces"]))
+        self._meshes.put((family, number), _mesh(arrays))
         return arrays
 
     def _made(self, family: str, number: int, key: str) -> dict[str, Array]:

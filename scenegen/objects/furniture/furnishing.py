@@ -4,7 +4,6 @@ Frame: y up, standing on y = 0, centred in x and z, the front faces +z.
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -207,7 +206,6 @@ class Furnishing:
     textures: tuple[Texture, ...] = ()
 
 
-@lru_cache(maxsize=256)
 def furnishing(family: str, number: int) -> Furnishing:
     """Return a family's member as furniture. Raises SpecError as `members.check_member`."""
     rng = member_rng(family, number, 1)

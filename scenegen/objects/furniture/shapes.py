@@ -6,12 +6,12 @@ shapes. So an object of a closed room is placed by the same similarity as all ot
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.common.recent import recent
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
 from scenegen.objects.furniture.furnishing import MESH, Furnishing, supports
 from scenegen.objects.furniture.room_shell import box_hull
@@ -75,7 +75,7 @@ def furniture_shape(name: str, thing: Furnishing) -> UnitShape:
     return UnitShape(name, mesh, *box_hull(vertices), 0.0, UPRIGHT, furnished=made)
 
 
-@lru_cache(maxsize=2000)
+@recent(200_000_000)
 def piece(shape_of: Callable[[str], UnitShape], name: str) -> Piece:
     """Return a piece of furniture as it is placed. Raises as `shape_of`."""
     made = shape_of(name).furnished

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from scenegen.common.recent import Recent
+from scenegen.common.recent import Recent, bytes_alive
 from scenegen.objects.cache import DiskCache
 from scenegen.objects.furniture.furnishing import Paint
 from scenegen.objects.meshes.errors import BadMeshError
@@ -18,7 +18,8 @@ from scenegen.objects.meshes.models import Model, load_model
 from scenegen.objects.meshes.read import read_bytes
 from scenegen.objects.solids import Array, Mesh, UnitShape
 
-MOST_FACES_KEPT = 8_000_000  # of all shapes in memory; a face takes about 20 bytes
+MOST_KEPT = 300_000_000  # bytes of all shapes in memory
+COLORS = 36  # bytes of a face's, which are read where they are asked for
 
 
 class MeshStore:
@@ -36,7 +37,7 @@ class MeshStore:
         self._disk = DiskCache(cache_dir)
         self._digests: dict[str, str] = {}
         self._lacks = False
-        self._shapes: Recent[UnitShape] = Recent(MOST_FACES_KEPT)
+        self._shapes: Recent[UnitShape] = Recent(MOST_KEPT)
 
     def __reduce__(self) -> Any:
         """Pickle the folders and the problems; another process loads its models itself."""
@@ -51,7 +52,7 @@ class MeshStore:
         if shape is None:
             model = self._load(name)
             shape = replace(_unit_shape(name, model), make_colors=lambda: self._colors(name, model))
-            self._shapes.put(name, shape, len(shape.mesh.faces))
+            self._shapes.put(name, shape, bytes_alive(shape) + COLORS * len(shape.mesh.faces))
         return shape
 
     def digest(self, name: str) -> str:

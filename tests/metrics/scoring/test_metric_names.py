@@ -78,7 +78,7 @@ def test_directions_and_limits_hold_for_scores_that_are_made():
     good, bad = all_scores(0.0), all_scores(1.0)
     for name, value in good.items():
         known = metric(name)
-        assert known.task == "rooms"
+        assert "rooms" in known.tasks
         if known.higher_is_better:
             assert value == pytest.approx(known.largest, abs=1e-12)
             assert known.largest == 1.0 > bad[name] >= known.smallest
@@ -110,9 +110,9 @@ def test_names_that_are_derived():
     assert aligned.higher_is_better
     assert aligned.definition.startswith("`delta_1`: the same after the scale, at least 0, and")
     assert metric("derived_normal_within_30").higher_is_better
-    assert metric("iqtt_accuracy").task == "iqtt"
+    assert metric("iqtt_accuracy").tasks == ("iqtt",)
     for task, names in HEADLINE.items():
-        assert all(metric(name).suits(task) for name in names)
+        assert all(task in metric(name).tasks for name in names)
 
 
 THRESHOLDS = "<threshold>", "", "0", "0.050", "5e-2", "-1", "1.2.3", "1e999", "٣"

@@ -48,7 +48,7 @@ def test_a_member_is_made_once_and_comes_back_as_it_was(tmp_path, made):
 
 
 def test_without_a_folder_only_the_last_meshes_are_kept(made, monkeypatch):
-    monkeypatch.setattr(store, "MOST_FACES_KEPT", 1)
+    monkeypatch.setattr(store, "MOST_KEPT", 1)
     members = MemberStore()
     check(members)
     assert made.call_count == 1, "the outline has the mesh made"

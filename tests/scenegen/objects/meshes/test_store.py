@@ -140,7 +140,7 @@ def test_flat_models_have_hulls(turn, side, tmp_path):
 
 
 def test_shapes_in_memory_are_bounded(opened, monkeypatch):
-    monkeypatch.setattr(store, "MOST_FACES_KEPT", 1280)
+    monkeypatch.setattr(store, "MOST_KEPT", 100_000)
     models = opened()
     first = models.shape("odd/0")
     assert models.shape("odd/0") is first

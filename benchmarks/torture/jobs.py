@@ -1,0 +1,74 @@
+"""Runs of the size of users' jobs, by name: each must end well, within a limit of memory."""
+
+import os
+import shlex
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from benchmarks.torture.runs import Results, Torture
+
+SMALL = "--size 32 --min-visible-pixels 3 --workers 1 --out rooms.h5"
+STREAM = "import scenegen\nfor _ in scenegen.RoomStream('shapes', batch=64, stop=50_000): pass"
+
+
+class Job(NamedTuple):
+    """Commands, one after another, and the most memory, MB, that a process of them may take.
+
+    The limit is some 15% above what was measured.
+    """
+
+    commands: Sequence[str]
+    most: int
+
+
+JOBS = {
+    "interiors": Job(
+        [f"scenegen render --preset interiors --n 5000 --spp 1 --no-denoise {SMALL}"], 1100
+    ),
+    "shapes": Job([f"scenegen render --n 50000 {SMALL}"], 700),
+    "objects": Job([f"scenegen render --preset shapenet --n 20000 {SMALL}"], 900),
+    "questions": Job(
+        [
+            "iqtt make-split --train 20000 --labeled 50 --val 30 --test 60 --size 32"
+            " --min-cube-pixels 1 --workers 1 --out split"
+        ],
+        700,
+    ),
+    "scores": Job(
+        [
+            f"scenegen render --n 20000 {SMALL}",
+            "bench baseline constant --train rooms.h5 --data rooms.h5 --out constant.h5",
+            "bench score constant.h5 --truth rooms.h5 --json scores.json --workers 1",
+        ],
+        700,
+    ),
+    "stream": Job([f"python {shlex.quote(STREAM)}"], 700),
+}
+
+
+def job(name: str, torture: Torture, _count: int) -> Results:
+    """Run a job in a fresh folder."""
+    yield f"a job of a user's size: {name}", run_job(name, torture.fresh("job"))
+
+
+def run_job(name: str, folder: Path) -> str:
+    """Run a job's commands in a folder; return what is wrong, or nothing."""
+    for command in JOBS[name].commands:
+        program, *words = shlex.split(command)
+        if program != "python":
+            words = [f"import cli; cli.{program}()", *words]
+        with subprocess.Popen(
+            [sys.executable, "-c", *words], cwd=folder, stdout=subprocess.DEVNULL
+        ) as process:
+            _, status, used = os.wait4(process.pid, 0)  # of the process and those it waited for
+            process.returncode = os.waitstatus_to_exitcode(status)
+        peak = used.ru_maxrss / 1000  # MB
+        print(f"{command[:70]}: {peak:.0f} MB", file=sys.stderr)
+        if process.returncode:
+            return f"exit {process.returncode}: {command}"
+        if peak > JOBS[name].most:
+            return f"{peak:.0f} MB: {command}"
+    return ""
