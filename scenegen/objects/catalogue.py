@@ -5,16 +5,10 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 from scenegen.common.errors import SpecError
-<<<<<<< HEAD
-from scenegen.common.recent import Recent
+from scenegen.common.recent import recent
 from scenegen.description.names import SHAPE_NAMES
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import Request
-=======
-from scenegen.common.recent import recent
-from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
-from scenegen.description.specs import DatasetSpec
->>>>>>> main
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families.members import MEMBERS, member_shape
