@@ -113,5 +113,5 @@ def handed_out(tables: Sequence[QuestionsFile]) -> list[tuple[Path, str]]:
     holds |= dict.fromkeys(answers, "answers to the test questions")
     files: list[tuple[Path, str]] = []
     for opened, meaning in holds.items():
-        files += with_shards(opened, meaning, f"{meaning}; shows its shards as one file")
+        files += with_shards(opened, meaning)
     return files

@@ -18,7 +18,7 @@ from scenegen.common.records import check, to_json
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.solids import UnitShape
 
@@ -53,7 +53,7 @@ class SceneBatch:
             an image's bits must not depend on the rest of its batch.
     """
 
-    spec: DatasetSpec
+    spec: Request
     names: tuple[str, ...]
     shape_of: Callable[[str], UnitShape]
     index: Array
@@ -79,13 +79,15 @@ class SceneBatch:
     def __len__(self) -> int:
         return len(self.fov_y_degrees)
 
-    def rows(self, start: int, end: int) -> "SceneBatch":
-        """Return the images start .. end - 1, with only the names that they need."""
+    def rows(self, which: Any) -> "SceneBatch":
+        """Return some images, by a slice or their numbers, with only the models that they need."""
         arrays: dict[str, Any] = {
-            field.name: value[start:end]
+            field.name: value[which]
             for field in fields(self)
             if isinstance(value := getattr(self, field.name), np.ndarray)
         }
+        if self.spec.source == "shapes":  # listed, used or not: so their scene is built only once
+            return replace(self, **arrays)
         used, shape = np.unique(arrays["shape"], return_inverse=True)
         names = tuple(self.names[i] for i in used.tolist() if i >= 0)
         arrays["shape"] = (shape.reshape(arrays["shape"].shape) - int(used[0] < 0)).astype(np.int32)
@@ -93,7 +95,7 @@ class SceneBatch:
 
 
 def pack(
-    spec: DatasetSpec,
+    spec: Request,
     scenes: Sequence[SceneSpec],
     views: Sequence[int] = (0,),
     objects: Objects | None = None,
@@ -117,7 +119,7 @@ def pack(
 
 
 def pack_arrays(
-    spec: DatasetSpec, scenes: SceneArrays, views: Sequence[int], objects: Objects | None = None
+    spec: Request, scenes: SceneArrays, views: Sequence[int], objects: Objects | None = None
 ) -> SceneBatch:
     """Pack all views of each scene into arrays, scene after scene; their numbers are `views`.
 
@@ -167,11 +169,10 @@ def pack_arrays(
         background=each(scenes.background),
         interior=each(scenes.interior) if spec.interior else None,
     )
-    # All basic shapes are listed, used or not, so that their Mitsuba scene is built only once.
-    return batch if spec.source == "shapes" else batch.rows(0, len(batch))
+    return batch.rows(slice(None))
 
 
-def _arrays(spec: DatasetSpec, scenes: Sequence[SceneSpec], views: Sequence[int]) -> SceneArrays:
+def _arrays(spec: Request, scenes: Sequence[SceneSpec], views: Sequence[int]) -> SceneArrays:
     """Return scenes as arrays, with these views alone."""
     shown = {item.shape for scene in scenes for item in scene.objects}
     names = spec.shapes if spec.source == "shapes" else tuple(sorted(shown))
