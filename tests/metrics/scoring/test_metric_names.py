@@ -115,6 +115,14 @@ def test_names_that_are_derived():
     assert aligned.definition.startswith("`delta_1`: the same after the scale, at least 0, and")
     assert metric("derived_normal_within_30").higher_is_better
     assert metric("iqtt_accuracy").tasks == ("iqtt",)
+    tasks = {name: metric(name).tasks for name in ("normal_mean_degrees", "flat_rmse", "silog")}
+    assert tasks == {
+        "normal_mean_degrees": ("rooms", "measured"), "flat_rmse": ("measured",),
+        "silog": ("rooms", "measured"),
+    }  # fmt: skip
+    derived = metric("derived_normal_mean_degrees")
+    assert (derived.tasks, derived.of, derived.lacking) == (("rooms",), "points", "planes")
+    assert (derived.redefined, metric("empty_room_chamfer").redefined) == (True, False)
     for task, names in (*HEADLINE.items(), *PRINTED.items()):
         assert all(task in metric(name).tasks for name in names)
     assert HEADLINE == {
