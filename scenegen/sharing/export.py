@@ -86,7 +86,7 @@ def write_export(
     parts = cut(len(chosen), rows_per_file)
     check(len(parts) <= MOST_FILES, "rows per file", rows_per_file, "fewer files than 100,000")
     ending, write = FORMATS[form]
-    stem = "-".join(filter(None, (file.path.stem, file.part)))
+    stem = export_stem(file)
     names = [shard_name(f"{stem}{ending}", i, len(parts)) for i in range(len(parts))]
     columns = [ROW, *task.exported(file)]
     changed = [c for c in columns if is_picture(c) and (encoding == "srgb" or _is_developed(c))]
@@ -107,6 +107,11 @@ def write_export(
             write(made / name, columns, blocks)
         (made / ABOUT).write_text(text + "\n", encoding="utf-8")
     return [Path(folder) / name for name in (*names, ABOUT)]
+
+
+def export_stem(file: RowFile) -> str:
+    """Return what the names of exported files begin with, before their numbers."""
+    return "-".join(filter(None, (file.path.stem, file.part)))
 
 
 def _is_developed(column: Column) -> bool:

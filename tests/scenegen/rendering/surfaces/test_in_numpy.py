@@ -5,7 +5,7 @@ import pytest
 from trimesh import Trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from scenegen.description.scenes import SHAPE_NAMES
+from scenegen.description.names import SHAPE_NAMES
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
