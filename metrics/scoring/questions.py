@@ -40,7 +40,7 @@ def score_questions(
 ) -> ScoreFile:
     """Score runs of one method on an open file of answers; raises as `evaluate.score`."""
     from iqtt.floors import floors_of
-    from iqtt.questions.specs import question_kind
+    from iqtt.questions.kinds import question_kind
 
     names = ("answers", *(LABELS if truth.has_truth else ()))
     columns = {name: np.asarray(truth.read(name, slice(None))) for name in names}
