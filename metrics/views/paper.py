@@ -18,7 +18,6 @@ from typing import Literal
 from metrics.scoring.records import ScoreFile
 from metrics.views.table import Cell, Table, make_table
 
-PAPER, PEOPLE = "Pix2Shape", "Human Evaluation"  # of the paper's methods
 PAPER_KIND = "other"  # kind of the paper's questions
 SOURCE = "Pix2Shape (IJCV 2020, doi:10.1007/s11263-020-01322-1)"
 REPORTED = "as reported, on the authors' data"
