@@ -50,8 +50,8 @@ def ask(
     """
     needs("bench ask", ("inspect_ai",), "vlm")
     from iqtt.vlm.rows import Asked, count_rows
-    from metrics.intake.asking import ask as ask_rows
-    from metrics.intake.harness_logs import read_returned, write_returned
+    from metrics.intake.answers.asking import ask as ask_rows
+    from metrics.intake.answers.harness_logs import read_returned, write_returned
     from scenegen.files.new_file import check_writable
 
     check_writable(Path(out), overwrite)
