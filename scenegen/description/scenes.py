@@ -8,11 +8,8 @@ from dataclasses import dataclass
 from scenegen.camera import Camera, Vector3
 from scenegen.common.records import check, from_json, to_json
 from scenegen.description.interiors import Interior
+from scenegen.description.shapes import SHAPE_NAMES
 
-SHAPE_NAMES = (
-    "box", "sphere", "cone", "torus", "cylinder", "teapot", "capsule", "pyramid", "prism",
-    "tetrahedron", "octahedron", "dodecahedron", "icosahedron",
-)  # fmt: skip
 FAMILY_NAMES = ("bag", "bottle", "bowl", "can", "cap", "chair", "lamp", "mug", "table")
 FURNITURE_NAMES = (  # families that came with closed rooms
     "armchair", "basket", "bed", "book", "books", "box", "cabinet", "clock", "coffee_table", "cup",

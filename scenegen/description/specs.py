@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scenegen.camera import Camera, Vector3
 from scenegen.common.names import check_choice
 from scenegen.common.records import check, check_range, from_json, normalise, to_json
-from scenegen.description.scenes import FAMILY_NAMES, FURNITURE_NAMES, SHAPE_NAMES
+from scenegen.description.scenes import FAMILY_NAMES, FURNITURE_NAMES
+from scenegen.description.shapes import DRAWN_SHAPES, SHAPE_NAMES
 
 IMAGE_DTYPES = ("uint8", "float16", "float32")
 BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES + FURNITURE_NAMES}
@@ -129,7 +130,7 @@ class DatasetSpec:
     width: int = 128
     objects: tuple[int, int] = (1, 3)
     source: str = "shapes"
-    shapes: tuple[str, ...] = SHAPE_NAMES
+    shapes: tuple[str, ...] = DRAWN_SHAPES
     object_split: str = "all"
     listing: str = ""
     object_radius: tuple[float, float] = (0.11, 0.22)

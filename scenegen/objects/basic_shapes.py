@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 
 from scenegen.common.names import check_choice
-from scenegen.description.scenes import SHAPE_NAMES
+from scenegen.description.shapes import SHAPE_NAMES
 from scenegen.objects import teapot
 from scenegen.objects.basic_hulls import FILE, all_kept, kept
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
@@ -150,17 +150,5 @@ def _teapot() -> UnitShape:
 
 
 _BUILDERS: dict[str, Callable[[], UnitShape]] = {
-    "box": _box,
-    "sphere": _sphere,
-    "cone": _cone,
-    "torus": _torus,
-    "cylinder": _cylinder,
-    "teapot": _teapot,
-    "capsule": _capsule,
-    "pyramid": _pyramid,
-    "prism": _prism,
-    "tetrahedron": _tetrahedron,
-    "octahedron": _octahedron,
-    "dodecahedron": _dodecahedron,
-    "icosahedron": _icosahedron,
+    name: globals()[f"_{name}"] for name in SHAPE_NAMES
 }

@@ -6,7 +6,8 @@ from functools import lru_cache
 
 from scenegen.common.errors import SpecError
 from scenegen.common.recent import recent
-from scenegen.description.scenes import SHAPE_NAMES, SceneSpec
+from scenegen.description.scenes import SceneSpec
+from scenegen.description.shapes import SHAPE_NAMES
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.cast_meshes import cast_mesh
