@@ -146,15 +146,24 @@ def audit(
 
 def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
     """Print what is wrong with questions of other people; return the exit code."""
+    import json
+
     from iqtt.audit import strangers
     from scenegen.files.new_file import write_text
 
     with progress_bar(None, "question") as bar:
-        found = strangers.audit_strangers(cubes, bar.update)
+        audited = strangers.audit_strangers(cubes, bar.update)
     if json_path:
-        write_text(json_path, strangers.as_json(found), overwrite)
-    click.echo(strangers.report(found))
-    return 0 if found.passed else 1
+        write_text(json_path, json.dumps(audited, indent=1) + "\n", overwrite)
+    for rule, count in audited["counts"].items():
+        where = next(
+            (f"; question {i}: {f[rule]}" for i, f in enumerate(audited["faults"]) if rule in f), ""
+        )
+        share = f"{count} ({count / audited['questions']:.1%})"
+        click.echo(f"  {'FAIL' if count else 'ok  '} {rule}: {share}{where}")
+    keys = ", ".join(f"{key}: {count}" for key, count in audited["key_counts"].items())
+    click.echo(f"\n  {audited['questions']} questions, keys {keys}")
+    return 0 if audited["passed"] else 1
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt floors iqtt-split/iqtt-test.h5 --out floors.json")

@@ -1,17 +1,21 @@
 """The `bench` commands that make submissions: from folders of files, and from a model."""
 
 import shlex
+from collections.abc import Callable
 from fractions import Fraction
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from scenegen.command_line.groups import EXAMPLE
-from scenegen.command_line.options import ENCODING, OVERWRITE
+from scenegen.command_line.options import ENCODING, OVERWRITE, Command, together
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, NewHdf5
+
+if TYPE_CHECKING:
+    from metrics.intake.reading import Reading
 
 
 class Factor(click.ParamType):  # type: ignore[type-arg]
@@ -40,6 +44,7 @@ class ModelName(InputPath):
 
 
 ALIGNMENTS = ("none", "median_scale", "scale", "scale_shift")
+DEPTH_KINDS = ("depth", "disparity", "distance")
 DATA = click.option(
     "--data", "truth", type=InputPath(), required=True, metavar="ROOMS.h5",
     help="The file of rooms or questions that is predicted.",
@@ -60,31 +65,52 @@ MISSING = click.option(
 )  # fmt: skip
 
 
+def reading_options(*kinds: str) -> Callable[[Command], Command]:
+    """Return the options that say what the numbers of files are, of `bench import` and `truth`."""
+    return together(
+        click.option(
+            "--kind", type=click.Choice(kinds), default="depth", show_default=True,
+            help="What the numbers are: planar depth, disparity (large where near; 1 / depth of"
+            " truth), distance along the ray, or points x, y, z."),
+        click.option("--unit", type=click.Choice(["m", "cm", "mm"]),
+                     help="Unit of the numbers; the edge of a room is 1 m."),
+        click.option("--scale", type=Factor(), help="Metres for each step, such as 1/256."),
+        click.option("--invalid", type=float, multiple=True,
+                     help="Stored number that stands for no value, such as 0; may be repeated."),
+        click.option("--normals", metavar="FILES",
+                     help="Normals, as --depth; whole numbers are -1 to 1."),
+        FRAME,
+        click.option("--array", help="Name of the array in NPZ, or of the channel in EXR files."),
+        click.option("--match", type=click.Choice(["number", "name"]), default="number",
+                     show_default=True, help="How files belong to rows: by the names of pictures"
+                     " or the number in their names, or in the order of their names."),
+    )  # fmt: skip
+
+
+def read_as(
+    *, unit: str | None, scale: float | None, alignment: Any = None, missing: Any = "refuse",
+    **numbers: Any,
+) -> "Reading":  # fmt: skip
+    """Return what `reading_options` say of the numbers in files."""
+    from metrics.intake.reading import UNITS, Reading
+
+    if unit and scale:
+        raise click.UsageError("give --unit or --scale, not both")
+    factor = scale if scale is not None else UNITS[unit or "m"]
+    return Reading(scale=factor, alignment=alignment, missing=missing, **numbers)
+
+
 # fmt: off
 @click.command("import", epilog=f"{EXAMPLE}bench import --depth 'out/*.png' --unit mm"
                                 " --invalid 0 --data rooms.h5 --out mine.h5")
 @click.option("--depth", "pattern", metavar="FILES",
               help="A folder, a pattern in quotes such as 'out/*.png', or one NPY or NPZ file with"
               " an image for each row. PNG, TIFF, EXR, PFM, NPY and NPZ are read.")
-@click.option("--kind", type=click.Choice(["depth", "disparity", "distance", "points"]),
-              default="depth", show_default=True,
-              help="What the numbers are: planar depth, disparity (large where near), distance"
-              " along the ray, or points x, y, z.")
-@click.option("--unit", type=click.Choice(["m", "cm", "mm"]),
-              help="Unit of the numbers; the edge of the room is 1 m.")
-@click.option("--scale", type=Factor(), help="Scene units for each step, such as 1/256.")
+@reading_options(*DEPTH_KINDS, "points")
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
               help="What the method cannot know [default: none; scale_shift of disparity]."
               " Disparity with none or scale is 1 / depth.")
-@click.option("--invalid", type=float, multiple=True,
-              help="Stored number that stands for no value, such as 0; may be repeated.")
 @MISSING
-@click.option("--normals", metavar="FILES", help="Normals, as --depth; whole numbers are -1 to 1.")
-@FRAME
-@click.option("--array", help="Name of the array in NPZ, or of the channel in EXR files.")
-@click.option("--match", type=click.Choice(["number", "name"]), default="number",
-              show_default=True, help="How files belong to rows: by the number in their names, or"
-              " in the order of their names.")
 @click.option("--shown", type=click.Choice(["scored_view", "first_view", "no_view"]),
               default="scored_view", show_default=True, help="Image of the scene that the method"
               " was shown to predict a view.")
@@ -99,18 +125,15 @@ MISSING = click.option(
 @OVERWRITE
 @click.argument("expanded", nargs=-1, metavar="")
 def import_(
-    pattern: str | None, kind: Any, unit: str | None, scale: float | None,
-    alignment: Any, invalid: tuple[float, ...], missing: Any, normals: str | None, frame: Any,
-    array: str | None, match: Any, shown: Any, answers: str | None, truth: str, out: str,
-    method: str | None, run_name: str, notes: str, overwrite: bool, expanded: tuple[str, ...],
+    pattern: str | None, alignment: Any, missing: Any, normals: str | None, shown: Any,
+    answers: str | None, truth: str, out: str, method: str | None, run_name: str, notes: str,
+    overwrite: bool, expanded: tuple[str, ...], **numbers: Any,
 ) -> None:
     """Make a submission of predictions that lie in files.
 
     Files belong to rows by the number in their names. A missing, extra or doubled file is an error.
     Images of another size are resampled to that of the truth.
     """
-    from metrics.intake.importing import UNITS, Reading, import_rooms
-    from metrics.intake.running import count_rows
     from scenegen.files.new_file import check_writable
 
     texts: dict[str, Any] = {"run": run_name, "notes": notes, "overwrite": overwrite}
@@ -121,37 +144,46 @@ def import_(
     if (pattern is None) == (answers is None):
         raise click.UsageError("give --depth for rooms, or --answers for questions")
     if answers is not None:
-        from metrics.intake.answer_files import import_answers
-        from metrics.intake.harness_logs import is_log, read_returned, write_returned
+        _import_answers(answers, truth, out, method, texts)
+        return
+    assert pattern is not None
+    from metrics.intake.importing import import_rooms
+    from metrics.measured.reader import open_images
 
+    reading = read_as(alignment=alignment, missing=missing, **numbers)
+    with open_images(truth) as rooms:
+        with progress_bar(len(rooms), "image") as bar:
+            how = import_rooms(
+                pattern, rooms, out, method=method or _name_of(pattern), reading=reading,
+                normals=normals, shown=shown, progress=bar.update, **texts,
+            )
+        print_line(f"{out}: {how}")
+        _print_hints(out, rooms)
+
+
+# fmt: on
+def _import_answers(
+    answers: str, truth: str, out: str, method: str | None, texts: dict[str, Any]
+) -> None:
+    """Make a submission of a list of answers, or of the log of a harness."""
+    from iqtt.files.reader import open_questions
+    from metrics.intake.answer_files import import_answers
+    from metrics.intake.harness_logs import is_log, read_returned, write_returned
+
+    with open_questions(truth) as questions:
         if is_log(answers):
             log = read_returned(answers)
-            texts["notes"] = notes or log.settings
+            texts["notes"] = texts["notes"] or log.settings
             count = write_returned(out, truth, log, method=method or "", **texts)
             for note in filter(None, (log.failure_note, log.unread_note)):
                 print_line(f"{answers}: {note}")
         else:
-            stem = Path(answers).stem
-            count = import_answers(answers, truth, out, method=method or stem, **texts)
-        total = count_rows(truth)
-        of_all = f" of {total}" if count < total else ""
-        print_line(f"{out}: answers to {count}{of_all} questions")
-        return
-    assert pattern is not None
-    if unit and scale:
-        raise click.UsageError("give --unit or --scale, not both")
-    factor = scale if scale is not None else UNITS[unit or "m"]
-    reading = Reading(kind, factor, alignment, invalid, frame, missing, array, match)
-    with progress_bar(count_rows(truth), "image") as bar:
-        how = import_rooms(
-            pattern, truth, out, method=method or _name_of(pattern), reading=reading,
-            normals=normals, shown=shown, progress=bar.update, **texts,
-        )
-    print_line(f"{out}: {how}")
-    _print_hints(out, truth)
+            name = method or Path(answers).stem
+            count = import_answers(answers, questions, out, method=name, **texts)
+        of_all = f" of {len(questions)}" if count < len(questions) else ""
+    print_line(f"{out}: answers to {count}{of_all} questions")
 
 
-# fmt: on
 def _name_of(pattern: str) -> str:
     """Return the name of the folder that files lie in, for tables."""
     path = Path(pattern)
@@ -159,21 +191,21 @@ def _name_of(pattern: str) -> str:
     return folder.resolve().name or "predictions"
 
 
-def _print_hints(out: str, truth: str) -> None:
-    """Print what a submission of images holds, hints on mistakes, and the next command."""
-    from metrics.measured.reader import open_images
+def _print_hints(out: str, data: Any) -> None:
+    """Print what a submission holds, hints on mistakes, and the next command.
+
+    `data` is the open file that was predicted.
+    """
     from metrics.submissions.reader import RoomPredictions, open_predictions
     from metrics.submissions.validation import hints
 
     with open_predictions(out) as opened:
         if isinstance(opened, RoomPredictions):
-            with open_images(truth) as rooms:
-                found = hints(opened, rooms)
             normals = ", with normals" if opened.has_normals else ""
             print_line(f"{out}: {opened.kind}, alignment {opened.alignment}{normals}")
-            for hint in found:
+            for hint in hints(opened, data):
                 print_line(f"hint: {out}: {hint}", err=True)
-    print_line(f"now: {shlex.join(['bench', 'score', out, '--truth', truth])}")
+    print_line(f"now: {shlex.join(['bench', 'score', out, '--truth', str(data.path)])}")
 
 
 # fmt: off
@@ -226,7 +258,8 @@ def run(
     """
     from metrics.intake.model_file import LIBRARIES, ModelError, opened_model
     from metrics.intake.outputs import KEYS
-    from metrics.intake.running import DEFAULT_BATCH, Call, count_rows, run_model
+    from metrics.intake.running import DEFAULT_BATCH, Call, run_model
+    from metrics.submissions.truths import open_data
     from scenegen.files.new_file import check_writable
 
     check_writable(Path(out), overwrite)
@@ -242,17 +275,21 @@ def run(
     kept = {**options, "arguments": words} if words else options
     call = Call(curve, exposure, intrinsics, batch or DEFAULT_BATCH, frame, key, missing)
     try:
-        with (
-            opened_model(
-                model, options, timeout, partial(print_line, err=True), arguments=words,
-                python=python,
-            ) as loaded,
-            progress_bar(count_rows(truth), "row") as bar,
-        ):
-            said = run_model(
-                loaded, truth, out, call=call, method=method or loaded.title, run=run_name,
-                notes=notes, overwrite=overwrite, keep=keep, options=kept, progress=bar.update,
-            )
+        with open_data(truth) as data:
+            with (
+                opened_model(
+                    model, options, timeout, partial(print_line, err=True), arguments=words,
+                    python=python,
+                ) as loaded,
+                progress_bar(len(data), "row") as bar,
+            ):
+                said = run_model(
+                    loaded, data, out, call=call, method=method or loaded.title, run=run_name,
+                    notes=notes, overwrite=overwrite, keep=keep, options=kept,
+                    progress=bar.update,
+                )
+            print_line(f"{out}: {said}")
+            _print_hints(out, data)
     except ModelError as error:
         if traceback and error.traceback:
             print_line(error.traceback, err=True)
@@ -263,8 +300,6 @@ def run(
         at = f" at {loaded.calls[0]}" if loaded is not None and loaded.calls else ""
         print_line(f"stopped{at}; the same command goes on with the rows in {out}.rows", err=True)
         raise
-    print_line(f"{out}: {said}")
-    _print_hints(out, truth)
 
 
 # fmt: on

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from metrics.commands.intake import Factor
+from metrics.commands.intake import DEPTH_KINDS, read_as, reading_options
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
@@ -21,27 +21,13 @@ LAYOUTS = ("moge", "nyu", "nyu-raw", "kitti", "diode", "hypersim", "sintel")
 @click.option("--images", metavar="FILES", help="Pictures: a folder, or a pattern in quotes.")
 @click.option("--depth", metavar="FILES",
               help="Their depth: PNG, TIFF, EXR, PFM, NPY or NPZ, in the size of the picture.")
-@click.option("--kind", type=click.Choice(["depth", "disparity", "distance"]), default="depth",
-              show_default=True, help="What the numbers are: planar depth, 1 / depth, or distance"
-              " along the ray.")
-@click.option("--unit", type=click.Choice(["m", "cm", "mm"]), help="Unit of the numbers.")
-@click.option("--scale", type=Factor(), help="Metres for each step, such as 1/256.")
-@click.option("--invalid", type=float, multiple=True,
-              help="Stored number that stands for no value, such as 0; may be repeated. What is not"
-              " above 0 is none in any case.")
+@reading_options(*DEPTH_KINDS)
 @click.option("--intrinsics", type=InputPath(), metavar="K.json",
               help="Pinhole matrix in pixels, whose first pixel has its centre at 0.5; or an object"
               " of them by picture.")
 @click.option("--groups", type=InputPath(), metavar="GROUPS.csv",
               help="Lines `picture,group`: frames of one scene or drive are a group.")
-@click.option("--normals", metavar="FILES", help="Normals, as --depth; whole numbers are -1 to 1.")
-@click.option("--frame", type=click.Choice(["opencv", "opengl"]), default="opencv",
-              show_default=True, help="Axes of the normals, as for `bench import`.")
 @click.option("--mask", metavar="FILES", help="Images that are 0 where depth does not count.")
-@click.option("--array", help="Name of the array in NPZ, or of the channel in EXR files.")
-@click.option("--match", type=click.Choice(["number", "name"]), default="number",
-              show_default=True, help="Files belong to pictures by name, or else by the number in"
-              " their names; or in the order of their names.")
 @click.option("--layout", type=click.Choice(LAYOUTS), help="A public set, as it is downloaded.")
 @click.option("--data", type=InputPath(), metavar="FOLDER", help="Its folder, or its file.")
 @click.option("--split", type=InputPath(), help="splits.mat of NYU, or a list of KITTI's frames.")
@@ -50,17 +36,15 @@ LAYOUTS = ("moge", "nyu", "nyu-raw", "kitti", "diode", "hypersim", "sintel")
 @click.option("--out", type=NewHdf5(), required=True, metavar="TRUTH.h5", help="File to write.")
 @OVERWRITE
 def truth(
-    images: str | None, depth: str | None, kind: Any, unit: str | None, scale: float | None,
-    invalid: tuple[float, ...], intrinsics: str | None, groups: str | None, normals: str | None,
-    frame: Any, mask: str | None, array: str | None, match: Any, layout: str | None,
-    data: str | None, split: str | None, source: str, licence: str, out: str, overwrite: bool,
+    images: str | None, depth: str | None, normals: str | None, intrinsics: str | None,
+    groups: str | None, mask: str | None, layout: str | None, data: str | None, split: str | None,
+    source: str, licence: str, out: str, overwrite: bool, **numbers: Any,
 ) -> None:
     """Make a file of truth that others measured, from files or from a public set.
 
     It is predicted and scored as a file of rooms: bench import, run, validate, score, compare,
     leaderboard.
     """
-    from metrics.intake.importing import UNITS, Reading
     from metrics.intake.truth_files import (
         Beside,
         read_groups,
@@ -68,7 +52,8 @@ def truth(
         truth_of_files,
         unknown_unit,
     )
-    from metrics.intake.truth_layouts import LAYOUTS as READERS
+    from metrics.intake.truth_layouts import LAYOUTS as SETS
+    from metrics.intake.truth_layouts import read_layout
     from metrics.measured.writer import write_measured
     from scenegen.files.new_file import check_writable
 
@@ -76,20 +61,16 @@ def truth(
     if bool(layout) != bool(data) or bool(images) != bool(depth) or bool(layout) == bool(images):
         raise click.UsageError("give --images and --depth, or --layout and --data")
     if layout and data:
-        of_files = (unit, scale, invalid, intrinsics, groups, normals, mask, array)
-        if any(of_files):
+        told = [numbers[name] for name in ("unit", "scale", "invalid", "array")]
+        if any((*told, intrinsics, groups, normals, mask)):
             raise click.UsageError("--layout knows its units, cameras and groups")
-        found = READERS[layout]
-        source, licence = source or found.source, licence or found.licence
-        rows = found.read(Path(data), Path(split) if split else None)
+        source, licence = source or SETS[layout].source, licence or SETS[layout].licence
+        rows = read_layout(layout, Path(data), Path(split) if split else None)
     else:
         assert images, "the options were checked"
         assert depth, "the options were checked"
-        if unit and scale:
-            raise click.UsageError("give --unit or --scale, not both")
-        factor = scale if scale is not None else UNITS[unit or "m"]
-        reading = Reading(kind, factor, None, invalid, frame, "refuse", array, match)
-        if unit is None and scale is None:
+        reading = read_as(**numbers)
+        if numbers["unit"] is None and numbers["scale"] is None:
             raise unknown_unit(depth, reading)
         beside = Beside(
             read_matrices(intrinsics) if intrinsics else {}, read_groups(groups) if groups else {},

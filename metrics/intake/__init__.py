@@ -2,10 +2,11 @@
 
 `outputs` turns what a model returns, or a file holds, into the geometry of the submission format;
 `resampling` brings it to the size of the truth. `running` calls a model of the user's
-(`model_file`) on every row and keeps what is done (`kept_rows`). `importing` takes folders of files
-instead: `matching` says which file belongs to which row, `array_files` reads them, and
-`answer_files` reads answers to questions, and `harness_logs` those that programs logged which ask
-models. Start reading with `outputs`.
+(`model_file`) on every row and keeps what is done (`kept_rows`). Folders of files have one reader,
+for predictions (`importing`) and for truth (`truth_files`): `folders` says which file belongs to
+which row, `array_files` reads it, and `reading` takes its numbers. `answer_files` reads answers to
+questions, and `harness_logs` those that programs logged which ask models. Start reading with
+`outputs`.
 
 Imports `metrics.submissions` and what it imports; never torch.
 """

@@ -2,9 +2,9 @@
 
 import csv
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,10 +16,12 @@ from metrics.submissions.strict_json import parse_json, read_bytes
 from metrics.submissions.writer import write_answers
 from scenegen.common.errors import SceneGenError
 
+if TYPE_CHECKING:
+    from iqtt.files.reader import QuestionsFile
+
 MOST_BYTES = 64 * 2**20
 QUESTION = ("question", "id", "index", "row")  # names that the index of a question may have
-ANSWER = ("answer", "prediction", "choice")
-ENDINGS = (".csv", ".json", ".jsonl")
+ANSWER = ("scores", "answer", "prediction", "choice")
 
 
 class AnswerFileError(SceneGenError):
@@ -28,7 +30,7 @@ class AnswerFileError(SceneGenError):
 
 def import_answers(
     path: str | Path,
-    questions: str | Path,
+    questions: "str | Path | QuestionsFile",
     out: str | Path,
     *,
     method: str,
@@ -46,13 +48,13 @@ def import_answers(
     Raises AnswerFileError, PredictionError, and OSError.
     """
     path = Path(path)
-    readers = {".csv": _csv, ".json": _json, ".jsonl": _json_lines}
-    reader = readers.get(path.suffix.lower())
+    reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise AnswerFileError(path, f"the ending {path.suffix!r:.20}", " or ".join(ENDINGS))
+        raise AnswerFileError(path, f"the ending {path.suffix!r:.20}", " or ".join(READERS))
     rows, values = list[int | None](), list[Any]()
     try:
-        for place, question, value in reader(read_bytes(path, MOST_BYTES)):
+        for place, entry in reader(read_bytes(path, MOST_BYTES)):
+            question, value = _parts(entry, place) if isinstance(entry, dict) else (None, entry)
             rows.append(None if question is None else _index(question, place))
             values.append(_value(value, place))
     except JsonError as error:
@@ -78,32 +80,24 @@ def import_answers(
     return len(values)
 
 
-Entries = Iterator[tuple[str, Any, Any]]  # place, question, answer or scores
-
-
-def _text(data: bytes) -> str:
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise AnswerFileError("text", "bytes that are not UTF-8", "text") from error
+Entries = Iterator[tuple[str, Any]]  # place, and an answer or an object with one
 
 
 def _csv(data: bytes) -> Entries:
-    lines = csv.DictReader(_text(data).splitlines(), skipinitialspace=True, strict=True)
     try:
-        names = {(name or "").strip().lower(): name for name in lines.fieldnames or ()}
-        question = next((names[name] for name in QUESTION if name in names), None)
-        answer = next((names[name] for name in ANSWER if name in names), None)
-        scores = [names[letter.lower()] for letter in LETTERS if letter.lower() in names]
-        if answer is None and len(scores) < 2:
-            found = ", ".join(map(repr, list(names)[:8])) or "no columns"
-            raise AnswerFileError("line 1", found, "a column answer, or columns A, B, C of scores")
-        for entry in lines:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise AnswerFileError("text", "bytes that are not UTF-8", "text") from error
+    lines = csv.DictReader(text.splitlines(), skipinitialspace=True, strict=True)
+    try:
+        for line in lines:
             place = f"line {lines.line_num}"
-            value = [entry[name] for name in scores] if answer is None else entry[answer]
-            if value is None or (isinstance(value, list) and None in value):
+            if None in line.values():
                 raise AnswerFileError(place, "too few columns", "as many as in line 1")
-            yield place, entry[question] if question else None, value
+            entry = {(name or "").strip().lower(): value for name, value in line.items()}
+            scores = [entry[letter.lower()] for letter in LETTERS if letter.lower() in entry]
+            several = len(scores) > 1 and not any(name in entry for name in ANSWER)
+            yield place, entry | ({"scores": scores} if several else {})
     except csv.Error as error:
         raise AnswerFileError(f"line {lines.line_num}", str(error), "CSV") from error
 
@@ -114,36 +108,33 @@ def _json(data: bytes) -> Entries:
         content = content["answers"]
     if isinstance(content, dict):
         for key, value in content.items():
-            yield f"key {key!r:.20}", key, value
+            yield f"key {key!r:.20}", {"question": key, "answer": value}
         return
     if not isinstance(content, list):
         raise AnswerFileError("JSON", type(content).__name__, "a list or an object")
-    for place, value in enumerate(content):
-        yield _entry(f"entry {place}", value) if isinstance(value, dict) else (
-            f"entry {place}", None, value
-        )  # fmt: skip
+    for number, entry in enumerate(content):
+        yield f"entry {number}", entry
 
 
 def _json_lines(data: bytes) -> Entries:
     for number, line in enumerate(data.splitlines(), 1):
         if line.strip():
             try:
-                content = parse_json(line, 100)
+                yield f"line {number}", parse_json(line, 100)
             except JsonError as error:
                 raise AnswerFileError(f"line {number}", error.found, error.expected) from error
-            if not isinstance(content, dict):
-                content = {"answer": content}
-            yield _entry(f"line {number}", content)
 
 
-def _entry(place: str, content: Mapping[str, Any]) -> tuple[str, Any, Any]:
-    question = next((content[name] for name in QUESTION if name in content), None)
-    for name in ("scores", *ANSWER):
-        if name in content:
-            return place, question, content[name]
-    raise AnswerFileError(
-        place, f"the keys {', '.join(map(repr, list(content)[:8]))}", "answer, or scores"
-    )
+READERS = {".csv": _csv, ".json": _json, ".jsonl": _json_lines}
+
+
+def _parts(entry: dict[str, Any], place: str) -> tuple[Any, Any]:
+    """Return the question of an object, None where it names none, and its answer."""
+    name = next((name for name in ANSWER if name in entry), None)
+    if name is None:
+        keys = ", ".join(map(repr, list(entry)[:8]))
+        raise AnswerFileError(place, f"the keys {keys}", "answer, scores, or A, B, C")
+    return next((entry[name] for name in QUESTION if name in entry), None), entry[name]
 
 
 def _index(value: Any, place: str) -> int:

@@ -4,8 +4,10 @@ The names of keys are those of MoGe (Wang et al. 2025), which wraps other models
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 
 from metrics.intake.resampling import filled, nearest, resampled
 from metrics.measures.alignment import Alignment
+from metrics.submissions.problems import PredictionError
 from metrics.submissions.writer import as_array
 from scenegen.common.errors import SceneGenError
 from scenegen.common.names import did_you_mean
@@ -63,6 +66,14 @@ class Geometry:
     fov_y_degrees: float | None = None
     key: str = ""
 
+    def within(self, mask: Array, name: str = "mask") -> "Geometry":
+        """Return the geometry without values where a mask (h, w) is False. Raises OutputError."""
+        shape = self.geometry.shape[:2]
+        if mask.shape != shape:
+            raise OutputError(name, f"shape {mask.shape}", f"{shape}, as {self.key or self.kind}")
+        inside = mask[..., None] if self.geometry.ndim == 3 else mask
+        return replace(self, geometry=np.where(inside, self.geometry, np.nan))
+
     @property
     def values(self) -> dict[str, Any]:
         """The arguments of `RoomPredictionWriter.add`, beside the row."""
@@ -71,6 +82,17 @@ class Geometry:
         return values | (
             {} if self.fov_y_degrees is None else {"fov_y_degrees": self.fov_y_degrees}
         )
+
+
+@contextmanager
+def in_row(out: str | Path, row: int, where: object) -> Iterator[None]:
+    """Name `where` in errors of the block, which writes a row of `out`, and what helps them."""
+    try:
+        yield
+    except (OutputError, PredictionError) as error:
+        place = error.where.removeprefix(f"{out}: row {row}: ")
+        hint = FILL if error.found.startswith("NaN") and not error.hint else error.hint
+        raise type(error)(f"{where}: {place}", error.found, error.expected, hint) from error
 
 
 def read_output(
@@ -104,21 +126,17 @@ def read_output(
         wanted = _WANTED if chosen is None else f"the key {chosen!r}"
         raise OutputError("returned", f"a dict with the keys {names}", wanted, hint)
     kind, alignment = KEYS[chosen]
-    image = image_of(output[chosen], chosen, vectors=kind == "points")
-    if output.get("mask") is not None:
-        inside = image_of(output["mask"], "mask") > 0.5
-        if inside.shape != image.shape[:2]:
-            raise OutputError("mask", f"shape {inside.shape}", f"{image.shape[:2]}, as {chosen}")
-        image = np.where(inside.reshape(inside.shape + (1,) * (image.ndim - 2)), image, np.nan)
-    normal = output.get("normal")
+    normal, mask = output.get("normal"), output.get("mask")
     geometry = Geometry(
         kind,
         alignment,
-        image,
+        image_of(output[chosen], chosen, vectors=kind == "points"),
         None if normal is None else image_of(normal, "normal", vectors=True),
         _fov(output.get("intrinsics"), height),
         chosen,
     )
+    if mask is not None:
+        geometry = geometry.within(image_of(mask, "mask") > 0.5)
     return fitted_to(geometry, height, width, frame=frame, missing=missing)
 
 

@@ -1,33 +1,35 @@
 """Run a model on every row of a file of rooms or questions, and write its submission."""
 
 import itertools
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.intake.importing import told_of_missing
 from metrics.intake.kept_rows import KeptRows, kept_rows
 from metrics.intake.model_file import Model, ModelError
-from metrics.intake.outputs import Frame, Geometry, Missing, OutputError, read_output
-from metrics.measured.reader import Images, MeasuredFile, matrix_of, open_images, size_of
-from metrics.submissions.problems import PredictionError
+from metrics.intake.outputs import Frame, Geometry, Missing, OutputError, in_row, read_output
+from metrics.measured.reader import Images, MeasuredFile, matrix_of, size_of
+from metrics.submissions.truths import open_data
 from metrics.submissions.writer import RoomPredictionWriter, as_array, write_answers
 from scenegen.common.errors import SpecError
 from scenegen.files.new_file import check_writable
-from scenegen.files.sets.shards import OpenFile
 from scenegen.rendering.ground_truth import decode_image
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import radiance_of
 
+if TYPE_CHECKING:
+    from iqtt.files.reader import QuestionsFile
+
 Array = NDArray[Any]
-Begun = TypeVar("Begun")
+Arrays = dict[str, Any]  # what is kept of a row
+Ask = Callable[[Sequence[int]], Callable[[], dict[int, Any]]]
 Progress = Callable[[int], Any]
 DEFAULT_BATCH = 8  # images, of a model that has infer_batch
-KIND = "file of rooms or questions"
 TOLD = "the true intrinsics were given to the model"
 
 
@@ -71,7 +73,7 @@ class Call:
 
 def run_model(
     model: Model,
-    data: str | Path,
+    data: "str | Path | Images | QuestionsFile",
     out: str | Path,
     *,
     call: Call,
@@ -89,7 +91,7 @@ def run_model(
     goes on with the others.
 
     Args:
-        data: a file of rooms, or of questions.
+        data: a file of rooms, or of questions, which may be open.
         keep: "resume", "restart" or None, as in `kept_rows`.
         options: that the model was loaded with; kept rows of others are refused.
         progress: called with the number of rows that were done since it was last called.
@@ -97,136 +99,121 @@ def run_model(
     Raises ModelError, OutputError and PredictionError, naming the row; and as `kept_rows` and the
     readers and writers of files.
     """
-    from iqtt.files.reader import holds_questions
-
     check_writable(out, overwrite)
-    with OpenFile(data, KIND) as opened:
-        questions = holds_questions(opened)
     texts: dict[str, Any] = {"method": method, "run": run, "notes": notes, "overwrite": overwrite}
-    kept = {name: value for name, value in (options or {}).items() if name != "batch"}
-    settings = {"model": model.sha256, **call.settings, "options": kept}
-    settings |= {"weights": model.provenance["weights_sha256"]} if model.named else {}
-    runner = _run_questions if questions else _run_rooms
-    return runner(model, data, out, call, texts, settings, keep, progress)
+    with open_data(data) as rows:
+        _check_suits(model, rows, call)
+        kept_options = {name: value for name, value in (options or {}).items() if name != "batch"}
+        settings = {"model": model.sha256, **call.settings, "options": kept_options}
+        settings |= {"weights": model.provenance["weights_sha256"]} if model.named else {}
+        with kept_rows(out, settings | {"data": rows.fingerprint or ""}, keep) as kept:
+            done = kept.count
+            write = _write_rooms if isinstance(rows, Images) else _write_answers
+            said = write(model, rows, out, call, texts, kept, progress)  # type: ignore[arg-type]
+    return said + (f", {done} of them from an earlier run" if done else "")
 
 
-def count_rows(data: str | Path) -> int:
-    """Return how many rows a file of rooms or questions has. Raises as their readers."""
-    from iqtt.files.reader import QuestionsFile, holds_questions
+def _check_suits(model: Model, rows: "Images | QuestionsFile", call: Call) -> None:
+    """Raise ModelError for a model that cannot predict such rows, or is not told the camera."""
+    if not isinstance(rows, Images):
+        if model.named:
+            found = f"questions in {rows.path}"
+            raise ModelError(model.name, found, "rooms, whose depth it predicts")
+    elif call.intrinsics and not model.takes_intrinsics:
+        found = f"infer of {model.name}, which takes none"
+        raise ModelError("--intrinsics", found, "infer(image, intrinsics=None)")
 
-    with OpenFile(data, KIND) as opened:
-        if holds_questions(opened):
-            return len(QuestionsFile(opened))
-    with open_images(data) as images:
-        return len(images)
+
+def _results(
+    ask: Ask, count: int, size: int, kept: KeptRows
+) -> Iterator[tuple[int, Arrays | None, Any]]:
+    """Yield each row with what is kept of it, or None and what the model returns.
+
+    The model is asked for `size` rows at a time, one block ahead: it works while rows are written.
+    """
+
+    def begin(start: int) -> tuple[dict[int, Arrays | None], Callable[[], dict[int, Any]]]:
+        stored = {row: kept.read(row) for row in range(start, min(start + size, count))}
+        lacking = [row for row, arrays in stored.items() if arrays is None]
+        return stored, ask(lacking) if lacking else dict
+
+    begun = map(begin, range(0, count, size))
+    block = next(begun, None)
+    while block is not None:
+        stored, wait = block
+        block = next(begun, None)
+        outputs = wait()
+        for row, arrays in stored.items():
+            yield row, arrays, outputs.get(row)
 
 
 # ---- rooms ----
 
 
-def _run_rooms(
-    model: Model, data: str | Path, out: str | Path, call: Call, texts: dict[str, Any],
-    settings: dict[str, Any], keep: str | None, progress: Progress,
+def _write_rooms(
+    model: Model, rooms: Images, out: str | Path, call: Call, texts: dict[str, Any],
+    kept: KeptRows, progress: Progress,
 ) -> str:  # fmt: skip
-    if call.intrinsics:
-        if not model.takes_intrinsics:
-            found = f"infer of {model.name}, which takes none"
-            raise ModelError("--intrinsics", found, "infer(image, intrinsics=None)")
-        texts["notes"] = "\n".join(filter(None, (texts["notes"], TOLD)))
-    with open_images(data) as rooms:
-        settings |= {"data": rooms.fingerprint}
-        with kept_rows(out, settings, keep) as kept:
-            done = kept.count
-            rows = _geometries(model, rooms, call, kept)
-            start = next(rows)
-            first = start[1]
-            model.ask_provenance()
-            told = [f"{name}: {text}" for name, text in model.provenance.items() if text]
-            texts["notes"] = "\n".join(filter(None, (texts["notes"], *told)))
-            with RoomPredictionWriter(out, data, alignment=first.alignment, **texts) as writer:
-                for row, geometry in itertools.chain([start], rows):
-                    where = f"{model.name}: row {row}"
-                    try:
-                        if geometry.key != first.key:
-                            expected = f"{first.key!r}, as in row 0"
-                            raise OutputError("returned", repr(geometry.key), expected)
-                        writer.add(row, **geometry.values)
-                    except (OutputError, PredictionError) as error:
-                        error.where = error.where.removeprefix(f"{out}: row {row}: ")
-                        raise told_of_missing(error, where) from error
-                    kept.write(row, _arrays(geometry))
-                    progress(1)
-    again = f", {done} of them from an earlier run" if done else ""
-    return f"{first.key} of {len(rooms)} rows{again}"
-
-
-def _geometries(
-    model: Model, rooms: Images, call: Call, kept: KeptRows
-) -> Iterator[tuple[int, Geometry]]:
-    """Yield what is predicted for each row, in order: kept, or from the model."""
     size = call.batch if model.takes_batches else 1
-
-    def begin(start: int) -> tuple[dict[int, Any], Callable[[], dict[int, Any]]]:
-        stored = {row: kept.read(row) for row in range(start, min(start + size, len(rooms)))}
-        todo = [row for row in stored if stored[row] is None]
-        return stored, _begun(model, rooms, call, todo) if todo else dict
-
-    for stored, wait in _one_ahead(begin, range(0, len(rooms), size)):
-        outputs = wait()
-        for row, arrays in stored.items():
-            if arrays is not None:
-                yield row, _geometry(arrays)
-                continue
-            try:
-                geometry = read_output(
-                    outputs[row], *size_of(rooms, row),
-                    frame=call.frame, key=call.key, missing=call.missing,
-                )  # fmt: skip
-            except OutputError as error:
-                raise error.inside(f"{model.name}: row {row}") from error
-            in_metres = isinstance(rooms, MeasuredFile) or rooms.spec.interior
-            if model.metres and geometry.alignment == "none" and not in_metres:
-                geometry = replace(geometry, alignment="scale")
-            yield row, geometry
+    results = _results(partial(_ask, model, rooms, call), len(rooms), size, kept)
+    rows = (
+        (row, _predicted(model, rooms, call, row, output) if arrays is None else _geometry(arrays))
+        for row, arrays, output in results
+    )
+    start = next(rows)
+    first = start[1]
+    model.ask_provenance()
+    told = [f"{name}: {text}" for name, text in model.provenance.items() if text]
+    notes = (texts["notes"], TOLD if call.intrinsics else "", *told)
+    texts["notes"] = "\n".join(filter(None, notes))
+    with RoomPredictionWriter(out, rooms, alignment=first.alignment, **texts) as writer:
+        for row, geometry in itertools.chain([start], rows):
+            with in_row(out, row, f"{model.name}: row {row}"):
+                if geometry.key != first.key:
+                    expected = f"{first.key!r}, as in row 0"
+                    raise OutputError("returned", repr(geometry.key), expected)
+                writer.add(row, **geometry.values)
+            kept.write(row, _arrays(geometry))
+            progress(1)
+    return f"{first.key} of {len(rooms)} rows"
 
 
-def _one_ahead(begin: Callable[[int], Begun], items: Iterable[int]) -> Iterator[Begun]:
-    """Begin each item before the one before it is yielded: the model works meanwhile."""
-    before: list[Begun] = []
-    for item in items:
-        before.append(begin(item))
-        if len(before) > 1:
-            yield before.pop(0)
-    yield from before
+def _predicted(model: Model, rooms: Images, call: Call, row: int, output: Any) -> Geometry:
+    """Return what a model returned for a row, in the size of the row. Raises OutputError."""
+    try:
+        geometry = read_output(
+            output, *size_of(rooms, row), frame=call.frame, key=call.key, missing=call.missing
+        )
+    except OutputError as error:
+        raise error.inside(f"{model.name}: row {row}") from error
+    in_metres = isinstance(rooms, MeasuredFile) or rooms.spec.interior
+    if model.metres and geometry.alignment == "none" and not in_metres:
+        return replace(geometry, alignment="scale")
+    return geometry
 
 
-def _begun(
+def _ask(
     model: Model, rooms: Images, call: Call, rows: Sequence[int]
 ) -> Callable[[], dict[int, Any]]:
     """Let the model begin some rows; the function returned waits for what it returns for each.
 
     Raises ModelError, and OutputError for a list of another length.
     """
-    images, cameras = [], []
-    for row in rows:
-        if isinstance(rooms, MeasuredFile):
-            images.append(rooms.picture(row))
-        else:
-            images.append(call.picture(radiance_of(rooms, row), rooms.place("image", row)))
-        cameras += [matrix_of(rooms, row)] if call.intrinsics else []
+    images = [_picture(rooms, row, call) for row in rows]
+    cameras = [matrix_of(rooms, row) for row in rows] if call.intrinsics else []
     if not model.takes_batches:
-        (row,), told = rows, cameras if call.intrinsics else []
-        one = model.begin("infer", f"row {row}", *images, *told)
-        return lambda: {row: one()}
+        wait_for_it = model.begin("infer", f"row {rows[0]}", *images, *cameras)
+        return lambda: {rows[0]: wait_for_it()}
     where = f"rows {rows[0]} to {rows[-1]}"
-    if len({image.shape for image in images}) > 1:
-        found = f"images of {len({image.shape for image in images})} sizes"
+    sizes = {image.shape for image in images}
+    if len(sizes) > 1:
+        found = f"images of {len(sizes)} sizes"
         raise OutputError(f"{model.name}: {where}", found, "one", "say --batch 1")
-    batch = (np.stack(images), *([np.stack(cameras)] if call.intrinsics else []))
-    several = model.begin("infer_batch", where, *batch)
+    batch = (np.stack(images), *([np.stack(cameras)] if cameras else []))
+    wait_for_all = model.begin("infer_batch", where, *batch)
 
     def wait() -> dict[int, Any]:
-        outputs = several()
+        outputs = wait_for_all()
         if not isinstance(outputs, list) or len(outputs) != len(rows):
             count = f" of {len(outputs)}" if isinstance(outputs, list) else ""
             place, found = f"{model.name}: {where}: infer_batch", type(outputs).__name__ + count
@@ -236,14 +223,20 @@ def _begun(
     return wait
 
 
-def _arrays(geometry: Geometry) -> dict[str, Any]:
+def _picture(rooms: Images, row: int, call: Call) -> Array:
+    if isinstance(rooms, MeasuredFile):
+        return rooms.picture(row)
+    return call.picture(radiance_of(rooms, row), rooms.place("image", row))
+
+
+def _arrays(geometry: Geometry) -> Arrays:
     arrays = {"geometry": geometry.geometry.astype(np.float32), "key": geometry.key}
     arrays |= {"kind": geometry.kind, "alignment": geometry.alignment}
     arrays |= {} if geometry.normal is None else {"normal": geometry.normal.astype(np.float32)}
     return arrays | ({} if geometry.fov_y_degrees is None else {"fov": geometry.fov_y_degrees})
 
 
-def _geometry(arrays: dict[str, Any]) -> Geometry:
+def _geometry(arrays: Mapping[str, Any]) -> Geometry:
     """Return what `_arrays` kept."""
     alignment: Any = str(arrays["alignment"])
     fov = float(arrays["fov"]) if "fov" in arrays else None
@@ -254,45 +247,32 @@ def _geometry(arrays: dict[str, Any]) -> Geometry:
 # ---- questions ----
 
 
-def _run_questions(
-    model: Model, data: str | Path, out: str | Path, call: Call, texts: dict[str, Any],
-    settings: dict[str, Any], keep: str | None, progress: Progress,
+def _write_answers(
+    model: Model, questions: "QuestionsFile", out: str | Path, call: Call, texts: dict[str, Any],
+    kept: KeptRows, progress: Progress,
 ) -> str:  # fmt: skip
-    from iqtt.files.reader import QuestionsFile
+    def ask(rows: Sequence[int]) -> Callable[[], dict[int, Any]]:
+        (row,) = rows
+        radiance = decode_image(questions.read("questions", row))
+        images = call.picture(radiance, f"{questions.path}: row {row}")
+        wait = model.begin("infer", f"row {row}", images[0], images[1:])
+        return lambda: {row: wait()}
 
-    if model.named:
-        raise ModelError(model.name, f"questions in {data}", "rooms, whose depth it predicts")
-    values = []
-    with QuestionsFile(data) as questions:
-        settings |= {"data": questions.fingerprint or ""}
-        with kept_rows(out, settings, keep) as kept:
-            done = kept.count
-
-            def begin(row: int) -> tuple[int, Any, Callable[[], Any]]:
-                arrays = kept.read(row)
-                if arrays is not None:
-                    return row, arrays, lambda: None
-                images = call.picture(
-                    decode_image(questions.read("questions", row)), f"{data}: row {row}"
-                )
-                return row, None, model.begin("infer", f"row {row}", images[0], images[1:])
-
-            for row, arrays, wait in _one_ahead(begin, range(len(questions))):
-                where = f"{model.name}: row {row}: returned"
-                value = arrays["value"] if arrays else _answer(wait(), questions.answers, where)
-                if arrays is None:
-                    kept.write(row, {"value": value})
-                values.append(value)
-                if values[-1].shape != values[0].shape:
-                    where = f"{model.name}: row {row}: returned"
-                    raise OutputError(where, "an index after scores, or scores after an index",
-                                      "the same for all questions")  # fmt: skip
-                progress(1)
-            form = "scores" if values and values[0].ndim else "answer"
-            given: dict[str, Any] = {form: np.array(values)}
-            write_answers(out, data, **texts, **given)
-    again = f", {done} of them from an earlier run" if done else ""
-    return f"{form} to {len(values)} questions{again}"
+    values = list[Array]()
+    for row, arrays, output in _results(ask, len(questions), 1, kept):
+        where = f"{model.name}: row {row}: returned"
+        value = _answer(output, questions.answers, where) if arrays is None else arrays["value"]
+        if arrays is None:
+            kept.write(row, {"value": value})
+        values.append(value)
+        if value.shape != values[0].shape:
+            found = "an index after scores, or scores after an index"
+            raise OutputError(where, found, "the same for all questions")
+        progress(1)
+    form = "scores" if values and values[0].ndim else "answer"
+    predicted: dict[str, Any] = {form: np.array(values)}
+    write_answers(out, questions, **texts, **predicted)
+    return f"{form} to {len(values)} questions"
 
 
 def _answer(value: Any, offered: int, where: str) -> Array:

@@ -10,20 +10,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
 
-from metrics.intake.array_files import ArrayFileError, read_array
-from metrics.intake.importing import Reading, unit_vectors
-from metrics.intake.matching import MatchError, files_of, numbered
+from metrics.intake.array_files import read_array
+from metrics.intake.folders import SHOWN, files_of, numbered
 from metrics.intake.outputs import FRAMES, image_of
+from metrics.intake.reading import Reading, geometry_reader
 from metrics.measured.reader import rays_of_matrix
 from metrics.measured.writer import Measured, Source, TruthError
 from scenegen.common.errors import SceneGenError
 from scenegen.description.specs import MAX_PIXELS
+from scenegen.files.pictures import READ, picture_size, read_picture
 
 Array = NDArray[Any]
-PICTURES = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp", ".ppm")
-SHOWN = 3  # pictures that an error lists
 # What the median of a room's or a street's depth in metres is multiplied by, and how to say it.
 GUESSES = ((1000.0, "--unit mm"), (256.0, "--scale 1/256"), (100.0, "--unit cm"), (1.0, "--unit m"))
 USUAL = (0.5, 60.0)  # metres, of such a median
@@ -49,115 +47,50 @@ def truth_of_files(images: str, depth: str, reading: Reading, beside: Beside) ->
     """Return a row for each picture of a pattern, with the depth that has its name or number.
 
     Raises MatchError for a picture without truth, two truths for one, or none; TruthError for names
-    in `beside` that no picture has; and as `matching.files_of`.
+    in `beside` that no picture has; and as `folders.files_of`.
     """
-    pictures = files_of(images, PICTURES)
-    of_depth = paired(pictures, files_of(depth), reading.match)
-    others = {
-        name: paired(pictures, files_of(pattern), reading.match)
-        for name, pattern in (("normals", beside.normals), ("masks", beside.masks))
-        if pattern is not None
-    }
-    for what, given in (("intrinsics", beside.matrices), ("groups", beside.groups)):
-        stems = {path.stem for path in pictures}
-        missing = sorted(stems - {Path(name).stem for name in given})
-        if given and "" not in given and missing:
-            found = f"none of {', '.join(missing[:SHOWN])}" + ", ..." * (len(missing) > SHOWN)
-            raise TruthError(what, found, "one for each picture")
-    groups, matrices = _by_stem(beside.groups), _by_stem(beside.matrices)
-    rows = []
-    for i, path in enumerate(pictures):
-        matrix = matrices.get("", matrices.get(path.stem))
-        more = {name: paths[i] for name, paths in others.items()}
-        read = partial(_measured, path, of_depth[i], reading, matrix, more)
-        rows.append(Source(path.name, groups.get(path.stem, path.name), size_of(path), read))
-    return rows
+    pictures = files_of(images, READ)
+    names = [path.name for path in pictures]
+    read, _ = geometry_reader(
+        reading, depth, names, lambda: [list(numbered(pictures))], beside.normals, beside.masks
+    )
+    matrices = _of_each(pictures, beside.matrices, "intrinsics")
+    groups = _of_each(pictures, beside.groups, "groups")
+    sizes = [picture_size(path, MAX_PIXELS) for path in pictures]
+
+    def measured(row: int) -> Measured:
+        path, matrix = pictures[row], matrices[row]
+        geometry, _ = read(row, partial(_rays, matrix, sizes[row], f"{depth}: {path.name}"))
+        truth, normal = geometry.geometry, geometry.normal
+        if reading.kind == "disparity":
+            truth = np.divide(1.0, truth, out=np.full_like(truth, np.nan), where=truth > 0.0)
+        normal = None if normal is None else normal * FRAMES[reading.frame]
+        return Measured(read_picture(path, MAX_PIXELS), truth, matrix, normal)
+
+    return [
+        Source(path.name, groups[row] or path.name, sizes[row], partial(measured, row))
+        for row, path in enumerate(pictures)
+    ]
 
 
-def _by_stem(given: Mapping[str, Any]) -> dict[str, Any]:
-    return {Path(name).stem if name else "": value for name, value in given.items()}
+def _of_each(pictures: Sequence[Path], by_name: Mapping[str, Any], what: str) -> list[Any]:
+    """Return what belongs to each picture, by its name with or without its ending; None for none.
 
-
-def paired(pictures: Sequence[Path], paths: Sequence[Path], by: str) -> list[Path]:
-    """Return for each picture the file of its name, of its number, or in their order by "name".
-
-    Raises MatchError where one has none, or two.
+    Raises TruthError where some have one, and others have none.
     """
-    if by != "number":
-        if len(pictures) != len(paths):
-            found = f"{len(pictures)} pictures and {len(paths)} files"
-            raise MatchError(paths[0].parent, found, "as many of each")
-        return list(paths)
-    first, second = (_by_stem_alone(some) for some in (pictures, paths))
-    if first.keys() != second.keys():
-        first, second = (dict(numbered(some)) for some in (pictures, paths))
-    for some, other, what in ((first, second, "truth"), (second, first, "picture")):
-        alone = [some[key].name for key in some if key not in other]
-        if alone:
-            found = f"no {what} for {', '.join(alone[:SHOWN])}" + ", ..." * (len(alone) > SHOWN)
-            raise MatchError(next(iter(some.values())).parent, found, "one of each")
-    return [second[key] for key in first]
-
-
-def _by_stem_alone(paths: Sequence[Path]) -> dict[Any, Path]:
-    """Return files by their names without ending. Raises MatchError where two share one."""
-    named: dict[Any, Path] = {}
-    for path in paths:
-        if path.stem in named:
-            found = f"{named[path.stem].name} and {path.name}"
-            raise MatchError(path.parent, found, "one file of a name")
-        named[path.stem] = path
-    return named
-
-
-def size_of(path: Path) -> tuple[int, int]:
-    """Return height and width of a picture, from its head. Raises ArrayFileError."""
-    try:
-        with Image.open(path) as picture:
-            if picture.width * picture.height > MAX_PIXELS:
-                found = f"{picture.height}x{picture.width}"
-                raise ArrayFileError(path, found, f"at most {MAX_PIXELS:,} pixels")
-            return picture.height, picture.width
-    except (UnidentifiedImageError, Image.DecompressionBombError, SyntaxError) as error:
-        raise ArrayFileError(path, "what is no picture", ", ".join(PICTURES)) from error
-
-
-def picture_of(path: Path) -> Array:
-    """Return a picture, (H, W, 3) sRGB bytes. Raises ArrayFileError."""
-    size_of(path)
-    try:
-        with Image.open(path) as picture:
-            return np.asarray(picture.convert("RGB"))
-    except (OSError, ValueError, SyntaxError) as error:
-        reason = " ".join(str(error).split())
-        raise ArrayFileError(path, f"a picture that cannot be read ({reason:.120})") from error
-
-
-def _measured(
-    path: Path, depth_path: Path, reading: Reading, matrix: Array | None, more: Mapping[str, Path]
-) -> Measured:
-    stored = read_array(depth_path, reading.array)
-    rays = partial(_rays, matrix, size_of(path), depth_path)
-    depth = reading.geometry(stored, None, rays).geometry
-    if reading.kind == "disparity":
-        depth = np.divide(1.0, depth, out=np.full_like(depth, np.nan), where=depth > 0.0)
-    if "masks" in more:
-        mask = image_of(read_array(more["masks"]), "mask")
-        if mask.shape != depth.shape:
-            raise TruthError(more["masks"], f"shape {mask.shape}", f"{depth.shape}, as the depth")
-        depth = np.where(mask > 0.0, depth, np.nan)
-    normal = None
-    if "normals" in more:
-        vectors = unit_vectors(read_array(more["normals"], None, True), more["normals"])
-        normal = vectors * FRAMES[reading.frame]
-    return Measured(picture_of(path), depth, matrix, normal)
+    by_stem = {Path(name).stem if name else "": value for name, value in by_name.items()}
+    missing = sorted(path.stem for path in pictures if path.stem not in by_stem)
+    if by_name and "" not in by_stem and missing:
+        found = f"none of {', '.join(missing[:SHOWN])}" + ", ..." * (len(missing) > SHOWN)
+        raise TruthError(what, found, "one for each picture")
+    return [by_stem.get("", by_stem.get(path.stem)) for path in pictures]
 
 
 def _rays(
-    matrix: Array | None, size: tuple[int, int], path: Path, height: int, width: int
+    matrix: Array | None, size: tuple[int, int], place: str, height: int, width: int
 ) -> Array:
     if matrix is None:
-        raise TruthError(path, "distance along the ray", "a camera: give --intrinsics")
+        raise TruthError(place, "distance along the ray", "a camera: give --intrinsics")
     return rays_of_matrix(matrix, size, height, width)
 
 

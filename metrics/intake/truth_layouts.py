@@ -7,7 +7,7 @@ hand: the tests write files of these layouts. What a set leaves open about its c
 import json
 import re
 import struct
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,10 +19,10 @@ from PIL import Image
 
 from metrics.intake.array_files import read_array
 from metrics.intake.outputs import image_of, planar_from_distance
-from metrics.intake.truth_files import picture_of, size_of
 from metrics.measured.reader import rays_of_matrix
 from metrics.measured.writer import Measured, Source, TruthError
 from scenegen.common.errors import FileFormatError
+from scenegen.description.specs import MAX_PIXELS
 from scenegen.files import trial
 from scenegen.files.input_file import (
     HDF5_ERRORS,
@@ -31,8 +31,11 @@ from scenegen.files.input_file import (
     open_file,
     open_unchecked,
 )
+from scenegen.files.pictures import picture_size, read_picture
+from scenegen.files.places import files_below
 
 Array = NDArray[Any]
+Measure = Callable[..., tuple[Array, Array | None]]  # from files to depth and matrix
 STEPS = 65533  # of MoGe's depth, between near and far
 INFINITE = 65535
 SINTEL_TAG = 202021.25  # begins files of depth and of cameras
@@ -42,9 +45,17 @@ FRAME = re.compile(r"(\d{4}_\d\d_\d\d_drive_\d{4}_sync)\D(?:.*\D)?(\d{10})(?!\d)
 class Layout(NamedTuple):
     """A public set: how a folder or file of it is read, and what a table says of it."""
 
-    read: Callable[[Path, Path | None], Sequence[Source]]
+    rows: Callable[[Path, Path | None], Iterable[Source]]
     source: str
     licence: str
+
+
+def read_layout(name: str, data: Path, split: Path | None = None) -> list[Source]:
+    """Return the rows of a set in one of `LAYOUTS`, all or those of a split.
+
+    Raises TruthError and FileFormatError, naming the file; OSError.
+    """
+    return list(LAYOUTS[name].rows(data, split))
 
 
 def _pinhole(fx: float, fy: float, cx: float, cy: float) -> Array:
@@ -58,9 +69,9 @@ NYU_CAMERA = _pinhole(
 DIODE_CAMERA = _pinhole(886.81, 927.06, 512.0, 384.0)  # of intrinsics.txt; 1024x768 pixels
 
 
-def _found(folder: Path, pattern: str) -> list[Path]:
-    """Return the files of a pattern in a folder, in order. Raises TruthError where none is."""
-    paths = sorted(folder.glob(pattern)) if folder.is_dir() else []
+def _matching(folder: Path, pattern: str) -> list[Path]:
+    """Return the files of a pattern below a folder, in order. Raises TruthError for none."""
+    paths = files_below(folder, pattern)
     if not paths:
         raise TruthError(folder, "none of its files", f"a folder that holds {pattern}")
     return paths
@@ -73,43 +84,49 @@ def _other(path: Path, what: str) -> Path:
     return path
 
 
-def moge(folder: Path, _split: Path | None) -> list[Source]:
-    """Return the rows of a folder of MoGe's evaluation: image, depth.png and meta.json each.
+def _row(name: str, group: str, picture: Path, measure: Measure, *files: Path) -> Source:
+    """Return a row of a picture, whose depth and matrix `measure` reads from files."""
+
+    def read() -> Measured:
+        return Measured(read_picture(picture, MAX_PIXELS), *measure(*files))
+
+    return Source(name, group, picture_size(picture, MAX_PIXELS), read)
+
+
+def moge(folder: Path, _split: Path | None) -> Iterator[Source]:
+    """Yield the rows of a folder of MoGe's evaluation: image, depth.png and meta.json each.
 
     Groups are the folders above. Depth is planar, and coded by its logarithm between near and far.
     """
     index = folder / ".index.txt"
     lines = index.read_text(encoding="utf-8").splitlines() if index.is_file() else []
     folders = [folder / line for line in lines if line.strip()] or [
-        path.parent for path in _found(folder, "**/meta.json")
+        path.parent for path in _matching(folder, "*/meta.json")
     ]
-    rows = []
     for place in folders:
         picture = next((p for p in (place / "image.jpg", place / "image.png") if p.is_file()), None)
         if picture is None:
             raise TruthError(place, "no image.jpg", "a picture beside its depth.png")
         name = place.relative_to(folder).as_posix()
         group = place.parent.relative_to(folder).as_posix()
-        read = partial(_of_moge, picture, place)
-        rows.append(Source(name, name if group == "." else group, size_of(picture), read))
-    return rows
+        yield _row(name, name if group == "." else group, picture, _of_moge, place)
 
 
-def _of_moge(picture: Path, place: Path) -> Measured:
+def _of_moge(place: Path) -> tuple[Array, Array]:
     path = _other(place / "depth.png", "depth")
-    height, width = size_of(path)
-    codes = read_array(path).astype(np.float64)
     about = _json(_other(place / "meta.json", "camera"))
+    codes = read_array(path).astype(np.float64)
     try:
         with Image.open(path) as image:
             near, far = (float(image.info[name]) for name in ("near", "far"))
             unit = float(image.info.get("unit", 1.0))  # of older files, metres
+        height, width = codes.shape
         matrix = np.array(about["intrinsics"], np.float64) * [[width], [height], [1.0]]
     except (KeyError, TypeError, ValueError) as error:
         raise TruthError(place, f"{error!s:.80}", "near, far and a matrix, as MoGe has") from error
     depth = unit * near * (far / near) ** ((codes - 1.0) / STEPS)
     known = (codes > 0) & (codes < INFINITE)
-    return Measured(picture_of(picture), np.where(known, depth, 0.0), matrix)
+    return np.where(known, depth, 0.0), matrix
 
 
 def _json(path: Path) -> Any:
@@ -171,15 +188,15 @@ def _nyu_split(path: Path, count: int) -> list[int]:
     return [int(number) for number in numbers]
 
 
-def kitti(folder: Path, split: Path | None) -> list[Source]:
-    """Return the rows of KITTI's annotated depth, all or those of a list of the Eigen split.
+def kitti(folder: Path, split: Path | None) -> Iterator[Source]:
+    """Yield the rows of KITTI's annotated depth, all or those of a list of the Eigen split.
 
     A folder holds DRIVE/proj_depth/groundtruth/image_02/FRAME.png, at any depth, and the pictures
     of the raw data, DATE/DRIVE/image_02/data/FRAME.png, with DATE/calib_cam_to_cam.txt. Depth is
     256 metres a step, 0 where nothing was measured. Groups are drives.
     """
     depths, pictures = dict[tuple[str, str], Path](), dict[tuple[str, str], Path]()
-    for path in _found(folder, "**/image_02/**/*.png"):
+    for path in _matching(folder, "*/image_02/*.png"):
         match = FRAME.search(path.as_posix())
         if match is not None and "velodyne_raw" not in path.parts:
             places = depths if "groundtruth" in path.parts else pictures
@@ -194,19 +211,17 @@ def kitti(folder: Path, split: Path | None) -> list[Source]:
         keys = [key for key in listed if key in depths]  # 45 of 697 frames have no annotated depth
     if not keys:
         raise TruthError(folder, "no annotated depth", "DRIVE/proj_depth/groundtruth/image_02")
-    rows = []
     for drive, frame in keys:
         if (drive, frame) not in pictures:
             found_name = f"no picture of {drive}, frame {frame}"
             raise TruthError(folder, found_name, f"{drive[:10]}/{drive}/image_02/data/{frame}.png")
         picture = pictures[drive, frame]
-        read = partial(_of_kitti, picture, depths[drive, frame])
-        rows.append(Source(f"{drive}_{frame}", drive, size_of(picture), read))
-    return rows
+        calibration = picture.parents[3] / "calib_cam_to_cam.txt"
+        depth = depths[drive, frame]
+        yield _row(f"{drive}_{frame}", drive, picture, _of_kitti, depth, calibration)
 
 
-def _of_kitti(picture: Path, path: Path) -> Measured:
-    calibration = picture.parents[3] / "calib_cam_to_cam.txt"
+def _of_kitti(path: Path, calibration: Path) -> tuple[Array, Array | None]:
     matrix = None
     if calibration.is_file():
         text = calibration.read_text(encoding="utf-8", errors="replace")
@@ -216,53 +231,46 @@ def _of_kitti(picture: Path, path: Path) -> Measured:
             matrix = np.array(numbers, np.float64).reshape(3, 4)[:, :3]
         except ValueError as error:
             raise TruthError(calibration, "no P_rect_02 of 12 numbers", "KITTI's file") from error
-    return Measured(picture_of(picture), read_array(path) / 256.0, matrix)
+    return read_array(path) / 256.0, matrix
 
 
-def diode(folder: Path, _split: Path | None) -> list[Source]:
-    """Return the rows of DIODE: NAME.png, NAME_depth.npy and NAME_depth_mask.npy each.
+def diode(folder: Path, _split: Path | None) -> Iterator[Source]:
+    """Yield the rows of DIODE: NAME.png, NAME_depth.npy and NAME_depth_mask.npy each.
 
     Groups are scans. The camera is that of the set's development kit.
     """
-    rows = []
-    for path in _found(folder, "**/*_depth.npy"):
-        picture = _other(path.with_name(path.name.replace("_depth.npy", ".png")), "picture")
+    for path in _matching(folder, "*_depth.npy"):
+        stem = path.name.removesuffix("_depth.npy")
+        picture = _other(path.with_name(f"{stem}.png"), "picture")
+        mask = path.with_name(f"{stem}_depth_mask.npy")
         group = path.parent.relative_to(folder).as_posix()
-        read = partial(_of_diode, picture, path)
-        rows.append(Source(picture.stem, group, size_of(picture), read))
-    return rows
+        yield _row(picture.stem, group, picture, _of_diode, path, mask)
 
 
-def _of_diode(picture: Path, path: Path) -> Measured:
+def _of_diode(path: Path, mask_path: Path) -> tuple[Array, Array | None]:
     depth = image_of(read_array(path), "depth")
-    place = _other(path.with_name(path.name.replace("_depth.npy", "_depth_mask.npy")), "mask")
-    mask = image_of(read_array(place), "mask")
+    mask = image_of(read_array(_other(mask_path, "mask")), "mask")
     if mask.shape != depth.shape:
-        raise TruthError(place, f"shape {mask.shape}", f"{depth.shape}, as the depth")
-    matrix = DIODE_CAMERA if depth.shape == (768, 1024) else None
-    return Measured(picture_of(picture), np.where(mask > 0.0, depth, 0.0), matrix)
+        raise TruthError(mask_path, f"shape {mask.shape}", f"{depth.shape}, as the depth")
+    return np.where(mask > 0.0, depth, 0.0), DIODE_CAMERA if depth.shape == (768, 1024) else None
 
 
-def hypersim(folder: Path, _split: Path | None) -> list[Source]:
-    """Return the rows of Hypersim: distances along rays, which become planar depth.
+def hypersim(folder: Path, _split: Path | None) -> Iterator[Source]:
+    """Yield the rows of Hypersim: distances along rays, which become planar depth.
 
     SCENE/images/scene_CAM_geometry_hdf5/frame.NNNN.depth_meters.hdf5 with the tone-mapped pictures
     of scene_CAM_final_preview. The camera is the set's usual one, 886.81 pixels at a width of 1024;
     a few scenes have others, which their files do not tell here. Groups are scenes.
     """
-    rows = []
-    for path in _found(folder, "**/images/scene_*_geometry_hdf5/frame.*.depth_meters.hdf5"):
-        camera = path.parent.name.replace("_geometry_hdf5", "_final_preview")
+    for path in _matching(folder, "*/images/scene_*_geometry_hdf5/frame.*.depth_meters.hdf5"):
+        camera = path.parent.name.removesuffix("_geometry_hdf5")
         frame = path.name.replace("depth_meters.hdf5", "tonemap.jpg")
-        picture = _other(path.parents[1] / camera / frame, "picture")
+        picture = _other(path.parents[1] / f"{camera}_final_preview" / frame, "picture")
         scene = path.parents[2].name
-        name = f"{scene}_{camera[: -len('_final_preview')]}_{frame.split('.')[1]}"
-        read = partial(_of_hypersim, picture, path)
-        rows.append(Source(name, scene, size_of(picture), read))
-    return rows
+        yield _row(f"{scene}_{camera}_{frame.split('.')[1]}", scene, picture, _of_hypersim, path)
 
 
-def _of_hypersim(picture: Path, path: Path) -> Measured:
+def _of_hypersim(path: Path) -> tuple[Array, Array]:
     try:
         with open_file(path, "file of distances") as file, checking(file):
             distance = image_of(file["dataset"][()], "dataset")
@@ -274,25 +282,22 @@ def _of_hypersim(picture: Path, path: Path) -> Measured:
     focal = 886.81 * width / 1024
     matrix = _pinhole(focal, focal, width / 2, height / 2)
     rays = rays_of_matrix(matrix, (height, width), height, width)
-    return Measured(picture_of(picture), planar_from_distance(distance, rays), matrix)
+    return planar_from_distance(distance, rays), matrix
 
 
-def sintel(folder: Path, _split: Path | None) -> list[Source]:
-    """Return the rows of MPI Sintel: depth/SCENE/frame_NNNN.dpt and the pictures of the final pass.
+def sintel(folder: Path, _split: Path | None) -> Iterator[Source]:
+    """Yield the rows of MPI Sintel: depth/SCENE/frame_NNNN.dpt and the pictures of the final pass.
 
     Cameras are those of camdata_left, where it is there. Groups are scenes.
     """
-    rows = []
-    for path in _found(folder, "**/depth/*/frame_*.dpt"):
+    for path in _matching(folder, "*/depth/*/frame_*.dpt"):
         scene, root = path.parent.name, path.parents[2]
         picture = _other(root / "final" / scene / f"{path.stem}.png", "picture of the final pass")
         camera = root / "camdata_left" / scene / f"{path.stem}.cam"
-        read = partial(_of_sintel, picture, path, camera)
-        rows.append(Source(f"{scene}_{path.stem}", scene, size_of(picture), read))
-    return rows
+        yield _row(f"{scene}_{path.stem}", scene, picture, _of_sintel, path, camera)
 
 
-def _of_sintel(picture: Path, path: Path, camera: Path) -> Measured:
+def _of_sintel(path: Path, camera: Path) -> tuple[Array, Array | None]:
     data = _tagged(path)
     width, height = struct.unpack("<ii", data[:8]) if len(data) >= 8 else (0, 0)
     if min(width, height) < 1 or len(data) != 8 + 4 * width * height:
@@ -304,7 +309,7 @@ def _of_sintel(picture: Path, path: Path, camera: Path) -> Measured:
         if len(numbers) != 8 * 21:
             raise TruthError(camera, f"{len(numbers)} bytes", "matrices of 9 and 12 numbers")
         matrix = np.frombuffer(numbers[:72], "<f8").reshape(3, 3)
-    return Measured(picture_of(picture), depth, matrix)
+    return depth, matrix
 
 
 def _tagged(path: Path) -> bytes:

@@ -183,11 +183,11 @@ def matrix_fault(matrix: Array, height: int, width: int) -> tuple[str, str, str]
 Images = RoomsFile | MeasuredFile
 
 
-def open_images(path: str | Path) -> Images:
+def open_images(path: str | Path | OpenFile) -> Images:
     """Open a file of rooms or of measured truth, whichever it is. Raises as their readers."""
-    opened = OpenFile(path, ROOMS.kind)
+    opened = path if isinstance(path, OpenFile) else OpenFile(path, ROOMS.kind)
     with checking(opened.file):
-        measured = read_text(opened.file, "format", path) == FORMAT_NAME
+        measured = read_text(opened.file, "format", opened.path) == FORMAT_NAME
     return MeasuredFile(opened) if measured else RoomsFile(opened)
 
 

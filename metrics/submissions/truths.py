@@ -4,6 +4,7 @@ What is wrong with a truth is an error: left alone, it would change which pixels
 """
 
 import os
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,13 +12,15 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measured.reader import Images, MeasuredFile, padded_size
+from metrics.measured.reader import Images, MeasuredFile, open_images, padded_size
 from metrics.submissions.layout import ID_NAMES
 from metrics.submissions.problems import Problem, first_ids
 from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
 from metrics.submissions.rules import Against, as_doubles, value_problems
 from scenegen.common.errors import FileFormatError
 from scenegen.files import trial
+from scenegen.files.rows import RowFile
+from scenegen.files.sets.shards import OpenFile
 from scenegen.rooms.reader import RoomsFile
 from scenegen.rooms.withheld import truth_beside, truth_path
 
@@ -61,6 +64,21 @@ class TrueView:
     def mask(self) -> Array:
         """The scored pixels, (H, W) bool."""
         return np.isfinite(self.depth)
+
+
+def open_data(
+    data: "str | Path | Images | QuestionsFile",
+) -> "AbstractContextManager[Images | QuestionsFile]":
+    """Open a file that models predict: rooms, measured truth or questions. An open one stays open.
+
+    Raises as the readers of these files.
+    """
+    from iqtt.files.reader import QuestionsFile, holds_questions
+
+    if isinstance(data, RowFile):
+        return nullcontext(data)
+    opened = OpenFile(data, "file of rooms or questions")
+    return QuestionsFile(opened) if holds_questions(opened) else open_images(opened)
 
 
 def find_truth(predictions: Predictions, named: str | Path | None = None) -> FoundTruth:

@@ -6,23 +6,27 @@ checked before anything is written.
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import TYPE_CHECKING, Any, Self
 
 import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metrics.measured.reader import MeasuredFile, open_images, padded_size, size_of
+from metrics.measured.reader import Images, MeasuredFile, open_images, padded_size, size_of
 from metrics.measures.alignment import Alignment
 from metrics.measures.answers import answers_from_scores
 from metrics.submissions import layout, rules
 from metrics.submissions.problems import PredictionError, first_error, first_ids
 from scenegen.files.row_file import new_hdf5_file, writer_name
+from scenegen.files.rows import RowFile
 from scenegen.files.schema import Column
 from scenegen.files.table import Table
+
+if TYPE_CHECKING:
+    from iqtt.files.reader import QuestionsFile
 
 
 class RoomPredictionWriter:
@@ -35,7 +39,7 @@ class RoomPredictionWriter:
     def __init__(
         self,
         path: str | Path,
-        truth: str | Path,
+        truth: str | Path | Images,
         *,
         method: str,
         run: str = "",
@@ -48,7 +52,8 @@ class RoomPredictionWriter:
         """Check the texts; the files are opened when the block begins.
 
         Args:
-            truth: the file of rooms, or of measured truth, that is predicted; recorded as given.
+            truth: the file of rooms, or of measured truth, that is predicted; its path is recorded
+                as given. An open file stays open.
             method, run: who predicts; runs of one method are averaged.
             alignment: what the method cannot know: "none", "median_scale", "scale" or
                 "scale_shift"; None for "none", or "scale_shift" of disparity.
@@ -62,9 +67,9 @@ class RoomPredictionWriter:
         """
         texts: dict[str, Any] = {"method": method, "run": run, "shown": shown, "notes": notes}
         texts |= {} if alignment is None else {"alignment": alignment}
-        self._given = _checked_texts("rooms", {**texts, "truth_path": str(truth)})
-        _check_elsewhere(path, truth)
-        self._path, self._truth_path = Path(path), Path(truth)
+        self._given = _checked_texts("rooms", {**texts, "truth_path": str(_place_of(truth))})
+        _check_elsewhere(path, _place_of(truth))
+        self._path, self._source = Path(path), truth
         self._overwrite, self._allow_partial = overwrite, allow_partial
         self._context: AbstractContextManager[None] | None = None
         self._table: Table | None = None
@@ -163,8 +168,10 @@ class RoomPredictionWriter:
 
     @contextmanager
     def _opened(self) -> Iterator[None]:
+        source = self._source
+        opening = nullcontext(source) if isinstance(source, Images) else open_images(source)
         with (
-            open_images(self._truth_path) as self._truth,
+            opening as self._truth,
             new_hdf5_file(self._path, self._overwrite) as self._file,
         ):
             self._written = np.zeros(len(self._truth), np.bool_)
@@ -194,7 +201,7 @@ class RoomPredictionWriter:
         count = len(self._written)
         whole = isinstance(row, int | np.integer) and not isinstance(row, bool)
         if not whole or not 0 <= row < count:
-            expected = f"a row of {self._truth_path}, from 0 to {count - 1}"
+            expected = f"a row of {self._truth.path}, from 0 to {count - 1}"
             raise PredictionError(f"{self._path}: row", f"{row!r:.40}", expected)
         if self._written[row]:
             raise PredictionError(f"{self._path}: row {row}", "it twice", "each row once")
@@ -225,7 +232,7 @@ class RoomPredictionWriter:
 
 def write_answers(
     path: str | Path,
-    questions_file: str | Path,
+    questions_file: "str | Path | QuestionsFile",
     *,
     method: str,
     answer: ArrayLike | None = None,
@@ -240,7 +247,7 @@ def write_answers(
     """Write answers to the questions of a file, all of them in its order unless `rows` is given.
 
     Args:
-        questions_file: such as iqtt-test.h5, recorded as given.
+        questions_file: such as iqtt-test.h5, or an open one; its path is recorded as given.
         method, run: as for `RoomPredictionWriter`.
         answer: (Q,) integers from 0, or -1 to abstain, which counts as wrong.
         scores: (Q, A) floats for A answers, 2 or 3 as the file offers: the highest wins, a tie for
@@ -255,12 +262,13 @@ def write_answers(
         PredictionError: naming the questions, what was found and what was expected.
         OSError, FileFormatError, SpecError: either file, as `iqtt.QuestionsFile`.
     """
-    texts = {"method": method, "run": run, "notes": notes, "truth_path": str(questions_file)}
+    place = _place_of(questions_file)
+    texts = {"method": method, "run": run, "notes": notes, "truth_path": str(place)}
     texts = _checked_texts("iqtt", texts)
-    _check_elsewhere(path, questions_file)
+    _check_elsewhere(path, place)
     count, offered, fingerprint = _questions(questions_file)
     if count == 0:
-        raise PredictionError(questions_file, "no questions", "at least one")
+        raise PredictionError(place, "no questions", "at least one")
     if answer is None and scores is None:
         raise PredictionError(path, "neither answer nor scores", "either")
     ids = np.arange(count) if rows is None else as_array(rows, f"{path}: rows")
@@ -291,16 +299,23 @@ def write_answers(
         _write_columns(file, "iqtt", values)
 
 
-def _questions(path: str | Path) -> tuple[int, int, str]:
+def _questions(source: "str | Path | QuestionsFile") -> tuple[int, int, str]:
     """Return how many questions a file holds, how many answers each offers, and its fingerprint."""
     from iqtt.files.reader import AnswersFile, NoImagesError, QuestionsFile
 
+    if isinstance(source, QuestionsFile):
+        return len(source), source.answers, source.fingerprint or ""
     try:
-        with QuestionsFile(path) as questions:
-            return len(questions), questions.answers, questions.fingerprint or ""
+        with QuestionsFile(source) as questions:
+            return _questions(questions)
     except NoImagesError:
-        with AnswersFile(path) as answers:
-            return len(answers), answers.answers, answers.fingerprint or ""
+        with AnswersFile(source) as answers:
+            return _questions(answers)
+
+
+def _place_of(truth: str | Path | RowFile) -> str | Path:
+    """Return the path of a file that may be open."""
+    return truth.path if isinstance(truth, RowFile) else truth
 
 
 def _check_elsewhere(path: str | Path, truth: str | Path) -> None:

@@ -1,9 +1,14 @@
-"""Pictures of the rows of a file: which rows to show, and how a picture is written."""
+"""Pictures: those of others are read, and those of the rows of a file are chosen and written."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from scenegen.common.errors import SpecError
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
 from scenegen.files.new_file import written_beside
@@ -15,6 +20,55 @@ DEFAULT_ROWS = 12
 MAX_ROWS = 400
 ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
 LARGEST_SIDE = {".webp": 16_383, ".jpg": 65_500, ".jpeg": 65_500, ".gif": 65_535}  # of the formats
+READ = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp", ".ppm")  # endings
+ORIENTATION, TURNED = 0x0112, (5, 6, 7, 8)  # of EXIF, and its values that swap the sides
+
+
+def picture_size(path: Path, most: int) -> tuple[int, int]:
+    """Return height and width of a picture, from its head, as `read_picture` returns it.
+
+    Raises FileFormatError for what is no picture, or has more than `most` pixels; OSError.
+    """
+    with _opened(path, most) as picture:
+        turned = picture.getexif().get(ORIENTATION) in TURNED
+        return picture.size if turned else picture.size[::-1]
+
+
+def read_picture(path: Path, most: int) -> NDArray[np.uint8]:
+    """Return a picture as it is to be seen, (H, W, 3) sRGB bytes, turned as its EXIF data say.
+
+    Raises as `picture_size`, and FileFormatError for a damaged one.
+    """
+    from PIL import ImageOps
+
+    with _opened(path, most) as picture:
+        return np.asarray(as_rgb(ImageOps.exif_transpose(picture)))
+
+
+def as_rgb(picture: "Image") -> "Image":
+    """Return a picture of any mode in 8 bits and three channels."""
+    if picture.mode.startswith("I"):  # 16 bits, which `convert` would cut off
+        picture = picture.convert("I").point(lambda value: value / 256)
+    return picture.convert("RGB")
+
+
+@contextmanager
+def _opened(path: Path, most: int) -> "Iterator[Image]":
+    from PIL import Image, UnidentifiedImageError
+
+    try:
+        with Image.open(path) as picture:
+            if picture.width * picture.height > most:
+                found = f"{picture.height}x{picture.width}"
+                raise FileFormatError(path, found, f"at most {most:,} pixels")
+            yield picture
+    except (UnidentifiedImageError, Image.DecompressionBombError) as error:
+        raise FileFormatError(path, "what is no picture", ", ".join(READ)) from error
+    except (OSError, ValueError, SyntaxError) as error:
+        if isinstance(error, OSError) and error.filename:
+            raise
+        reason = " ".join(str(error).split())
+        raise FileFormatError(path, f"a picture that cannot be read ({reason:.120})") from error
 
 
 def pick_rows(

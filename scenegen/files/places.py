@@ -10,6 +10,7 @@ import re
 import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
+from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, cast
 
@@ -61,6 +62,27 @@ def listing(folder: Path) -> list[Path]:
         return list(folder.iterdir())
     except (FileNotFoundError, NotADirectoryError):
         return []
+
+
+def files_below(folder: Path, pattern: str = "*") -> list[Path]:
+    """Return the files in a folder and the folders below it, in order; links are followed.
+
+    A folder that several links lead to is entered once, so links in a circle end.
+
+    Args:
+        pattern: of the path within the folder, with "/" before it; `*` stands for anything.
+    """
+    entered, files = set[str](), []
+    for place, folders, names in os.walk(folder, followlinks=True):
+        real = os.path.realpath(place)
+        if real in entered:
+            folders.clear()
+            continue
+        entered.add(real)
+        folders.sort()
+        paths = [Path(place, name) for name in names]
+        files += [p for p in paths if fnmatchcase(f"/{p.relative_to(folder).as_posix()}", pattern)]
+    return sorted(path for path in files if path.is_file())
 
 
 def upload(file: Path, place: Path) -> None:

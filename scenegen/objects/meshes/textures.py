@@ -14,6 +14,7 @@ import trimesh
 from PIL import Image
 
 from scenegen.common.srgb import decoded
+from scenegen.files.pictures import as_rgb
 from scenegen.objects.furniture.furnishing import Paint, Texture
 from scenegen.objects.meshes.clean import MOST_COORDINATE
 from scenegen.objects.meshes.colors import colors_of, matched, read_triangles
@@ -141,9 +142,7 @@ def _rgb(image: Any) -> Any:
     if max(image.size) > MOST_PIXELS:
         found = f"{image.size[0]} x {image.size[1]} pixels"
         raise BadMeshError("texture", found, f"at most {MOST_PIXELS} a side")
-    if image.mode.startswith("I"):  # 16 bits, which `convert` would cut off
-        image = image.convert("I").point(lambda value: value / 256)
-    picture = image.convert("RGB")
+    picture = as_rgb(image)
     longest = max(picture.size)
     return picture.reduce(-(-longest // KEPT_PIXELS)) if longest > KEPT_PIXELS else picture
 

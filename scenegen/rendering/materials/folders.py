@@ -14,6 +14,7 @@ from PIL import Image
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.recent import recent
 from scenegen.common.srgb import decoded
+from scenegen.files.places import files_below
 from scenegen.rendering.materials.material import Array, Material, slopes_of
 
 Result = TypeVar("Result")
@@ -77,9 +78,9 @@ def from_folder(folder: str | Path) -> Mapping[str, tuple[MapFiles, ...]]:
     if not root.is_dir():
         raise SpecError(root, "no folder", "a folder of materials", "see --materials")
     sets: dict[tuple[Path, str], list[tuple[str, Path]]] = {}
-    for path in sorted(root.rglob("*")):
+    for path in files_below(root):
         match = _NAME.fullmatch(path.name)
-        if match and path.is_file():
+        if match:
             kind = _ENDS[match["end"].lower()]
             sets.setdefault((path.parent, match["name"]), []).append((kind, path))
     if not any(kind == "color" for files in sets.values() for kind, _ in files):

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
 from scenegen.description.specs import DatasetSpec
+from scenegen.files.places import files_below
 from scenegen.rendering.backend import point_to_llvm
 from scenegen.rendering.materials.folders import MapFiles, check_maps, from_folder
 from scenegen.rendering.pictures.places import ASSETS
@@ -63,7 +64,7 @@ def digest_of(place: Path) -> str:
 
     Raises OSError where it cannot be read.
     """
-    files = sorted(p for p in place.rglob("*") if p.is_file()) if place.is_dir() else [place]
+    files = files_below(place) if place.is_dir() else [place]
     digest = hashlib.sha256()
     for path in files:
         name = path.relative_to(place).as_posix()

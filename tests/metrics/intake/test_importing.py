@@ -5,7 +5,8 @@ import pytest
 from PIL import Image
 from refusals import refused
 
-from metrics.intake.importing import Reading, import_rooms
+from metrics.intake.importing import import_rooms
+from metrics.intake.reading import Reading
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from scenegen.camera import pixel_directions

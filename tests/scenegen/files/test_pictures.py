@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scenegen.common.errors import SpecError
-from scenegen.files.pictures import pick_rows, save_picture
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.files.pictures import pick_rows, picture_size, read_picture, save_picture
 
 
 def test_choice_of_rows():
@@ -45,3 +45,22 @@ def test_a_sheet_that_a_format_cannot_hold(tmp_path):
         assert error.value.where == "out"
     save_picture(tall, tmp_path / "s.png")
     assert [p.name for p in tmp_path.iterdir()] == ["s.png"]
+
+
+def test_a_picture_is_read_as_it_is_seen(tmp_path):
+    """Turned as its EXIF data say, and 16 bits of grey as 8."""
+    values = np.arange(2 * 3 * 3, dtype=np.uint8).reshape(2, 3, 3)
+    turned = Image.Exif()
+    turned[0x0112] = 6  # the first row is the right-hand side
+    Image.fromarray(values).save(tmp_path / "turned.png", exif=turned)
+    assert picture_size(tmp_path / "turned.png", 6) == (3, 2)
+    np.testing.assert_array_equal(
+        read_picture(tmp_path / "turned.png", 6), np.rot90(values, axes=(1, 0))
+    )
+    grey = np.array([[0, 255, 256], [513, 40_000, 65_535]], np.uint16)
+    Image.fromarray(grey).save(tmp_path / "grey.png")
+    seen = read_picture(tmp_path / "grey.png", 6)
+    np.testing.assert_array_equal(seen, np.repeat((grey >> 8)[..., None], 3, axis=2))
+    for read in (picture_size, read_picture):
+        with pytest.raises(FileFormatError):
+            read(tmp_path / "grey.png", 5)

@@ -11,7 +11,7 @@ import pytest
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import SceneGenError, SpecError
-from scenegen.files.places import as_place, is_remote
+from scenegen.files.places import as_place, files_below, is_remote
 from scenegen.files.sets.manifest import manifest_path, read_manifest
 
 pytest.importorskip("upath")
@@ -118,3 +118,16 @@ def test_a_path_of_this_machine_is_no_url(tmp_path):
     assert not is_remote(as_place(str(tmp_path)))
     assert not is_remote(as_place(f"file://{tmp_path}"))
     assert is_remote(as_place("memory://x/rooms.h5"))
+
+
+def test_files_below_follow_links_that_end(tmp_path):
+    """A folder that links to one above it, or that two links lead to, is entered once."""
+    for name in ("a/b/2.png", "a/1.png", "a/no.txt", "beside/3.png"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    (tmp_path / "a/b/above").symlink_to(tmp_path / "a")
+    (tmp_path / "a/b/linked").symlink_to(tmp_path / "beside")
+    (tmp_path / "a/dead.png").symlink_to(tmp_path / "nothing.png")
+    names = [path.relative_to(tmp_path).as_posix() for path in files_below(tmp_path / "a", "*.png")]
+    assert names == ["a/1.png", "a/b/2.png", "a/b/linked/3.png"]
+    assert [path.name for path in files_below(tmp_path, "*/b/*.png")] == ["2.png", "3.png"]

@@ -1,0 +1,141 @@
+"""How the numbers of files are taken: kind, unit, frame, and what stands for no value."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from metrics.intake.array_files import ArrayFileError
+from metrics.intake.folders import By, Keys, row_reader
+from metrics.intake.outputs import (
+    Frame,
+    Geometry,
+    Missing,
+    OutputError,
+    image_of,
+    planar_from_distance,
+)
+from metrics.measures.alignment import Alignment
+from metrics.submissions.layout import KINDS
+from scenegen.common.errors import SpecError
+
+Array = NDArray[Any]
+Rays = Callable[[int, int], Array]
+GeometryReader = Callable[[int, Rays], tuple[Geometry, str]]
+Kind = Literal["depth", "disparity", "distance", "points"]
+UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}  # scene units for each, where the room's edge is 1 m
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How the numbers of files are to be taken.
+
+    Attributes:
+        kind: "depth" is planar, "distance" goes along the ray, "disparity" is large where near,
+            "points" are x, y, z.
+        scale: scene units for each step; 1 of disparity.
+        alignment: what the method does not know; None for "none", or "scale_shift" of disparity.
+            Disparity under another alignment is 1 / depth, and becomes depth.
+        invalid: stored values that stand for no value.
+        frame: of points and normals.
+        missing: what to do with pixels without a value.
+        array: name of the array in NPZ files, or of the channel in EXR files.
+        match: whether files belong to rows by number, or in the order of their names.
+    """
+
+    kind: Kind = "depth"
+    scale: float = 1.0
+    alignment: Alignment | None = None
+    invalid: tuple[float, ...] = ()
+    frame: Frame = "opencv"
+    missing: Missing = "refuse"
+    array: str | None = None
+    match: By = "number"
+
+    def __post_init__(self) -> None:
+        """Raise SpecError where settings contradict each other."""
+        kinds = {"distance": KINDS["depth"][:-1], "disparity": KINDS["depth"]}
+        allowed = kinds.get(self.kind) or KINDS[self.kind]
+        if self.alignment is not None and self.alignment not in allowed:
+            expected = f"{' or '.join(allowed)}, for {self.kind}"
+            raise SpecError("alignment", repr(self.alignment), expected)
+        if not 0.0 < self.scale < np.inf:
+            raise SpecError("scale", self.scale, "a number above 0")
+
+    def geometry(self, stored: Array, normal: Array | None, rays: Rays) -> Geometry:
+        """Return the geometry of the numbers of a file, (h, w) or (h, w, 3). Raises OutputError.
+
+        `rays` returns the directions of the pixels of an image of a height and a width, z = -1.
+        """
+        values = image_of(stored, self.kind, vectors=self.kind == "points")
+        invalid = np.isin(values, self.invalid)
+        values = np.where(
+            invalid.all(axis=-1, keepdims=True) if values.ndim == 3 else invalid,
+            np.nan,
+            values * self.scale,
+        )
+        kind, alignment = self.kind, self.alignment or "none"
+        if kind == "distance":
+            values = planar_from_distance(values, rays(*values.shape))
+            return Geometry("depth", alignment, values, normal)
+        if kind == "disparity" and self.alignment in ("none", "scale", "median_scale"):
+            positive = np.where(values > 0.0, values, np.nan)  # what is at infinity has no depth
+            return Geometry("depth", alignment, 1.0 / positive, normal)
+        if kind == "disparity":
+            return Geometry(kind, "scale_shift", values, normal)
+        return Geometry(kind, alignment, values, normal)
+
+
+def geometry_reader(
+    reading: Reading,
+    depth: str,
+    names: Sequence[str],
+    keys: Keys,
+    normals: str | None = None,
+    masks: str | None = None,
+) -> tuple[GeometryReader, str]:
+    """Return what reads the geometry of each row from files, and in words how rows have them.
+
+    The reader takes a row and its rays, and returns its geometry with the place of its file.
+    Normals are as stored, in the frame of the files.
+
+    Args:
+        depth, normals, masks: patterns of files, as `folders.row_reader`; a mask is 0 where the
+            geometry has no value.
+        names, keys: of the rows, as `folders.match_files`.
+
+    Raises as `row_reader`; the reader ArrayFileError and OutputError.
+    """
+    rows = partial(row_reader, names=names, keys=keys, by=reading.match)
+    read, how = rows(depth, array=reading.array, vectors=reading.kind == "points")
+    read_normal = rows(normals, vectors=True)[0] if normals is not None else None
+    read_mask = rows(masks)[0] if masks is not None else None
+
+    def geometry(row: int, rays: Rays) -> tuple[Geometry, str]:
+        where, stored = read(row)
+        normal = None
+        try:
+            if read_normal is not None:
+                place, vectors = read_normal(row)
+                normal = _unit_vectors(vectors, place)
+            geometry = reading.geometry(stored, normal, rays)
+            if read_mask is not None:
+                place, values = read_mask(row)
+                geometry = geometry.within(image_of(values, "mask") > 0.0, place)
+        except OutputError as error:
+            raise error.inside(where) from error
+        return geometry, where
+
+    return geometry, how
+
+
+def _unit_vectors(values: Array, where: object) -> Array:
+    """Return normals (h, w, 3) of a file: whole numbers encode -1 to 1."""
+    if values.dtype.kind == "u":
+        return image_of(values, "normal", vectors=True) * (2.0 / np.iinfo(values.dtype).max) - 1.0
+    if values.dtype.kind != "f":
+        raise ArrayFileError(where, f"type {values.dtype}", "floats, or whole numbers from 0")
+    return image_of(values, "normal", vectors=True)
