@@ -38,7 +38,7 @@ demo: $(VENV)/.runtime
 	$(BIN)/bench baseline nearest --train demo/train.h5 --data demo/rooms.h5 --out demo/nearest.h5 --overwrite
 	for name in constant mean-depth; do $(BIN)/bench score demo/$$name.h5 --truth demo/rooms.h5 --json demo/$$name.json --overwrite > /dev/null || exit 1; done
 	$(BIN)/bench score demo/nearest.h5 --truth demo/rooms.h5 --json demo/nearest.json --html demo/report.html --overwrite
-	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/nearest.json --no-paper --format text --tables headline
+	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/nearest.json --no-paper --format text --no-intervals
 	@$(MAKE) --no-print-directory demo-summary
 
 # What `make demo` leaves; it gets here only if all of it was made.
@@ -72,7 +72,7 @@ demo-summary:
 demo-model: demo $(VENV)/.model
 	$(BIN)/bench baseline pix2shape-rays --data demo/rooms.h5 --out demo/pix2shape.h5 --overwrite
 	$(BIN)/bench score demo/pix2shape.h5 --truth demo/rooms.h5 --json demo/pix2shape.json --html demo/pix2shape.html --overwrite
-	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/nearest.json demo/pix2shape.json --format text --tables headline
+	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/nearest.json demo/pix2shape.json --no-paper --format text --no-intervals
 	$(BIN)/bench baseline pix2shape-views --data demo/iqtt/iqtt-test.h5 --out demo/answers.h5 --overwrite
 	$(BIN)/bench score demo/answers.h5 --truth demo/iqtt/iqtt-test-answers.h5
 	$(BIN)/pix2shape rotate --data demo/objects.h5 --items 0,3,6,9 --out demo/rotation.gif --overwrite

@@ -7,11 +7,7 @@ from scenegen.command_line.groups import PackageCommands
 ROOMS = tuple(
     f"scenegen.commands.{name}" for name in ("making", "rooms", "viewing", "sharing", "meshes")
 )
-QUESTIONS = (
-    *(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing", "quiz")),
-    "metrics.commands.people",
-)
-
+QUESTIONS = tuple(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing", "quiz"))
 SCORES = (
     *(
         f"metrics.commands.{name}"

@@ -1,10 +1,14 @@
-"""Mental-rotation questions as a task of Inspect: `inspect eval pix2shape_bench/iqtt -T path=DIR`.
+"""Mental-rotation questions as tasks of Inspect, which finds this file by its entry point.
 
-Inspect names a task after the package that holds it, so this file has the project's name.
+    inspect eval pix2shape_bench/questions -T path=iqtt-test.h5 --model openai/NAME
+    inspect eval pix2shape_bench/iqtt -T path=val-vlm --model openai/NAME
+
+`bench ask` runs `questions`. Inspect names a task after the package that holds it, so this file has
+the project's name.
 """
 
 import base64
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +30,35 @@ from inspect_ai.scorer import (
 from inspect_ai.solver import TaskState, generate
 
 from iqtt.vlm import harness
+from iqtt.vlm.export import row_facts
+from iqtt.vlm.prompt import SIZE
 from iqtt.vlm.reading import ENDINGS
+from iqtt.vlm.rows import Asked, Layout, vlm_rows
+
+
+@task
+def questions(
+    path: str,
+    part: str | None = None,
+    answers: str | None = None,
+    with_answers: bool = False,
+    layout: Layout = "composed",
+    rotations: int = 1,
+    size: int = SIZE,
+    control: bool = False,
+    items: Sequence[int] | None = None,
+) -> Task:
+    """Ask the questions of a file, such as iqtt-test.h5; their pictures are drawn now.
+
+    Args:
+        path, part, answers, with_answers, layout, rotations, size, items: as in `Asked`.
+        control: asks the questions without their references.
+    """
+    asked = Asked(
+        path, part, answers, with_answers, layout, rotations, size,
+        with_reference=not control, items=items,
+    )  # fmt: skip
+    return _task(_sample(row_facts(row), row.sent) for row in vlm_rows(asked))
 
 
 @task
@@ -49,23 +81,32 @@ def iqtt(
     rows = [row for row in rows if not kind or row.get("kind") == kind]
     if not rows:
         raise ValueError(f"{path}: no questions of the kind {kind!r}")
-    if "answer" not in rows[0]:
-        raise ValueError(f"{path}: the answers are withheld; ask with `bench ask`, then import")
-    samples = [_sample(row, layout) for row in rows[: limit or None]]
-    return Task(dataset=MemoryDataset(samples, name="iqtt"), solver=generate(), scorer=letter())
+    return _task(_sample_of_folder(row, layout) for row in rows[: limit or None])
 
 
-def _sample(row: dict[str, Any], layout: str) -> Sample:
+def _task(samples: Iterable[Sample]) -> Task:
+    """Return the task of these samples. Nothing is scored where the answers are withheld."""
+    dataset = MemoryDataset(list(samples), name="iqtt")
+    told = all(sample.target for sample in dataset)
+    return Task(dataset=dataset, solver=generate(), scorer=letter() if told else None)
+
+
+def _sample_of_folder(row: Mapping[str, Any], layout: str) -> Sample:
     pictures = [row["image"]] if layout == "composed" else row["images"]
-    content: list[Content] = [ContentImage(image=_url(picture["bytes"])) for picture in pictures]
-    content.append(ContentText(text=row["question"]))
-    bucket = f"angle {int(row['angle'] // 30) * 30}"
     facts = {name: value for name, value in row.items() if name not in ("image", "images")}
+    return _sample(facts, [picture["bytes"] for picture in pictures])
+
+
+def _sample(facts: Mapping[str, Any], pictures: Sequence[bytes]) -> Sample:
+    content: list[Content] = [ContentImage(image=_url(picture)) for picture in pictures]
+    content.append(ContentText(text=facts["question"]))
+    told = "answer" in facts
+    bucket = {"angle_bin": f"angle {int(facts['angle'] // 30) * 30}"} if told else {}
     return Sample(
         input=[ChatMessageUser(content=content)],
-        target=row["answer"],
-        id=row["id"],
-        metadata={**facts, "angle_bin": bucket},
+        target=facts["answer"] if told else "",
+        id=facts["id"],
+        metadata={**facts, **bucket},
     )
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from scenegen.description.presets import preset_spec as preset_spec
     from scenegen.description.scenes import SceneSpec as SceneSpec
     from scenegen.description.specs import DatasetSpec as DatasetSpec
+    from scenegen.description.specs import InteriorSpec as InteriorSpec
     from scenegen.rendering.shading import shade as shade
     from scenegen.rooms.make import make_dataset as make_dataset
     from scenegen.rooms.reader import Room as Room
@@ -31,7 +32,7 @@ HOMES = {
     "common.errors": "SceneGenError",
     "description.presets": "preset_spec",
     "description.scenes": "SceneSpec",
-    "description.specs": "DatasetSpec",
+    "description.specs": "DatasetSpec InteriorSpec",
     "rendering.shading": "shade",
     "rooms.make": "make_dataset",
     "rooms.reader": "Room RoomsDataset RoomsFile open_rooms",

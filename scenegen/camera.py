@@ -17,10 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import SpecError
-from scenegen.common.records import check
+from scenegen.common.records import Vector3, check
 from scenegen.common.rotations import cos_sin, cross
 
-Vector3 = tuple[float, float, float]
 Array = NDArray[Any]
 _FIRST_CENTER = {"half": 0.5, "integer": 0.0}
 

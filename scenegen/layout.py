@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Any
 
 from scenegen.common.text_table import piped
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.files.content import CONTENT_DIGEST
 from scenegen.files.schema import DIGEST, Column, Format
 from scenegen.objects.meshes.as_furniture import family_like
@@ -176,7 +176,7 @@ FURTHER = {  # columns of `DatasetSpec.truth`, by its names
 # fmt: on
 
 
-def fields(spec: DatasetSpec) -> list[Column]:
+def fields(spec: Request) -> list[Column]:
     """Return the columns of a file that answers that spec, without the sizes of their axes."""
     further = [column for name in spec.truth for column in FURTHER[name]]
     if not spec.interior:
@@ -189,12 +189,12 @@ def fields(spec: DatasetSpec) -> list[Column]:
     return found
 
 
-def conventions(spec: DatasetSpec) -> str:
+def conventions(spec: Request) -> str:
     """Return the root attribute of that name."""
     return INTERIOR_CONVENTIONS if spec.interior else CONVENTIONS
 
 
-def columns(spec: DatasetSpec) -> list[Column]:
+def columns(spec: Request) -> list[Column]:
     """Return the datasets of a file that answers that spec, with a row for each image."""
     slots = spec.object_slots
     sizes = {"y": spec.height, "x": spec.width, "light_slot": spec.light_slots, **FIXED}

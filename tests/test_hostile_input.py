@@ -26,14 +26,13 @@ from hypothesis import strategies as st
 from json_edits import GONE, changed, every_place
 from PIL import Image
 from pix2shape_models import tiny, written
-from quizzes import made_answers
 
 import cli
 from baselines.pix2shape.weights import open_weights
 from iqtt import open_questions
-from iqtt.quiz.answers import read_answers
 from metrics.intake.answer_files import import_answers
 from metrics.intake.array_files import read_array
+from metrics.intake.quiz_answers import read_answers
 from metrics.intake.truth_layouts import nyu
 from metrics.measured.describe import describe
 from metrics.measured.reader import MeasuredFile
@@ -63,7 +62,11 @@ def honest(truths, tmp_path_factory):
     submissions.good_answers(folder, folder / "iqtt-test.h5")
     write_scores(made_scores.rooms_with_objects(), folder / "scores.json")
     write_scores(made_scores.rooms_with_objects("other"), folder / "other.json")
-    made_answers(folder / "people.db", 2)
+    given = {"question": 3, "answer": 1, "seconds": 2.5, "times_shown": 1}
+    practice = [{"answer": 0, "seconds": 1.5, "times_shown": 2}]
+    quiz = {"format": "pix2shape-bench/quiz-answers", "format_version": "1.0", "digest": "0" * 64}
+    quiz |= {"quiz": "1" * 16, "participant": "2" * 16, "answers": [given], "practice": practice}
+    (folder / "people.json").write_text(json.dumps(quiz))
     written(folder / "weights.safetensors", tiny())
     (folder / "answers.json").write_text('{"answers": {"0": 1, "5": 2}, "method": "mine"}')
     (folder / "answers.csv").write_text("question,answer\n" + "".join(f"{i},A\n" for i in range(6)))
@@ -117,7 +120,7 @@ def read(path):
     elif name.startswith("iqtt-"):
         with open_questions(path) as questions:
             list(questions)
-    elif name == "people.db":
+    elif name == "people.json":
         read_answers(path)
     elif name == "scores.json":
         read_scores(path)
@@ -258,7 +261,7 @@ def edit_bytes(path, draw):
 
 
 READ = ("rooms.h5", "iqtt-val.h5", "measured.h5", "nyu.mat", "predictions.h5", "answers.h5",
-        "scores.json", "answers.json", "answers.csv", "people.db", "weights.safetensors", *MESHES,
+        "scores.json", "answers.json", "answers.csv", "people.json", "weights.safetensors", *MESHES,
         *IMAGES)  # fmt: skip
 
 

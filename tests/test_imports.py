@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 HEAVY = (
     "mitsuba", "drjit", "numpy", "h5py", "trimesh", "scipy", "PIL", "OpenEXR", "tqdm", "torch",
-    "lightning_fabric", "safetensors", "tensorboard", "pyarrow", "starlette", "uvicorn", "rerun",
+    "lightning_fabric", "safetensors", "tensorboard", "pyarrow", "inspect_ai", "rerun",
 )  # fmt: skip
 LIGHT = (
     "scenegen --help", "scenegen --version", "scenegen render --help", "scenegen verify --help",

@@ -38,7 +38,7 @@ def test_the_blocks_print_what_the_page_says(tmp_path):
 
 
 def test_a_wrong_number_is_noticed():
-    line = "  skill of chamfer  -1.2562  [-1.4430, -1.0969]  0: empty room\n"
+    line = "  chamfer  -1.2562  [-1.4430, -1.0969]  0: empty room\n"
     assert missing_lines(line, line.replace("1.2562", "1.2570")) == []
     for wrong in (line.replace("-1.2562", "1.2562"), line.replace("1.2562", "1.3"), line[:-6]):
         assert missing_lines(line, wrong) == [line.rstrip("\n")]

@@ -28,7 +28,7 @@ from scenegen.camera import Camera, look_at
 from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.common.names import check_choice
 from scenegen.common.random.seeding import Purpose, item_seed
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import DatasetSpec, request_from_json
 from scenegen.files.new_file import check_writable, written_beside
 from scenegen.files.pictures import check_picture_name, check_picture_size, save_picture
 from scenegen.rooms import preview
@@ -119,7 +119,10 @@ def sample_sheet(
     Raises SpecError for a label that the model does not know, and for a model of questions.
     """
     _check_camera(card)
-    spec = replace(DatasetSpec.from_json(card.data.partition("\n")[0]), seed=seed)
+    spec = request_from_json(card.data.partition("\n")[0])
+    if not isinstance(spec, DatasetSpec):
+        raise SpecError("weights", "trained on closed rooms", "the paper's rooms")
+    spec = replace(spec, seed=seed)
     if label is not None:
         none = "" if card.classes else "none: it knows no classes"
         check_choice("class", label, card.classes, expected=none)
@@ -165,6 +168,7 @@ def rotation_frames(
     batch = rooms.as_batch(default_collate([rooms[row] for row in rows]))
     with torch.no_grad():
         code = model.encode(batch.image, batch.views)
+    assert isinstance(rooms.spec, DatasetSpec)  # others are refused with their poses
     inputs, frames = image_tiles(batch.image), []
     for angle in degrees:
         cameras = [turned_camera(rooms.world_from_camera[row], rooms.spec, angle) for row in rows]

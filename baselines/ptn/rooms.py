@@ -15,14 +15,15 @@ from baselines.training.images import Array, check_reducible
 from baselines.training.rooms import camera_poses, room_image
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import SpecError
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import DatasetSpec, Request
 from scenegen.rooms.reader import RoomsFile
 
 SWAPPED = (2, 1, 0)  # x, y, z of the mirrored room
 
 
-def room_box(spec: DatasetSpec) -> tuple[Corner, Corner]:
+def room_box(spec: Request) -> tuple[Corner, Corner]:
     """Return the corners of the part of the unit box that objects can reach."""
+    assert isinstance(spec, DatasetSpec)  # `camera_poses` refuses others
     return (0.0, 0.0, 0.0), (1.0, min(1.0, 2 * spec.object_radius[1]), 1.0)
 
 

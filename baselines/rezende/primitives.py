@@ -14,10 +14,11 @@ import numpy as np
 from baselines.rezende.images import Pictures
 from baselines.rezende.rasteriser import Views
 from baselines.training.images import Array, channels_first
-from scenegen.camera import Camera, Vector3
+from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
 from scenegen.common.random.seeding import Purpose, item_rng
+from scenegen.common.records import Vector3
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.ground_truth import decode_image

@@ -12,8 +12,7 @@ model_options = together(  # those of `iqtt.vlm.rows.Asked`
                  help="File with the answers of a test file: it tells the cubes to draw"
                  " [default: the one beside FILE]."),
     click.option("--with-answers", is_flag=True,
-                 help="Tell the answers of test questions: exports hold them, and bench ask counts"
-                 " right ones."),
+                 help="Tell the answers of test questions: exports hold them, and Inspect scores."),
     click.option("--layout", type=click.Choice(["composed", "separate"]), default="composed",
                  show_default=True, help="One picture of all, or one picture each."),
     click.option("--rotations", type=click.IntRange(1, 3), default=1, show_default=True,

@@ -9,9 +9,9 @@ from typing import Any, get_args
 
 from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import MAX_CUBES
-from scenegen.camera import Camera, Vector3, half_angle
+from scenegen.camera import Camera, half_angle
 from scenegen.common.names import check_choice
-from scenegen.common.records import check, check_range, from_json, normalise, to_json
+from scenegen.common.records import Vector3, check, check_range, from_json, normalise, to_json
 from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 
 SPLITS = ("train", "val", "test")

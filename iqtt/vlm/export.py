@@ -88,14 +88,12 @@ def _write_rows(
     return block[-1]
 
 
-def row_values(row: Row) -> dict[str, Any]:
-    """Return the values of a row by COLUMNS; without FACTS where the answer is withheld."""
+def row_facts(row: Row) -> dict[str, Any]:
+    """Return what is told of a row beside its pictures; without FACTS if the answer is withheld."""
     values = {
         "id": row.id,
         "question_index": row.question_index,
         "rotation": row.rotation,
-        "image": {"bytes": row.image, "path": None},
-        "images": [{"bytes": image, "path": None} for image in row.images],
         "question": row.question,
         "choices": [f"picture {letter}" for letter in row.letters],
         "answer": row.answer,
@@ -104,7 +102,17 @@ def row_values(row: Row) -> dict[str, Any]:
         "digest": row.digest,
     }
     hidden = FACTS if row.answer is None else ()
-    return {name: values[name] for name in COLUMNS if name not in hidden}
+    return {name: value for name, value in values.items() if name not in hidden}
+
+
+def row_values(row: Row) -> dict[str, Any]:
+    """Return the values of a row by COLUMNS; without FACTS where the answer is withheld."""
+    values = {
+        **row_facts(row),
+        "image": {"bytes": row.image, "path": None},
+        "images": [{"bytes": image, "path": None} for image in row.images],
+    }
+    return {name: values[name] for name in COLUMNS if name in values}
 
 
 @contextmanager

@@ -115,8 +115,12 @@ def read_as(
               default="scored_view", show_default=True, help="Image of the scene that the method"
               " was shown to predict a view.")
 @click.option("--answers", type=InputPath(), metavar="ANSWERS",
-              help="Answers to questions instead: .csv, .json or .jsonl; or a harness's log: bench"
-              " ask (.jsonl), Inspect (.eval), lmms-eval (.jsonl), VLMEvalKit (.tsv, .xlsx).")
+              help="Answers to questions instead: .csv, .json or .jsonl; or a harness's log:"
+              " Inspect (.eval), lmms-eval (.jsonl), VLMEvalKit (.tsv, .xlsx).")
+@click.option("--quiz", "people", metavar="FILES",
+              help="People's answers instead, a folder or a pattern in quotes such as"
+              " 'answers/*.json', as the page of `iqtt quiz` saves them. --out is then a folder of"
+              " submissions, a run for each person.")
 @DATA
 @OUT
 @METHOD
@@ -126,8 +130,8 @@ def read_as(
 @click.argument("expanded", nargs=-1, metavar="")
 def import_(
     pattern: str | None, alignment: Any, missing: Any, normals: str | None, shown: Any,
-    answers: str | None, truth: str, out: str, method: str | None, run_name: str, notes: str,
-    overwrite: bool, expanded: tuple[str, ...], **numbers: Any,
+    answers: str | None, people: str | None, truth: str, out: str, method: str | None,
+    run_name: str, notes: str, overwrite: bool, expanded: tuple[str, ...], **numbers: Any,
 ) -> None:
     """Make a submission of predictions that lie in files.
 
@@ -140,9 +144,21 @@ def import_(
     if expanded:
         found = f"{expanded[0]} beside the options, as where a shell expands a pattern"
         raise click.UsageError(f"found {found}; put patterns in quotes, such as 'out/*.png'")
+    if sum(source is not None for source in (pattern, answers, people)) != 1:
+        raise click.UsageError("give --depth for rooms, or --answers or --quiz for questions")
+    if people is not None:
+        from metrics.intake.folders import files_of
+        from metrics.intake.quiz_answers import import_quiz
+
+        made = import_quiz(
+            files_of(people, (".json",)), truth, out,
+            method=method or "people", notes=notes, overwrite=overwrite,
+        )
+        print_line(f"{out}: answers of {len(made)} people")
+        score = f"bench score {shlex.quote(out.rstrip('/'))}/*.h5 --allow-partial --truth"
+        print_line(f"now: {score} ANSWERS.h5")
+        return
     check_writable(Path(out), overwrite)
-    if (pattern is None) == (answers is None):
-        raise click.UsageError("give --depth for rooms, or --answers for questions")
     if answers is not None:
         _import_answers(answers, truth, out, method, texts)
         return

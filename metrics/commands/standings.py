@@ -22,26 +22,7 @@ from scenegen.command_line.paths import InputPath, OutputPath
     help="A score to compare; may be repeated [default: the headline scores].",
 )  # fmt: skip
 @click.option("--json", "json_path", type=OutputPath(), help="Write the comparison here.")
-@click.option(
-    "--html",
-    "html_path",
-    type=OutputPath(),
-    help="Write a page: verdicts, headline, pictures of scenes, curves.",
-)
-@click.option(
-    "--truth",
-    type=InputPath(),
-    help="The truth, for the page's pictures [default: the file that was scored against, where it"
-    " still lies there].",
-)
-@click.option(
-    "--predictions",
-    multiple=True,
-    type=InputPath(),
-    metavar="PREDICTIONS",
-    help="A submission that was scored, for the page's pictures; may be repeated [default: those"
-    " that the score files name, where they still lie there].",
-)
+@click.option("--html", "html_path", type=OutputPath(), help="Write a page: verdicts and charts.")
 @MARKDOWN
 @SEED
 @click.option(
@@ -55,8 +36,6 @@ def compare(
     metrics: tuple[str, ...],
     json_path: str | None,
     html_path: str | None,
-    truth: str | None,
-    predictions: tuple[str, ...],
     markdown: bool,
     overwrite: bool,
     **settings: Any,
@@ -68,27 +47,19 @@ def compare(
     """
     from metrics.score_file import read_scores
     from metrics.views.compare.compare import compare as compare_files
-    from metrics.views.compare.report import text_report, to_json
+    from metrics.views.compare.report import html_report, text_report, to_json
     from scenegen.files.new_file import check_writable, write_text
 
     for path in (json_path, html_path):
         if path:
             check_writable(Path(path), overwrite)
-    if (truth or predictions) and html_path is None:
-        raise click.UsageError("--truth and --predictions are for the page: give --html, too")
     files = [read_scores(path) for path in scores]
     comparison = compare_files(files, metrics or None, **settings)
     if json_path:
         write_text(json_path, to_json(comparison), overwrite)
-    try:
-        if html_path:
-            from metrics.views.compare.report import html_report
-
-            paths = [Path(path) for path in predictions]
-            page = html_report(comparison, files, Path(truth) if truth else None, paths)
-            write_text(html_path, page, overwrite)
-    finally:
-        click.echo(text_report(comparison, files, markdown, line_width()))
+    if html_path:
+        write_text(html_path, html_report(comparison, files), overwrite)
+    click.echo(text_report(comparison, files, markdown, line_width()))
 
 
 @click.command(
@@ -108,14 +79,6 @@ def compare(
     show_default=True,
     help="Format of the tables.",
 )
-@click.option(
-    "--tables",
-    "shown_tables",
-    type=click.Choice(["all", "headline"]),
-    default="all",
-    show_default=True,
-    help="All tables, or the ranking of each test set alone.",
-)
 @click.option("--no-intervals", is_flag=True, help="Show the values alone.")
 @click.option("--caption", default="", help="Of the first LaTeX table [default: its test set].")
 @click.option(
@@ -123,10 +86,6 @@ def compare(
     default="",
     help=r"Of the first LaTeX table, for \ref; a number follows it for each other one.",
 )
-@click.option(
-    "--cards", "cards_path", type=InputPath(), metavar="CARDS.yaml",
-    help="What is known of methods: by their name trained_on, supervised, told, paper, code, date.",
-)  # fmt: skip
 @click.option("--out", type=OutputPath(), help="Write to this file instead of printing.")
 @click.option("--no-paper", is_flag=True, help="Leave out what the paper reports.")
 @OVERWRITE
@@ -134,11 +93,9 @@ def leaderboard(
     scores: tuple[str, ...],
     metrics: tuple[str, ...],
     form: str,
-    shown_tables: str,
     no_intervals: bool,
     caption: str,
     label: str,
-    cards_path: str | None,
     out: str | None,
     no_paper: bool,
     overwrite: bool,
@@ -146,13 +103,12 @@ def leaderboard(
     """Rank score files in one table for each test set.
 
     The headline ranks: shape for rooms, or what is behind for methods that see the first view
-    alone, and skill for questions. Floors, and what the paper reported on its own data, stand below
-    the methods, without a rank.
+    alone, and skill for questions. Baselines, and what the paper reported on its own data, stand
+    below the methods, without a rank.
     """
     from metrics.score_file import read_scores
-    from metrics.views.leaderboard.cards import read_cards, unmatched
-    from metrics.views.leaderboard.ranking import leaderboard as rank
-    from metrics.views.leaderboard.ranking import to_html
+    from metrics.views.leaderboard import leaderboard as rank
+    from metrics.views.leaderboard import to_html
     from metrics.views.table import to_latex, to_markdown, to_text, without_rests
     from scenegen.files.new_file import check_writable, write_text
 
@@ -160,12 +116,8 @@ def leaderboard(
         raise click.UsageError("--caption and --label need --format latex")
     if out is not None:
         check_writable(Path(out), overwrite)
-    cards = read_cards(cards_path) if cards_path else None
     files = [read_scores(path) for path in scores]
-    for sentence in unmatched(cards or {}, files):
-        print_line(f"warning: {cards_path}: {sentence}", err=True)
-    short = shown_tables == "headline"
-    tables = list(rank(files, metrics or None, paper=not no_paper, headline=short, cards=cards))
+    tables = list(rank(files, metrics or None, paper=not no_paper))
     if no_intervals:
         tables = [without_rests(table) for table in tables]
     if caption and tables:

@@ -1,7 +1,8 @@
 """Answers that come back from harnesses: their logs become one submission.
 
-Read are logs of `bench ask` (.jsonl), of Inspect (.eval, .json), samples of lmms-eval (.jsonl) and
-result sheets of VLMEvalKit (.tsv, .csv, .xlsx).
+Read are logs of Inspect (.eval, .json), which `bench ask` runs, samples of lmms-eval (.jsonl),
+result sheets of VLMEvalKit (.tsv, .csv, .xlsx), and what `bench ask` kept before it ran Inspect
+(.jsonl).
 """
 
 import csv
@@ -17,8 +18,6 @@ from typing import Any
 import numpy as np
 
 from iqtt.files.reader import QuestionsFile
-from iqtt.vlm.ask import FORMAT as ASKED
-from iqtt.vlm.ask import read_heading, read_log
 from iqtt.vlm.export import CIRCULAR
 from iqtt.vlm.reading import ENDINGS, Outcome, read_reply, unread_note
 from metrics.submissions.rules import NOT_ASKED, OUTCOMES
@@ -26,6 +25,7 @@ from metrics.submissions.writer import write_answers
 from scenegen.common.errors import FileFormatError, SceneGenError
 
 ABSTAINED = -1
+ASKED = b"pix2shape-bench/asked"  # format of what `bench ask` kept
 REASONS, LONGEST_REASON = 3, 120  # reasons of failures that are told, and their characters
 # What lmms-eval and VLMEvalKit write in place of a reply that never came.
 FAILED = re.compile(r"\s*(?:\[LMMS_EVAL_REQUEST_FAILED|Fail(?:ed)? to obtain answer|Error: )")
@@ -67,6 +67,7 @@ class Log:
         model: its name; "" where the log does not tell.
         settings: how the model was asked; no prompt and no key.
         answers: in the order of questions and rotations.
+        tokens: of prompts and of replies, by the model; empty where the log does not tell.
         failures: why a row has no answer, by question and rotation: the model, or the harness,
             failed. These rows are left out of `answers`.
     """
@@ -76,6 +77,7 @@ class Log:
     model: str
     settings: str
     answers: tuple[ReturnedAnswer, ...]
+    tokens: tuple[int, ...] = ()
     failures: Mapping[Place, str] = field(default_factory=dict)
 
     @property
@@ -87,6 +89,11 @@ class Log:
         reasons = Counter(self.failures.values()).most_common(REASONS)
         told = "; ".join(f"{reason} ({count})" for reason, count in reasons)
         return f"{len(self.failures)} of {rows} samples failed in {self.harness}: {told}"
+
+    @property
+    def tokens_note(self) -> str:
+        """How many tokens were used; "" where the log does not tell."""
+        return f"{self.tokens[0]:,} + {self.tokens[1]:,} tokens" if any(self.tokens) else ""
 
     @property
     def unread_note(self) -> str:
@@ -107,7 +114,7 @@ def is_log(path: str | Path) -> bool:
     with path.open("rb") as file:
         start = file.read(4096)
     if path.suffix == ".jsonl":
-        return ASKED.encode() in start or b'"doc_id"' in start
+        return ASKED in start or b'"doc_id"' in start
     if path.suffix in (".tsv", ".csv"):
         columns = set(re.split(rb"[\t,]", start.split(b"\n")[0].strip()))
         return {b"index", b"prediction", b"A", b"B"} <= columns
@@ -239,9 +246,14 @@ def _of_inspect(path: Path) -> Log:
     if not (answers or failures) and log.error is not None:
         raise FileFormatError(path, f"no sample: {_reason(log.error.message)}", "samples")
     settings = log.eval.model_generate_config.model_dump(exclude_none=True)
-    kept = {name: settings[name] for name in ("temperature", "max_tokens") if name in settings}
+    settings |= log.plan.config.model_dump(exclude_none=True)
+    settings |= log.eval.task_args_passed  # how pictures were made
+    names = ("temperature", "max_tokens", "layout", "size", "control")
+    kept = {name: settings[name] for name in names if name in settings}
+    usage = log.stats.model_usage.values()
+    tokens = sum(u.input_tokens for u in usage), sum(u.output_tokens for u in usage)
     how = f"asked with Inspect, {json.dumps(kept)}"
-    return Log(path, "Inspect", log.eval.model, how, tuple(answers), failures)
+    return Log(path, "Inspect", log.eval.model, how, tuple(answers), tokens, failures)
 
 
 def _failure_in_inspect(sample: Any) -> str:
@@ -259,9 +271,9 @@ def _failure_in_inspect(sample: Any) -> str:
 
 
 def _of_lines(path: Path) -> Log:
-    lines = path.read_bytes().splitlines()
-    if lines and ASKED.encode() in lines[0]:
-        return _of_ask(path)
+    lines = path.read_bytes().split(b"\n")
+    if ASKED in lines[0]:
+        return _of_ask(lines[:-1], path)
     answers, failures = [], dict[Place, str]()
     for line in map(json.loads, filter(bytes.strip, lines)):
         # lmms-eval 0.7 leaves the row out, but for what `process_results` returned of it.
@@ -276,7 +288,7 @@ def _of_lines(path: Path) -> Log:
             continue
         ended: Outcome | None = "refused" if text.startswith(BLOCKED) else None
         answers.append(_answer(doc, text, len(doc["choices"]), ended))
-    return Log(path, "lmms-eval", "", "asked with lmms-eval", tuple(answers), failures)
+    return Log(path, "lmms-eval", "", "asked with lmms-eval", tuple(answers), failures=failures)
 
 
 def _first_text(value: Any) -> str:
@@ -290,25 +302,26 @@ def _failure_in_text(text: str) -> str:
     return _reason(text) if FAILED.match(text) else "" if text.strip() else "no response"
 
 
-def _of_ask(path: Path) -> Log:
-    heading, replies = read_heading(path), read_log(path)
-    digest = str(heading["digest"])
+def _of_ask(lines: list[bytes], path: Path) -> Log:
+    """Return what `bench ask` kept: a heading, then replies; a last line may have been cut off."""
+    heading, *rows = map(json.loads, lines)
+    replies: dict[str, Any] = {}
+    for row in rows:
+        if "id" in row:  # two processes may have begun the log; the first reply to a row counts
+            replies.setdefault(row["id"], row)
     answers = tuple(
         ReturnedAnswer(
-            line["question_index"],
-            line["rotation"],
-            ABSTAINED if line["answer"] is None else line["answer"],
-            line["outcome"],
-            digest,
-            line["text"],
+            question=row["question_index"],
+            rotation=row["rotation"],
+            answer=ABSTAINED if row["answer"] is None else row["answer"],
+            outcome=row["outcome"],
+            digest=str(heading["digest"]),
+            text=row["text"],
         )
-        for line in replies.values()
+        for row in replies.values()
     )
     names = ("temperature", "max_tokens", "layout", "size", "control")
-    kept = {name: heading[name] for name in names}
-    if any("temperature" not in line.get("settings", kept) for line in replies.values()):
-        kept["temperature"] = None  # the server has its own
-    how = f"asked with bench ask, {json.dumps(kept)}"
+    how = f"asked with bench ask, {json.dumps({name: heading[name] for name in names})}"
     return Log(path, "bench ask", str(heading["model"]), how, answers)
 
 
@@ -324,7 +337,8 @@ def _of_sheet(path: Path) -> Log:
             failures[question, rotation] = failure
         else:
             answers.append(_answer(place, text, offered))
-    return Log(path, "VLMEvalKit", "", "asked with VLMEvalKit", tuple(answers), failures)
+    how = "asked with VLMEvalKit"
+    return Log(path, "VLMEvalKit", "", how, tuple(answers), failures=failures)
 
 
 def _sheet_rows(path: Path) -> Iterator[Mapping[str, Any]]:

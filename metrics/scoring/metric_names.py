@@ -30,13 +30,14 @@ class Baseline:
     """What a metric's skill is measured against.
 
     Attributes:
-        name: for tables.
-        definition: completes "`metric` of ...".
+        name, gloss: for tables, and what it is in a few words.
+        definition: completes "`metric`: that of ...".
         needs: the least of a scene that it is made from, among what a method may be shown.
         of_truth: whether it follows from the truth alone, and no submission has a part in it.
     """
 
     name: str
+    gloss: str
     definition: str
     needs: Shown = "scored_view"
     of_truth: bool = True
@@ -47,32 +48,45 @@ EMPTY_ROOM, CUT_OUT, LEANING = "empty_room_", "cut_out_", "leaning_"
 BALLS, BLOCKS, FLAT, RAMP = "balls_", "blocks_", "flat_", "ramp_"
 OTHER_SCENE = "other_scene_"
 _BLIND = (
-    "a guess that sees no picture ({}), fitted as predictions are, in least squares for L1, and by"
-    " scale and shift where nothing is."
+    " that sees no picture, fitted as predictions are, in least squares for L1, and by scale and"
+    " shift where nothing is."
 )
 BASELINES = {
     EMPTY_ROOM: Baseline(
-        "empty room", "the empty room, drawn from the true camera.", needs="no_view"
+        "empty room", "room without objects", "the empty room, drawn from the true camera.",
+        needs="no_view",
     ),
     CUT_OUT: Baseline(
-        "flat cut-out",
+        "cut-out", "each object flat at its true median depth",
         "flat cut-outs, each at its object's median depth; of normals, each object's mean true"
         " normal.",
     ),
     LEANING: Baseline(
-        "leaning cut-out",
+        "leaning cut-out", "a cut-out that leans half as much as the wall behind it",
         "cut-outs that lean half as much as the walls behind them, in closed rooms alone.",
     ),
-    FLAT: Baseline("one depth", _BLIND.format("one depth")),
-    RAMP: Baseline("nearer to the lower edge", _BLIND.format("nearer to the lower edge")),
-    BALLS: Baseline("balls", "balls in place of the first view's objects.", needs="first_view"),
-    BLOCKS: Baseline("blocks", "blocks in place of the first view's objects.", needs="first_view"),
+    FLAT: Baseline(
+        "constant", "one depth for all pixels, fitted as predictions are",
+        f"one depth for all pixels,{_BLIND}",
+    ),
+    RAMP: Baseline(
+        "ramp", "depth that falls to the lower edge, fitted as predictions are",
+        f"depth that falls evenly to the lower edge,{_BLIND}",
+    ),
+    BALLS: Baseline(
+        "balls", "a ball for each object of the first view",
+        "balls in place of the first view's objects.", needs="first_view",
+    ),
+    BLOCKS: Baseline(
+        "blocks", "a block for each object of the first view",
+        "blocks in place of the first view's objects.", needs="first_view",
+    ),
     OTHER_SCENE: Baseline(
-        "against another scene",
+        "shuffled", "this prediction against another scene",
         "the same prediction with the relief of another scene, seen in the same view.",
         of_truth=False,
     ),
-}
+}  # fmt: skip
 OF_TRUTH = tuple(begins for begins, baseline in BASELINES.items() if baseline.of_truth)
 _SEEN: Sequence[Shown] = ("no_view", "first_view", "scored_view")  # ever more
 
@@ -94,7 +108,8 @@ class Metric:
         higher_is_better: its direction.
         largest, smallest: the limits of its values.
         tasks: whose items have it. A scene unit is 1 m of measured truth.
-        headline: its place among the main metrics of a task, by task.
+        headline: its place among the main metrics of a task, by task. The first one ranks.
+        printed: its place in what `bench score` prints of rooms; 0 where it is not.
         baselines: keys of BASELINES; the best one is the 0 of its skill.
         forms: key of FORMS: which further metrics are made of it.
         of_objects: whether single objects have it, too.
@@ -120,6 +135,7 @@ class Metric:
     smallest: float = 0.0
     tasks: tuple[str, ...] = ("rooms",)
     headline: Mapping[str, int] = field(default_factory=dict, hash=False)
+    printed: int = 0
     baselines: tuple[str, ...] = ()
     forms: Literal["", "depth", "points", "normals"] = ""
     of_objects: bool = False
@@ -201,7 +217,7 @@ _FLAT_OR_EMPTY = (CUT_OUT, EMPTY_ROOM)
 
 TABLE: Sequence[Metric] = (
     _error("chamfer", "Chamfer", "`accuracy_distance` + `completeness_distance`; not squared.",
-           headline={"rooms": 4}, baselines=(EMPTY_ROOM,), **_SURFACE),
+           headline={"rooms": 4}, printed=4, baselines=(EMPTY_ROOM,), **_SURFACE),
     _error("accuracy_distance", "Accuracy distance",
            "mean distance from the predicted points to the true surface.", **_SURFACE),
     _error("completeness_distance", "Completeness distance",
@@ -210,7 +226,7 @@ TABLE: Sequence[Metric] = (
            "mean squared distance from the predicted points to the true surface, plus that from the"
            " true surface to the predicted points.", "scene unit squared", **_SURFACE),
     _error("hausdorff", "Hausdorff", "larger of `hausdorff_forward` and `hausdorff_reverse`.",
-           headline={"rooms": 5}, baselines=(EMPTY_ROOM,), **_SURFACE),
+           headline={"rooms": 5}, printed=5, baselines=(EMPTY_ROOM,), **_SURFACE),
     _error("hausdorff_forward", "Hausdorff, forward",
            "largest distance from a predicted point to the true surface.", **_SURFACE),
     _error("hausdorff_reverse", "Hausdorff, reverse",
@@ -231,18 +247,19 @@ TABLE: Sequence[Metric] = (
     _error("paper_hausdorff_reverse", "Hausdorff, reverse, as in the paper",
            "largest distance from a true point to the nearest predicted point.", **_PAPER),
     _error("mse_depth", "MSE-depth", "mean squared difference of predicted and true planar depth.",
-           "scene unit squared", headline={"rooms": 6}, baselines=(EMPTY_ROOM,), **_DEPTH),
+           "scene unit squared", headline={"rooms": 6}, printed=3, baselines=(EMPTY_ROOM,),
+           **_DEPTH),
     _error("rmse", "RMSE", "square root of `mse_depth` of the image.", headline={"measured": 3},
            is_root=True, **_BLINDLY, **_DEPTH),
     _error("abs_rel", "AbsRel", "mean of absolute difference of depth divided by true depth.",
-           "ratio", headline={"measured": 1}, **_BLINDLY, **_DEPTH),
+           "ratio", headline={"measured": 1}, printed=1, **_BLINDLY, **_DEPTH),
     _error("silog", "SILog",
            "standard deviation of ln predicted - ln true depth, times 100; predicted depths up to"
            " 0.001 count as 0.001 and are left out of the mean it subtracts.", "100 ln",
            headline={"measured": 4}, **_BLINDLY, **_DEPTH),
     _share("delta_1", "delta 1",
            "fraction of pixels whose predicted and true depth differ by a factor below 1.25.",
-           headline={"measured": 2}, **_BLINDLY, **_DEPTH),
+           headline={"measured": 2}, printed=2, **_BLINDLY, **_DEPTH),
     *(_share(f"delta_{power}", f"delta {power}",
              "fraction of pixels whose predicted and true depth differ by a factor below"
              f" 1.25^{power}.", **_DEPTH)
@@ -290,7 +307,7 @@ TABLE: Sequence[Metric] = (
       for limit in ("5", "7.5", "11.25", "22.5", "30")),
     _error("shape_error", "Shape error",
            "mean error inside objects, after each object's median error is taken off.", of="points",
-           headline={"rooms": 1}, baselines=(*_FLAT_OR_EMPTY, LEANING), **_INSIDE),
+           headline={"rooms": 1}, printed=8, baselines=(*_FLAT_OR_EMPTY, LEANING), **_INSIDE),
     _correlation("shape_correlation", "Shape correlation",
                  "correlation inside objects of what predicted and true depth have left after the"
                  " least-squares plane of each object.", lacking="bends", **_SURFACE),
@@ -305,8 +322,8 @@ TABLE: Sequence[Metric] = (
            baselines=_FLAT_OR_EMPTY, **_INSIDE),
     _error(BEHIND, "Depth error behind",
            "mean error at the pixels of objects that the first view of the scene does not see.",
-           headline={"rooms": 2}, baselines=(EMPTY_ROOM, CUT_OUT, LEANING, BALLS, BLOCKS),
-           **_BEHIND),
+           headline={"rooms": 2}, printed=7,
+           baselines=(EMPTY_ROOM, CUT_OUT, LEANING, BALLS, BLOCKS), **_BEHIND),
     _share("behind_recall_0.05", "Found behind within 0.05",
            "fraction of the true surface there that is nearer than 0.05 scene units to the"
            " predicted points.", **_BEHIND),
@@ -331,7 +348,7 @@ TABLE: Sequence[Metric] = (
                  " of the empty room minus that of the surface.", **_RELIEF),
     _share("relief_iou", "Segmentation (relief IoU)",
            "pixels where predicted and true relief both exceed 0.05 scene units, divided by those"
-           " where either does.", headline={"rooms": 3}, **_RELIEF),
+           " where either does.", headline={"rooms": 3}, printed=6, **_RELIEF),
     _share("iqtt_accuracy", "IQTT accuracy",
            "1 where the right answer is given, else 0, abstentions included; chance is 1 /"
            " answers.",
@@ -362,7 +379,7 @@ class Form:
             name=self.name.replace("*", metric.name),
             title=f"{metric.title}, {self.title}",
             definition=f"`{metric.name}`: {self.definition}",
-            **{"headline": {}, "baselines": (), "forms": "", **self.changes},
+            **{"headline": {}, "printed": 0, "baselines": (), "forms": "", **self.changes},
         )
 
 
@@ -422,13 +439,18 @@ ALL: Mapping[str, Metric] = {
     metric.name: metric for metric in (*_forms(TABLE), *_scores_of_baselines())
 }
 _PLACES = {name: place for place, name in enumerate(ALL)}
-HEADLINE: Mapping[str, tuple[str, ...]] = {
+HEADLINE: dict[str, tuple[str, ...]] = {
     task: tuple(
         metric.name
         for metric in sorted(TABLE, key=lambda metric: metric.headline.get(task, 0))
         if task in metric.headline
     )
     for task in ("rooms", "iqtt", "measured")
+}
+PRINTED = HEADLINE | {
+    "rooms": tuple(
+        metric.name for metric in sorted(TABLE, key=lambda metric: metric.printed) if metric.printed
+    )
 }
 OBJECT_SCORES = tuple(metric.name for metric in TABLE if metric.of_objects)
 SKILLED: Mapping[str, tuple[str, ...]] = {

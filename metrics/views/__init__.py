@@ -1,9 +1,7 @@
-"""Scores for people: every command's output, drawn from score files.
+"""What people look at: tables, charts, pages, comparisons and leaderboards of score files.
 
-A `table` prints as text, Markdown, LaTeX and HTML. A `page` is made of sections, each with tables,
-`plots` and `examples`. On them stand the views: the `report` of one score file (`score_tables`,
-`headline`, `by_angle`), the comparison of several in `compare`, the ranking of all in
-`leaderboard`, and what people answered in `people`. `paper` has the figures that the paper reports.
-
-Start reading in `table`, then `report`.
+`score_tables` makes the tables of one score file and `report` its page; `protocols` shows it under
+each protocol, and `compare` and `leaderboard` show several files. All tables go through `table`,
+all pages through `page`, all charts through `figures`. `paper` has the figures of the paper,
+`pictures` and `examples` the images of a page.
 """

@@ -1,11 +1,14 @@
-"""Figures for papers: scores with intervals, scores by group, and a grid of pictures.
+"""Figures of papers and pages: scores with intervals, scores by group, and a grid of pictures.
 
 Vector files embed their fonts (TrueType in PDF, outlines in SVG). The same numbers give the same
 bytes.
 """
 
+import base64
 import io
-from collections.abc import Iterator, Mapping, Sequence
+import os
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -14,24 +17,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measured.reader import Images, MeasuredFile, open_images
+from metrics.measures.statistics import cluster_means
 from metrics.scoring.geometry import depth_as_scored
 from metrics.scoring.measured_rows import depth_as_declared
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import Score, ScoreFile
 from metrics.submissions.reader import PredictedView, RoomPredictions, open_predictions
-from metrics.views.by_angle import angle_floors
-from metrics.views.plots import KINDS, LINE, kind_of, load_matplotlib
 from scenegen.common.errors import SceneGenError
 from scenegen.common.names import did_you_mean
+from scenegen.common.text_table import number, plain
 from scenegen.files.new_file import written_beside
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import radiance_of
 
 Array = NDArray[Any]
 Line = tuple[Array, Array, Sequence[Array]]  # of a grid: picture, true depth, depths
+Target = str | Path | io.BytesIO  # a file, or a stream that an SVG is written to
 COLUMN, PAGE = 3.25, 6.75  # inches: a column, and both, of two-column papers
 SUFFIXES = (".pdf", ".svg", ".png")
-# The groupings that a figure can show, each with the words below it.
+BINS = 30
+# Colour and marker of methods, which may share them, and the colour of baselines.
+LOOKS = (
+    ("#0b63b0", "o"), ("#b34700", "s"), ("#00735a", "^"), ("#8a3b8f", "D"), ("#7a5c00", "v"),
+    ("#4a4f57", "P"),
+)  # fmt: skip
+BASELINE = "#6b7280"
+# The groupings that a figure can show, by task.
 GROUPINGS = {
     "angle": {"rooms": "by_view_angle", "iqtt": "by_rotation_angle"},
     "kind": {"rooms": "by_object_shape", "iqtt": "by_distractor"},
@@ -47,6 +58,7 @@ _STYLE: dict[Any, Any] = {
     "svg.fonttype": "path",
     "svg.hashsalt": "pix2shape-bench",
     "savefig.dpi": 300,
+    "text.parse_math": False,
 }
 
 
@@ -55,14 +67,14 @@ class FigureError(SceneGenError):
 
 
 def draw_scores(
-    path: str | Path,
+    path: Target,
     files: Sequence[ScoreFile],
     name: str = "",
     width: float = COLUMN,
     overwrite: bool = False,
     labels: Sequence[str] = (),
 ) -> None:
-    """Draw one score of several methods: a dot and an interval each, and the floor, dashed.
+    """Draw one score of several methods: a dot and an interval each, and the baseline, dashed.
 
     Args:
         path: to write; its suffix is one of SUFFIXES.
@@ -74,29 +86,29 @@ def draw_scores(
     """
     name = _common(files, name)
     floor = _floor(files[0], name)
-    with _figure(path, overwrite, width, 0.35 + 0.17 * len(files)) as axes:
+    with _figure(path, overwrite, width, 0.6 + 0.17 * len(files)) as axes:
         named = zip(files, labels or labels_of(files), strict=True)
         for place, (file, label) in enumerate(named):
-            color, marker = KINDS[kind_of(place)]
+            color, marker = LOOKS[place % len(LOOKS)]
             _dot(axes, file.metrics[name], len(files) - place, color, marker, along="y")
             axes.text(-0.02, len(files) - place, label, ha="right", va="center",
                       transform=axes.get_yaxis_transform())  # fmt: skip
         if floor is not None:
-            axes.axvline(floor, color=KINDS[LINE][0], linestyle="--", label="floor")
+            axes.axvline(floor, color=BASELINE, linestyle="--", label="baseline")
             _legend(axes)
         axes.set(yticks=[], ylim=(0.4, len(files) + 0.6), xlabel=_with_direction(name))
         axes.spines["left"].set_visible(False)
 
 
 def draw_groups(
-    path: str | Path,
+    path: Target,
     files: Sequence[ScoreFile],
     by: str = "angle",
     name: str = "",
     width: float = COLUMN,
     overwrite: bool = False,
 ) -> None:
-    """Draw one score by group: by angle, kind or size, as GROUPINGS has them; floors are dashed.
+    """Draw one score by group: by angle, kind or size, as GROUPINGS has them; baselines are dashed.
 
     Args and errors as of `draw_scores`; FigureError, too, where the files have no such groups.
     """
@@ -107,12 +119,12 @@ def draw_groups(
     if not keys:
         place = f"{files[0].method}: {name} by {by}"
         raise FigureError(place, "no groups that all files have", "another --by or --score")
-    keys.sort(key=_number)
+    keys.sort(key=_by_number)
     floors = [_group_floor(files[0], by, key, name) for key in keys]
     with _figure(path, overwrite, width, 0.62 * width) as axes:
-        for number, (group, label) in enumerate(zip(groups, labels_of(files), strict=True)):
-            color, marker = KINDS[kind_of(number)]
-            aside = 0.12 * (number - (len(files) - 1) / 2)
+        for i, (group, label) in enumerate(zip(groups, labels_of(files), strict=True)):
+            color, marker = LOOKS[i % len(LOOKS)]
+            aside = 0.12 * (i - (len(files) - 1) / 2)
             for at, key in enumerate(keys):
                 _dot(axes, group[key][name], at + aside, color, marker, along="x")
             values = [group[key][name].value for key in keys]
@@ -121,15 +133,38 @@ def draw_groups(
             axes.plot([], [], marker, color=color, markersize=3, label=label)
         for at, floor in enumerate(floors):
             if floor is not None:
-                label = "floor" if at == 0 else "_"
-                axes.hlines(floor, at - 0.4, at + 0.4, KINDS[LINE][0], "--", label=label)
+                label = "baseline" if at == 0 else "_"
+                axes.hlines(floor, at - 0.4, at + 0.4, BASELINE, "--", label=label)
         axes.set_xticks(range(len(keys)), keys, rotation=0 if by == "angle" else 20)
         axes.set(xlabel=_words(by, files[0].task), ylabel=_with_direction(name, "\n"))
         _legend(axes)
 
 
+def draw_histogram(path: Target, file: ScoreFile, name: str, width: float = COLUMN) -> None:
+    """Draw the distribution of a score over the items, with mean and median."""
+    values = np.asarray(file.items[name], float)
+    values = values[np.isfinite(values)]
+    limits = (min(0.0, float(values.min())), max(0.0, float(values.max())))
+    counts, edges = np.histogram(values, BINS, limits)
+    middles = (("mean", float(values.mean()), "-"), ("median", float(np.median(values)), "--"))
+    with _figure(path, False, width, 0.55 * width) as axes:
+        axes.stairs(counts, edges, fill=True, color="#5b8fbf")
+        for (text, at, style), (color, _) in zip(middles, LOOKS[1:], strict=False):
+            axes.axvline(at, color=color, linestyle=style, label=f"{text} {number(at)}")
+        axes.set(xlabel=file.unit_of(name), ylabel="images")
+        axes.locator_params(axis="x", nbins=6)
+        _legend(axes)
+
+
+def svg_url(draw: Callable[..., None], *arguments: Any) -> str:
+    """Return what one of these functions draws, as SVG in a data URL."""
+    stream = io.BytesIO()
+    draw(stream, *arguments)
+    return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
 def draw_grid(
-    path: str | Path,
+    path: Target,
     truth: str | Path,
     submissions: Sequence[str | Path],
     rows: Sequence[int],
@@ -162,7 +197,8 @@ def draw_grid(
 
 def labels_of(files: Sequence[ScoreFile]) -> list[str]:
     """Return the methods' names, cut where they are long; a number follows those that repeat."""
-    names = [file.method if len(file.method) <= 24 else f"{file.method[:23]}…" for file in files]
+    names = [plain(file.method) for file in files]
+    names = [name if len(name) <= 24 else f"{name[:23]}…" for name in names]
     return [
         f"{name} ({names[: i + 1].count(name)})" if names.count(name) > 1 else name
         for i, name in enumerate(names)
@@ -191,7 +227,7 @@ def _view(file: Any, row: int) -> PredictedView:
 
 
 def _grid(
-    path: str | Path,
+    path: Target,
     lines: Sequence[Line],
     methods: Sequence[str],
     width: float,
@@ -256,7 +292,19 @@ def _group_floor(file: ScoreFile, by: str, key: str, name: str) -> float | None:
     if file.task == "iqtt":
         floor = file.question_floors.get(key) if by == "kind" else None
         return None if floor is None else floor.accuracy
-    return angle_floors(file, name).get(key) if by == "angle" else None
+    return angle_floor(file, key, name) if by == "angle" else None
+
+
+def angle_floor(file: ScoreFile, degrees: str, name: str) -> float | None:
+    """Return the mean of a score's baseline over the views turned by so many degrees."""
+    angles = file.items.get("view_angle_degrees")
+    column = file.items.get(f"{file.floor_of(name)}{name}")
+    if angles is None or column is None:
+        return None
+    chosen = (np.abs(angles) == int(degrees)) & np.isfinite(column)
+    if not chosen.any():
+        return None
+    return float(cluster_means(column[chosen], file.clusters[chosen]).mean())
 
 
 def _dot(axes: Any, score: Score, at: float, color: str, marker: str, along: str) -> None:
@@ -287,14 +335,29 @@ def _words(by: str, task: str) -> str:
     return what
 
 
-def _number(key: str) -> tuple[float, str]:
+def _by_number(key: str) -> tuple[float, str]:
     first = key.split("-", maxsplit=1)[0]
     return (float(first), key) if first.replace(".", "").isdigit() else (0.0, key)
 
 
+def load_matplotlib() -> Any:
+    """Return matplotlib. A backend in the environment does not count: none is used here.
+
+    Notebooks and IDEs leave MPLBACKEND behind, and a name that matplotlib does not know would end
+    its import.
+    """
+    backend = os.environ.pop("MPLBACKEND", None)
+    try:
+        import matplotlib
+    finally:
+        if backend is not None:
+            os.environ["MPLBACKEND"] = backend
+    return matplotlib
+
+
 @contextmanager
 def _figure(
-    path: str | Path,
+    path: Target,
     overwrite: bool,
     width: float,
     height: float,
@@ -304,7 +367,7 @@ def _figure(
     matplotlib = load_matplotlib()
     from matplotlib.figure import Figure
 
-    suffix = Path(path).suffix.lower()
+    suffix = ".svg" if isinstance(path, io.BytesIO) else Path(path).suffix.lower()
     if suffix not in SUFFIXES:
         raise FigureError(path, f"the ending {suffix!r}", " or ".join(SUFFIXES))
     with matplotlib.rc_context():
@@ -318,6 +381,11 @@ def _figure(
             ".svg": {"Date": None, "Creator": None},
             ".png": {"Software": None},
         }[suffix]
-        figure.savefig(stream, format=suffix[1:], metadata=dict(metadata))
+        with warnings.catch_warnings():  # names may have letters that the font lacks
+            warnings.simplefilter("ignore", UserWarning)
+            figure.savefig(stream, format=suffix[1:], metadata=dict(metadata))
+    if isinstance(path, io.BytesIO):
+        path.write(stream.getvalue())
+        return
     with written_beside(path, overwrite) as temporary:
         temporary.write_bytes(stream.getvalue())

@@ -1,4 +1,4 @@
-"""Pages that hold everything they show: sections of text, tables, charts and pictures.
+"""The one kind of page, which holds everything it shows: texts, tables, charts and pictures.
 
 All pages are filled into one template, which escapes whatever it shows.
 """
@@ -15,7 +15,6 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
 
 from metrics.views.examples import Example
-from metrics.views.plots import Chart
 from metrics.views.table import Table
 from scenegen.common.text_table import printable
 
@@ -23,42 +22,31 @@ _TEMPLATES = Path(__file__).parent / "templates"
 
 
 @dataclass(frozen=True)
-class Lead:
-    """A sentence that answers first: its beginning in bold, and the rest."""
-
-    strong: str
-    text: str
-
-
-@dataclass(frozen=True)
 class Section:
     """What stands under a heading, in this order.
 
     Attributes:
-        remarks: sentences in small letters.
+        remarks: sentences.
         tables: each with its title, unless that is the section's.
         examples: titles of lists, and their items with pictures.
+        charts: titles, and SVG images as data URLs.
         notes: a list in small letters.
         folded: whether it opens at a click; its tables are printed all the same.
     """
 
-    title: str
+    title: str = ""
     remarks: Sequence[str] = ()
     tables: Sequence[Table] = ()
     examples: Sequence[tuple[str, Sequence[Example]]] = ()
-    charts: Sequence[Chart] = ()
+    charts: Sequence[tuple[str, str]] = ()
     notes: Sequence[str] = ()
     folded: bool = False
 
 
 def html_page(
-    title: str,
-    sections: Sequence[Section],
-    leads: Sequence[Lead] = (),
-    warnings: Sequence[str] = (),
-    sortable: bool = False,
+    title: str, sections: Sequence[Section], warnings: Sequence[str] = (), sortable: bool = False
 ) -> str:
-    """Return a page that asks for nothing: `leads` and `warnings` first, then the sections.
+    """Return a page that asks for nothing: `warnings` first, then the sections.
 
     A section without a title belongs to what stands first.
 
@@ -74,8 +62,8 @@ def html_page(
     )
     policy += f"; script-src '{_digest(script)}'" if script else ""
     page: str = _template().render(
-        title=title, sections=sections, leads=leads, warnings=warnings,
-        style=Markup(style), policy=policy, script=Markup(script),
+        title=title, sections=sections, warnings=warnings, policy=policy,
+        style=Markup(style), script=Markup(script),
     )  # fmt: skip
     return page
 

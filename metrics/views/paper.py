@@ -12,10 +12,11 @@ no unit of length, so no score made here ranks with these figures.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from metrics.scoring.records import ScoreFile
+from metrics.views.table import Cell, Table, make_table
 
 PAPER, PEOPLE = "Pix2Shape", "Human Evaluation"  # of the paper's methods
 PAPER_KIND = "other"  # kind of the paper's questions
@@ -217,6 +218,30 @@ TABLES: Sequence[PaperTable] = (
 )
 
 
-def tables_beside(scores: ScoreFile) -> Sequence[PaperTable]:
-    """Return the tables that stand beside scores: none in closed rooms, which are in metres."""
-    return () if scores.length == "metre" else TABLES
+def figures_of(scores: ScoreFile) -> list[Figure]:
+    """Return the figures that stand beside scores, without those of ablations.
+
+    There are none beside what is measured in metres, and none beside other kinds of questions.
+    """
+    kinds = set(scores.by_distractor) if scores.task == "iqtt" else {PAPER_KIND}
+    if scores.task == "measured" or scores.length == "metre" or kinds - {PAPER_KIND}:
+        return []
+    figures = [f for table in TABLES if not table.ablation for f in table.figures]
+    return [f for f in figures if f.metric in scores.metrics]
+
+
+def paper_table(figures: Sequence[Figure]) -> Table:
+    """Return a row for each method, data and angle of the paper, as printed."""
+    names = list(dict.fromkeys(f.metric for f in figures))
+    rows: dict[tuple[str, ...], dict[str, Cell]] = {}
+    for f in figures:
+        angle = "-" if f.view_angle is None else f"{f.view_angle}°"
+        labels = "-" if f.labels is None else f"{f.labels:,}"
+        about = (f.method, f.data, angle, labels, str(f.table))
+        rows.setdefault(about, {})[f.metric] = Cell(f.text, f"± {f.spread}" if f.spread else "")
+    head = ("method", "data", "view angle", "labels", "table", *names)
+    cells: list[list[Cell | str]] = [
+        [*about, *(row.get(name, Cell()) for name in names)] for about, row in rows.items()
+    ]
+    note = f"{SOURCE}, {REPORTED}, whose unit of length the paper does not state"
+    return replace(make_table("as the paper reports", head, cells), notes=(note,))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from metrics.measures.surfaces.normals import normals_from_depth
-from metrics.views.plots import load_matplotlib
+from metrics.views.figures import load_matplotlib
 from scenegen.common.text_table import number
 from scenegen.rooms.preview import srgb_bytes
 

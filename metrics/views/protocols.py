@@ -9,9 +9,9 @@ from metrics.measured.protocols import BY_NAME, PROTOCOLS, Crop
 from metrics.scoring.metric_names import HEADLINE
 from metrics.scoring.records import ScoreFile
 from metrics.views.figures import COLUMN, draw_scores
-from metrics.views.score_tables import INTERVAL, floor_cell, score_cell, title_of
+from metrics.views.score_tables import INTERVAL, baseline_cell, score_cell, size_of
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
-from scenegen.common.text_table import piped
+from scenegen.common.text_table import piped, plain
 
 
 def protocols_report(
@@ -27,7 +27,9 @@ def protocols_report(
         why = "they suit neither these images nor what is predicted"
         notes.append(f"left out, as {why}: {', '.join(left_out)}")
     form = to_markdown if as_markdown else to_text
-    return form(title_of(scores[0]), [protocols_table(scores)], notes, width)
+    first = scores[0]
+    title = f"{plain(first.method)} on {plain(first.meta.truth_path)}: {size_of(first)}"
+    return form(title, [protocols_table(scores)], notes, width)
 
 
 def protocols_table(scores: Sequence[ScoreFile]) -> Table:
@@ -39,10 +41,10 @@ def protocols_table(scores: Sequence[ScoreFile]) -> Table:
         share = f"{file.columns['pixels'].sum() / scores[0].columns['pixels'].sum():.0%}"
         limits = range_text(protocol.least, protocol.largest)
         scored = [score_cell(file.metrics[name]) for name in names]
-        # Its floor beside the first score; that of the others is in the tables of one protocol.
-        scored.insert(1, floor_cell(file, names[0]))
+        # Its baseline beside the first score; that of the others is in the tables of one protocol.
+        scored.insert(1, baseline_cell(file, names[0]))
         rows.append([protocol.name, file.alignment, limits, share, *scored])
-    head = ("protocol", "alignment", "metres", "pixels", names[0], "its floor", *names[1:])
+    head = ("protocol", "alignment", "metres", "pixels", names[0], "its baseline", *names[1:])
     return make_table("", head, rows)
 
 

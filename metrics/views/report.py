@@ -1,4 +1,4 @@
-"""Scores of one submission as a page that answers first."""
+"""Scores of one submission as a page: main metrics, examples, charts, then all numbers."""
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -8,21 +8,23 @@ import numpy as np
 
 from metrics.measured.reader import Images
 from metrics.score_file import read_scores
-from metrics.scoring.estimates import CONFIDENCE
 from metrics.scoring.evaluate import Runs
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
-from metrics.scoring.records import ScoreFile
+from metrics.scoring.records import ScoreFile, Scores
 from metrics.scoring.truth_digests import require_truth, stated_truth
-from metrics.views.by_angle import view_curves
 from metrics.views.examples import examples_of
-from metrics.views.headline import headline_lead, headline_section, kinds_sections
+from metrics.views.figures import draw_groups, draw_histogram, svg_url
 from metrics.views.page import Section, html_page
-from metrics.views.plots import Chart, histogram
+from metrics.views.paper import figures_of, paper_table
 from metrics.views.score_tables import (
+    alignment_tables,
     all_scores,
     group_tables,
-    labels_of,
-    source_text,
+    main_table,
+    notes_of,
+    side_by_side,
+    title_of,
+    warnings_of,
 )
 from metrics.views.table import make_table
 
@@ -33,9 +35,9 @@ ROOMS_REMARK = (
     "Depths share the truth's range; the error ends at a tenth of it. Normals are x, y, z as red,"
     " green, blue. Grey is not scored. A click enlarges a picture."
 )
-CURVES_REMARK = (
-    "Bars are intervals. The paper's figures (†) are in the tables only, as it states no unit of"
-    " length."
+QUESTIONS_REMARK = (
+    "One answer shows the shape of the reference, turned. The questions are spread evenly over the"
+    " file."
 )
 
 
@@ -54,36 +56,56 @@ def html_report(
     for file in beside:
         require_truth(file, scores.truth, scores.method, scores.protocol)
     files = [scores, *beside]
-    sections = [headline_section(files)]
-    if scores.task == "iqtt":
-        sections += kinds_sections(files)
-        remark = "One answer shows the shape of the reference, turned. The questions are spread"
-        remark, title = f"{remark} evenly over the file.", "Questions"
-    else:
-        remark, title = ROOMS_REMARK, "Scenes" if scores.task == "rooms" else "Images"
-        if scores.grouped:
-            remark += f" Of several in {scores.unit} the one nearest to their mean is shown."
+    tables = [main_table(scores), *([side_by_side(files)] if beside else [])]
+    sections = [Section(remarks=[title_of(scores)], tables=tables, notes=notes_of(scores))]
     examples = [] if runs is None else examples_of(scores, runs.truth, runs.files[0])
     if examples:
-        sections.append(Section(title, remarks=[remark], examples=examples))
-    if scores.task == "rooms":
-        sections += curves_section(files)
-    charts = list(_distributions(scores))
-    if charts:
-        sections.append(Section("Distribution over images", charts=charts))
-    return html_page(
-        scores.method,
-        [*sections, *_all_numbers(scores)],
-        leads=[headline_lead(scores)],
-        warnings=scores.warnings,
-    )
+        titles = {"rooms": "Scenes", "measured": "Images", "iqtt": "Questions"}
+        remark = QUESTIONS_REMARK if scores.task == "iqtt" else ROOMS_REMARK
+        if scores.grouped:
+            remark += " Of several images of a group, the one nearest to their mean is shown."
+        sections.append(Section(titles[scores.task], remarks=[remark], examples=examples))
+    groups = list(group_tables(scores))
+    reported = figures_of(scores)
+    sections += group_charts(files)
+    distributions = list(_distributions(scores))
+    if distributions:
+        sections.append(Section("Distribution over images", charts=distributions))
+    sections.append(Section("All numbers"))
+    tables = [*alignment_tables(scores), *groups, all_scores(scores)]
+    tables += [paper_table(reported)] if reported else []
+    sections += [Section(t.title.capitalize(), tables=[t], folded=True) for t in tables]
+    rows = [(name, metric(name).definition) for name in in_order(scores.metrics)]
+    table = make_table("Definitions", ("metric", "of one item"), rows)
+    sections += [
+        Section("How each number is defined", tables=[table], folded=True),
+        Section("Where the numbers come from", notes=_origin(scores), folded=True),
+    ]
+    return html_page(scores.method, sections, warnings_of(scores))
 
 
-def curves_section(files: Sequence[ScoreFile]) -> list[Section]:
-    """Return the section of scores of rooms by view angle; none where all views have one."""
-    charts = list(view_curves(files, labels_of(files)))
-    title = "By degrees between the view and the scene's first one"
-    return [Section(title, charts=charts, notes=[CURVES_REMARK])] if charts else []
+def group_charts(files: Sequence[ScoreFile]) -> list[Section]:
+    """Return charts of the main metrics by view angle, or of accuracy by kind of question.
+
+    They show all methods, and the baseline of the first one. There are none where all views have
+    one angle, or all questions are of one kind.
+    """
+    by = {"rooms": ("angle", files[0].by_view_angle), "iqtt": ("kind", files[0].by_distractor)}
+    grouping, groups = by.get(files[0].task, ("", {}))
+    names = [
+        name
+        for name in HEADLINE[files[0].task]
+        if sum(all(name in _group(file, grouping, key) for file in files) for key in groups) > 1
+    ]
+    charts = [(metric(n).title, svg_url(draw_groups, files, grouping, n)) for n in names]
+    titles = {"angle": "By degrees between the view and the scene's first one"}
+    title = titles.get(grouping, "Accuracy by kind of question")
+    return [Section(title, charts=charts)] if charts else []
+
+
+def _group(file: ScoreFile, grouping: str, key: str) -> Scores:
+    groups = file.by_view_angle if grouping == "angle" else file.by_distractor
+    return groups.get(key, {})
 
 
 def read_beside(paths: Sequence[str | Path], truth: "Images | AnswersFile") -> list[ScoreFile]:
@@ -99,32 +121,20 @@ def read_beside(paths: Sequence[str | Path], truth: "Images | AnswersFile") -> l
     return files
 
 
-def _distributions(scores: ScoreFile) -> Iterator[Chart]:
+def _distributions(scores: ScoreFile) -> Iterator[tuple[str, str]]:
+    if scores.task == "iqtt":
+        return
     for name in (*HEADLINE[scores.task], "normal_mean_degrees", "derived_normal_mean_degrees"):
-        if name in scores.items:
-            values = np.asarray(scores.items[name], float)
-            chart = histogram(values, metric(name).title, scores.unit_of(name))
-            if chart:
-                yield chart
+        if name in scores.items and np.isfinite(np.asarray(scores.items[name], float)).any():
+            yield metric(name).title, svg_url(draw_histogram, scores, name)
 
 
-def _all_numbers(scores: ScoreFile) -> Iterator[Section]:
-    """Yield what is folded at the end: all scores, their definitions, and where they come from."""
-    yield Section("All numbers")
-    for table in group_tables(scores) if scores.task != "iqtt" else ():
-        yield Section(table.title.capitalize(), tables=[table], folded=True)
-    title = f"All scores ({len(scores.metrics)})"
-    yield Section(title, tables=[all_scores(scores)], folded=True)
-    rows = [(name, metric(name).definition) for name in in_order(scores.metrics)]
-    table = make_table("Definitions", ("score", "of one item"), rows)
-    yield Section("How each number is defined", tables=[table], folded=True)
+def _origin(scores: ScoreFile) -> list[str]:
     meta = scores.meta
-    drawn = f" from {meta.resamples} resamples with seed {meta.seed}" if meta.resamples else ""
     counts = ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in meta.counts.items())
-    notes = [
+    return [
         f"{counts}.",
-        f"Truth: {meta.truth_path} {meta.truth_digest[:12]}, {source_text(meta)}.",
-        f"Scored by {meta.writer}, with intervals at {CONFIDENCE:.0%}{drawn}.",
-        *(f"{run.path} {run.run} {run.sha256[:16]}" for run in meta.submissions),
+        f"Truth: {meta.truth_path}, digest {meta.truth_digest}, request {meta.truth_fingerprint}.",
+        f"Scored by {meta.writer}.",
+        *(f"{run.path} {run.run} {run.sha256}" for run in meta.submissions),
     ]
-    yield Section("Where the numbers come from", notes=notes, folded=True)

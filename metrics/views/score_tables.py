@@ -1,4 +1,4 @@
-"""Tables of one score file, as text, Markdown and CSV: headline, all scores, main ones by group."""
+"""Tables of one score file, as text, Markdown and CSV: main metrics, all, and by group."""
 
 import csv
 from collections.abc import Iterator, Sequence
@@ -16,8 +16,10 @@ from metrics.scoring.estimates import CONFIDENCE, question_skill
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
     BASELINES,
+    BEHIND,
     HEADLINE,
     OTHER_SCENE,
+    PRINTED,
     in_order,
     metric,
 )
@@ -26,13 +28,14 @@ from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
 from scenegen.common.text_table import by_number, distinct, number, plain, with_interval
 from scenegen.files.new_file import written_beside
 
-INTERVAL = f"{CONFIDENCE:.0%} interval"
-NO_FLOOR = (
-    "no skill: no floor is known of questions with these settings. `iqtt floors {} --out"
+INTERVAL = f"{CONFIDENCE:.0%} CI"
+MAIN_HEAD = ("metric", "", "value", INTERVAL, "baseline", "skill", INTERVAL)
+SKILL = "skill: 0 = baseline, 1 = perfect, negative = worse than the baseline"
+ITSELF = "baseline itself"
+NO_BASELINE = (
+    "no skill: no baseline is known of questions with these settings. `iqtt floors {} --out"
     " floors.json` measures it, and `bench score --floors floors.json` uses it"
 )
-SKILL = "Skill: 1 is perfect, 0 is as good as the floor, below 0 is worse than the floor."
-UNREAD = "replies that name no letter; they count as wrong"
 BY_KIND = "by kind of question"
 GROUP_TITLES = {
     "by_view_angle": "by degrees between the view and the scene's first one",
@@ -46,25 +49,28 @@ GROUP_TITLES = {
     "by_circle": "circular: right in every order of the answers",
 }
 ALIGNMENT_SCORES = ("abs_rel", "rmse", "delta_1")
-GROUP_SCORES = HEADLINE
 
 
 def text_report(
     scores: ScoreFile, as_markdown: bool = False, whole: bool = False, width: int | None = None
 ) -> str:
-    """Return the headline, as aligned text or Markdown, and accuracy by kind of question.
+    """Return the main metrics, as aligned text or Markdown, and accuracy by kind of question.
 
     Args:
-        whole: whether all scores, and the main ones by group, stand there as well.
+        whole: whether all metrics, and the main ones by group, stand there as well.
         width: characters of a line, to which sentences are wrapped.
     """
-    tables, notes = [headline_rows(scores)], list(notes_of(scores))
+    title = "\n".join([title_of(scores), *(f"WARNING  {text}" for text in warnings_of(scores))])
+    tables, notes = [main_table(scores)], notes_of(scores)
     if whole:
         tables += [*alignment_tables(scores), all_scores(scores), *group_tables(scores)]
     else:
-        tables += [table for table in group_tables(scores) if table.title == BY_KIND]
-        notes.append("--all prints all scores and groups")
-    return (to_markdown if as_markdown else to_text)(title_of(scores), tables, notes, width)
+        kinds = scores.by_distractor if scores.task == "iqtt" else {}
+        tables += [t for t in group_tables(scores) if t.title == BY_KIND and len(kinds) > 1]
+        missing = _not_scored(scores)
+        count = f"{len(scores.metrics)} metrics, " * (len(scores.metrics) > 1)
+        notes.append(f"more: --all ({count}by group), --json, --html{missing}")
+    return (to_markdown if as_markdown else to_text)(title, tables, notes, width)
 
 
 def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> None:
@@ -79,40 +85,42 @@ def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> N
         out.writerows(zip(*columns, strict=True))
 
 
-def headline_rows(scores: ScoreFile) -> Table:
-    """Return a row for each skill of a headline score, then for each such score, with floors."""
-    names = scores.headline
-    rows: list[Sequence[str]] = [
-        (f"skill of {n}", *interval_cells(scores.skills[n]), f"0: {floor_text(scores, n)}")
-        for n in names
-        if n in scores.skills
-    ]
-    for name in names:
-        floor = floor_cell(scores, name)
-        text = f"{floor.value}: {floor.rest}" if floor.rest else floor.value
-        rows.append((name, *interval_cells(scores.metrics[name]), text))
-    if scores.unread is not None:
-        rows.append(("unread replies", f"{scores.unread:.0%}", "-", UNREAD))
-    return make_table("", ("headline", "value", INTERVAL, "floor"), rows)
+def main_names(scores: ScoreFile) -> list[str]:
+    """Return the metrics that are shown first: those of the headline, or others without any."""
+    names = [name for name in PRINTED[scores.task] if name in scores.metrics]
+    names = [name for name in names if name != BEHIND or name in scores.headline]
+    return names or in_order(scores.metrics)[:5]
 
 
-def floor_text(scores: ScoreFile, name: str) -> str:
-    """Return the name of the floor of a score that has a skill."""
+def main_table(scores: ScoreFile) -> Table:
+    """Return a row for each main metric: direction, value, baseline and skill."""
+    rows: list[Sequence[str]] = []
+    for name in main_names(scores):
+        score, skill = scores.metrics[name], scores.skills.get(name)
+        value, interval = interval_cells(score)
+        value += "" if score.std is None else f" ± {number(score.std, (score.low, score.high))}"
+        up = "up" if metric(name).higher_is_better else "down"
+        row = (name, up, value, interval, str(baseline_cell(scores, name)))
+        if skill is None:
+            rows.append((*row, "-", ""))
+        else:
+            rows.append((*row, *(("0", ITSELF) if skill.is_floor else interval_cells(skill))))
+    return make_table("", MAIN_HEAD, rows)
+
+
+def baseline_name(scores: ScoreFile, name: str) -> str:
+    """Return the name of the baseline of a score that has a skill."""
     if scores.task != "iqtt":
         return BASELINES[scores.skills[name].floor_name[: -len(name)]].name
-    return scores.skills[name].floor_name
+    return " ".join(scores.skills[name].floor_name.split())
 
 
-def floor_cell(scores: ScoreFile, name: str) -> Cell:
-    """Return the floor of a score with its name, and what chance gives."""
-    label, value = references(scores).get(name, ("", 0.0))
-    reference = _beside(value, scores.metrics[name])
+def baseline_cell(scores: ScoreFile, name: str) -> Cell:
+    """Return what the baseline of a score reaches, with its name."""
     if name not in scores.skills:
-        return Cell(reference, label) if label else Cell()
-    floor, texts = scores.skills[name].floor, [floor_text(scores, name)]
-    if label and not texts[0].startswith(label):
-        texts.append(f"{label} {reference}")
-    return Cell(_beside(floor, scores.metrics[name]), "; ".join(texts))
+        return Cell()
+    value = _beside(scores.skills[name].floor, scores.metrics[name])
+    return Cell(value, baseline_name(scores, name))
 
 
 def _beside(reference: float, score: Score) -> str:
@@ -121,47 +129,40 @@ def _beside(reference: float, score: Score) -> str:
     return number(reference) if reference and float(text) == 0 else text
 
 
-def references(scores: ScoreFile) -> dict[str, tuple[str, float]]:
-    """Return by name of the score what chance gives, with its label."""
-    if scores.task == "iqtt":
-        return {"iqtt_accuracy": ("chance", 1.0 / scores.meta.counts["answers"])}
-    return {}
-
-
 def alignment_tables(scores: ScoreFile) -> Iterator[Table]:
     """Yield the scores of depth under each alignment side by side, the one that ranks first."""
+    rows: list[Sequence[Cell | str]] = []
+    for alignment, shown in _by_alignment(scores):
+        ranks = alignment == scores.alignment
+        label = f"{alignment} (ranks)" if ranks else alignment
+        rows.insert(0 if ranks else len(rows), (label, *map(score_cell, shown)))
+    if rows:
+        yield make_table("depth after each alignment", ("alignment", *ALIGNMENT_SCORES), rows)
+
+
+def _by_alignment(scores: ScoreFile) -> Iterator[tuple[str, list[Score | None]]]:
+    """Yield each alignment that leaves as much open as the method does, and ALIGNMENT_SCORES."""
     ending = "" if scores.alignment == "none" else f"_after_{scores.alignment}"
-    names = [f"{name}{ending}" for name in ALIGNMENT_SCORES]
-    if not all(name in scores.metrics for name in names):
+    if not all(f"{name}{ending}" in scores.metrics for name in ALIGNMENT_SCORES):
         return
-    rows = []
     for alignment in get_args(Alignment):
         ending = "" if alignment == "none" else f"_after_{alignment}"
         shown = [scores.metrics.get(f"{name}{ending}") for name in ALIGNMENT_SCORES]
         if shown[0] is not None and (ending or scores.alignment == "none"):
-            ranks = alignment == scores.alignment
-            label = f"{alignment} (ranks)" if ranks else alignment
-            rows.append((not ranks, [label, *map(score_cell, shown)]))
-    table = [row for _, row in sorted(rows, key=lambda row: row[0])]
-    yield make_table("depth after each alignment", ("alignment", *ALIGNMENT_SCORES), table)
+            yield alignment, shown
 
 
 def all_scores(scores: ScoreFile) -> Table:
-    """Return a row for each score; what chance gives follows its score."""
+    """Return a row for each score."""
     rows: list[Sequence[str]] = []
-    beside = references(scores)
     for name in in_order(scores.metrics):
-        score = scores.metrics[name]
-        better = "higher" if metric(name).higher_is_better else "lower"
+        score, skill = scores.metrics[name], scores.skills.get(name)
         std = "-" if score.std is None else number(score.std, (score.low, score.high))
-        skill = scores.skills.get(name)
         floor = "-" if skill is None else _beside(skill.floor, score)
-        rows.append((name, *interval_cells(score), std, floor, score.unit, better))
-        if name in beside:
-            label, value = beside[name]
-            rows.append((f"  {label}", _beside(value, score), "-", "-", "-", score.unit, ""))
-    head = ("score", "value", INTERVAL, "std of runs", "floor", "unit", "better")
-    return make_table("all scores", head, rows)
+        row = (name, *interval_cells(score), std, floor, score.unit, metric(name).better)
+        rows.append(row)
+    head = ("metric", "value", INTERVAL, "std of runs", "baseline", "unit", "better")
+    return make_table("all metrics", head, rows)
 
 
 def group_tables(scores: ScoreFile) -> Iterator[Table]:
@@ -171,16 +172,16 @@ def group_tables(scores: ScoreFile) -> Iterator[Table]:
         if not groups:
             continue
         held = {name for group in groups.values() for name in group}
-        names = [name for name in GROUP_SCORES[scores.task] if name in held] or in_order(held)
-        with_floors = grouping == "by_distractor"
+        names = [name for name in HEADLINE[scores.task] if name in held] or in_order(held)
+        with_skills = grouping == "by_distractor"
         rows: list[Sequence[Cell | str]] = []
         for key in by_number(groups):
             group = groups[key]
             cells = [_group_cell(group.get(name)) for name in names]
             n = str(max(score.n for score in group.values()))
             label = shown_key(grouping, key)
-            rows.append((label, *cells, n, *(_kind_cells(scores, key) if with_floors else ())))
-        head = ("", *names, "n", *(("skill", "floor") if with_floors else ()))
+            rows.append((label, *cells, n, *(_kind_cells(scores, key) if with_skills else ())))
+        head = ("", *names, "n", *(("skill", "baseline") if with_skills else ()))
         yield make_table(GROUP_TITLES[grouping], head, rows)
 
 
@@ -194,17 +195,13 @@ def _group_cell(score: Score | None) -> Cell:
     return Cell() if score is None else score_cell(replace(score, std=None))
 
 
-def _kind_cells(scores: ScoreFile, kind: str) -> tuple[Cell, str]:
-    """Return the skill in a kind of questions, and its floor."""
-    skill = kind_skill(scores, kind)
-    floor = "-" if skill is None else f"{number(skill.floor)}: {skill.floor_name}"
-    return score_cell(skill), floor
-
-
-def kind_skill(scores: ScoreFile, kind: str) -> Skill | None:
-    """Return the skill in a kind of questions over the floor of that kind, if it is known."""
+def _kind_cells(scores: ScoreFile, kind: str) -> tuple[Cell, Cell]:
+    """Return the skill in a kind of questions over the baseline of that kind, and the baseline."""
     accuracy = scores.by_distractor[kind]["iqtt_accuracy"]
-    return question_skill(accuracy, {kind: accuracy.n}, scores.question_floors)
+    skill = question_skill(accuracy, {kind: accuracy.n}, scores.question_floors)
+    if skill is None:
+        return Cell(), Cell()
+    return score_cell(skill), Cell(number(skill.floor), skill.floor_name)
 
 
 def interval_cells(score: Score | Skill) -> tuple[str, str]:
@@ -213,7 +210,7 @@ def interval_cells(score: Score | Skill) -> tuple[str, str]:
 
 
 def score_cell(score: Score | Skill | None, best: bool = False, floor: float | None = None) -> Cell:
-    """Return a value, with standard deviation over runs, interval, and a floor of its own.
+    """Return a value, with standard deviation over runs, interval, and a baseline of its own.
 
     Args:
         best: whether it is the best value of its column.
@@ -221,13 +218,32 @@ def score_cell(score: Score | Skill | None, best: bool = False, floor: float | N
     if score is None:
         return Cell()
     if isinstance(score, Skill) and score.is_floor:
-        return Cell("0", "is the floor")
+        return Cell("0", ITSELF)
     value, interval = interval_cells(score)
     std, ends = getattr(score, "std", None), (score.low, score.high)
     rest = [] if std is None else [f"± {number(std, ends)}"]
     rest += [] if interval == "-" else [interval]
-    rest += [] if floor is None else [f"floor {number(floor, ends)}"]
+    rest += [] if floor is None else [f"baseline {number(floor, ends)}"]
     return Cell(value, " ".join(rest), best)
+
+
+def side_by_side(files: Sequence[ScoreFile]) -> Table:
+    """Return a row for each main metric and each kind of question, with a column for each method.
+
+    Metrics that have a skill are shown by it.
+    """
+    rows: list[Sequence[Cell | str]] = []
+    names = {name for file in files for name in file.headline}
+    for name in (n for n in HEADLINE[files[0].task] if n in names and n in files[0].metrics):
+        has_skill = name in files[0].skills
+        cells = [(file.skills if has_skill else file.metrics).get(name) for file in files]
+        label = f"skill of {name}" if has_skill else name
+        baseline = baseline_name(files[0], name) if has_skill else "-"
+        rows.append((label, *map(score_cell, cells), baseline))
+    for kind in by_number(files[0].by_distractor) if files[0].task == "iqtt" else ():
+        shown = [file.by_distractor.get(kind, {}).get("iqtt_accuracy") for file in files]
+        rows.append((f"accuracy, {kind}", *map(score_cell, shown), "-"))
+    return make_table("side by side", ("", *labels_of(files), "baseline"), rows)
 
 
 def labels_of(files: Sequence[ScoreFile]) -> list[str]:
@@ -235,81 +251,108 @@ def labels_of(files: Sequence[ScoreFile]) -> list[str]:
     return distinct([f.method for f in files], [f.path.stem if f.path else "" for f in files])
 
 
-def title_of(scores: ScoreFile) -> str:
-    """Return method, size and truth."""
-    size = f"{len(scores.ids)} questions"
-    if scores.task == "rooms":
-        size = f"{len(scores.ids)} images of {len(np.unique(scores.clusters))} scenes"
-    if scores.task == "measured":
+def size_of(scores: ScoreFile) -> str:
+    """Return how much was scored, in words."""
+    if scores.task == "iqtt":
+        size = f"{len(scores.ids)} questions"
+    else:
         size = f"{len(scores.ids)} images"
-        size += f" in {len(np.unique(scores.clusters))} groups" if scores.grouped else ""
-    runs = f", mean of {scores.runs} runs" if scores.runs > 1 else ""
-    return f"{plain(scores.method)}: {size} of {plain(scores.meta.truth_path)}{runs}"
+        count = len(np.unique(scores.clusters))
+        size += f", {count} {scores.unit}" if scores.task == "rooms" or scores.grouped else ""
+    return size + (f", mean of {scores.runs} runs" if scores.runs > 1 else "")
 
 
-def notes_of(scores: ScoreFile) -> Iterator[str]:
-    """Yield what has to be known to read the tables, and where the scores come from."""
-    meta = scores.meta
-    yield from floor_sentences(scores)
-    for warning in (*scores.warnings, *few_clusters(scores)):
-        yield f"warning: {warning}"
-    if scores.skills:
-        yield f"{SKILL} {what_the_floor_is(scores)}"
-    yield from partner_sentences(scores)
-    bootstrap = f"{meta.resamples} resamples, seed {meta.seed}"
+def title_of(scores: ScoreFile) -> str:
+    """Return method, truth and size; of images also what was fitted, the protocol and the unit."""
+    texts = [f"{plain(scores.method)} on {plain(_truth_name(scores.meta))}: {size_of(scores)}"]
     if scores.task != "iqtt":
-        claim = f"alignment: {scores.alignment}"
-        if scores.alignment != "none":
-            claim += ", fitted to the truth of each image before all scores"
-        yield f"intervals: bootstrap over {scores.unit}, {bootstrap}; {claim}"
-        if scores.protocol:
-            yield f"protocol {scores.protocol}: {BY_NAME[scores.protocol].source}; 1 unit is 1 m"
-            yield from measured_sentences(scores)
+        how = "metric" if scores.alignment == "none" else "fitted to the truth of each image"
+        texts += [f"alignment: {scores.alignment} ({how})"]
+        texts += [f"protocol: {scores.protocol}"] if scores.protocol else []
+        unit = "metre" if scores.task == "measured" else scores.length
+        texts += [f"unit: {unit}"]
+    return "   ".join(texts)
+
+
+def _truth_name(meta: Meta) -> str:
+    return meta.truth_path.replace("\\", "/").rsplit("/", maxsplit=1)[-1]
+
+
+def warnings_of(scores: ScoreFile) -> list[str]:
+    """Return what is to be known before any number."""
+    return [*scores.warnings, *few_clusters(scores), *partner_sentences(scores)]
+
+
+def notes_of(scores: ScoreFile) -> list[str]:
+    """Return how to read the main table, and where its numbers come from: six lines at most."""
+    meta = scores.meta
+    bootstrap = f"{meta.resamples} resamples, seed {meta.seed}"
+    notes = skill_notes(scores)
+    if scores.task != "iqtt":
+        notes += _alignment_note(scores)
+        over = f"{scores.unit}, {bootstrap}"
+        if scores.task == "measured" and not scores.grouped:
+            over += "; images count as independent, as no groups are known"
+        notes.append(f"CIs: bootstrap over {over}")
     else:
         how = "Wilson's" if scores.runs == 1 else f"bootstrap, {bootstrap}"
         over = "questions, as the truth does not tell their shapes"
         if "shape" in scores.items:
             over = f"the shapes of references, {len(np.unique(scores.items['shape']))} in all"
-        yield f"intervals: {how}, over {over}"
-        yield "abstentions and ties count as wrong"
-        if not scores.skills and scores.by_distractor:
-            yield NO_FLOOR.format(plain(meta.truth_path))
-        elif not scores.skills:
-            yield "no skill: the truth does not tell its settings, so no floor is known"
-    yield (
-        f"truth: {plain(meta.truth_path)}, digest {meta.truth_digest[:12]}, {source_text(meta)};"
-        f" fingerprint {meta.truth_fingerprint[:12]}"
-    )
-    runs = ", ".join(f"{run.path} {run.sha256[:12]}" for run in meta.submissions)
-    yield f"submissions: {plain(runs)}"
+        notes.append(f"CIs: {how}, over {over}; abstentions and ties count as wrong")
+        notes += unread_notes([scores])
+    runs = ", ".join(run.sha256[:12] for run in meta.submissions)
+    return [
+        *notes,
+        f"ground truth {meta.truth_digest[:12]} ({source_text(meta)}); predictions {plain(runs)}",
+    ]
 
 
-def measured_sentences(scores: ScoreFile) -> Iterator[str]:
-    """Yield what the truth of measured images cannot tell."""
-    yield "scores of objects: none, as nobody marked them"
-    if not scores.grouped:
-        yield "images count as independent, as no groups are known; frames of a drive are alike"
+def skill_notes(scores: ScoreFile) -> list[str]:
+    """Return in two lines what skills mean; why there are none, where there are none."""
+    if scores.task == "iqtt":
+        if not scores.skills:
+            known = bool(scores.by_distractor)
+            missing = "no skill: the truth does not tell its settings, so no baseline is known"
+            return [NO_BASELINE.format(plain(scores.meta.truth_path)) if known else missing]
+        chance = f"chance is {1.0 / scores.meta.counts['answers']:.2f}"
+        return [SKILL, f"baseline: best method without 3D on such questions, by kind; {chance}"]
+    if not scores.skills:
+        return []
+    names = [name for name in HEADLINE[scores.task] if name in scores.skills] or [*scores.skills]
+    begins = dict.fromkeys(scores.skills[name].floor_name[: -len(name)] for name in names)
+    used = [BASELINES[begin] for begin in BASELINES if begin in begins]
+    return [SKILL, f"baselines: {'; '.join(f'{base.name} = {base.gloss}' for base in used)}"]
+
+
+def _alignment_note(scores: ScoreFile) -> list[str]:
+    by_alignment = list(_by_alignment(scores))
+    firsts = [(name, shown[0]) for name, shown in by_alignment]
+    values = " | ".join(f"{name} {interval_cells(first)[0]}" for name, first in firsts if first)
+    rule = "compare methods in ONE column only (bench compare --metric)"
+    return [f"abs_rel by alignment: {values}; {rule}"] * (len(by_alignment) > 1)
+
+
+def _not_scored(scores: ScoreFile) -> str:
+    """Return in words what the truth of measured images cannot tell."""
+    if scores.task != "measured":
+        return ""
+    texts = ["objects, as nobody marked them"]
     if scores.protocol == DECLARED.name and "boundary_f1" not in scores.items:
-        yield "boundaries: none, as depth is known at too few pixels"
+        texts.append("boundaries, as depth is known at too few pixels")
     if scores.protocol == DECLARED.name and "normal_mean_degrees" not in scores.items:
-        yield "normals: none, unless both the truth and the predictions have them"
+        texts.append("normals, unless both files have them")
+    source = BY_NAME[scores.protocol].source
+    return f"; not scored: {'; '.join(texts)}; protocol: {source}"
 
 
 def unread_notes(files: Sequence[ScoreFile]) -> list[str]:
     """Return in words the share of unread replies of each method whose replies were read."""
     return [
-        f"{label}: {file.unread:.0%} unread {UNREAD}"
+        f"unread replies of {label}: {file.unread:.0%} name no letter; they count as wrong"
         for file, label in zip(files, labels_of(files), strict=True)
         if file.unread is not None
     ]
-
-
-def floor_sentences(scores: ScoreFile) -> list[str]:
-    """Return a sentence where a method scores what its floor does; else none."""
-    headline = [name for name in scores.headline if name in scores.skills]
-    names = [name for name in headline if scores.skills[name].is_floor]
-    floors = dict.fromkeys(" ".join(floor_text(scores, name).split()) for name in names)
-    return [f"this method is the floor ({', '.join(floors)}) of {', '.join(names)}"] * bool(names)
 
 
 def partner_sentences(scores: ScoreFile) -> list[str]:
@@ -334,42 +377,12 @@ def few_clusters(scores: ScoreFile) -> list[str]:
 
 def too_few_warning(count: int, units: str) -> list[str]:
     """Return a warning where so many scenes or shapes do not suffice for intervals; else none."""
-    if not 1 < count < FEW_CLUSTERS:
-        return []
-    return [
-        f"{count} {units} are too few for intervals at {CONFIDENCE:.0%}, which then hold the truth"
-        f" less often; take at least {FEW_CLUSTERS}"
-    ]
-
-
-def what_the_floor_is(scores: ScoreFile) -> str:
-    """Return in a sentence what the floor of the skills is."""
-    if scores.task == "rooms":
-        return (
-            "The floor of shape is a flat cut-out of each object at its median depth, or the empty"
-            " room, or in closed rooms a cut-out between both, whichever is best. Of relief it is"
-            " the same prediction, held against the relief of another scene. Of what is"
-            " behind it is the best guess that was shown as much. Else it is the empty room: walls"
-            " and floor from the true camera, no objects."
-        )
-    if scores.task == "measured":
-        return (
-            "The floor is the better of two guesses that see no picture: one depth everywhere, or"
-            " nearer evenly to the lower edge. They are fitted as predictions are, by scale and"
-            " shift where nothing is fitted."
-        )
-    return (
-        "The floor is the best method without 3D on questions of the same settings, by kind of"
-        " question: docs/results.md."
-    )
+    text = f"{count} {units}: {CONFIDENCE:.0%} CIs under-cover below {FEW_CLUSTERS}"
+    return [text] * (1 < count < FEW_CLUSTERS)
 
 
 def source_text(meta: Meta) -> str:
-    """Return in words where the truth comes from."""
+    """Return in words who chose the truth, and its name among the known test sets."""
     test = known_test(meta.truth_digest)
-    name = f" ({test.name})" if test else ""
-    return {
-        "given": "given to be scored against",
-        "known": "known to the benchmark",
-        "submission": "chosen by the submission itself",
-    }[meta.truth_source] + name
+    source = "from --truth" if meta.truth_source == "given" else "path stored in the predictions"
+    return f"{source}, {f'test set {test.name}' if test else 'not a named test set'}"

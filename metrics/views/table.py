@@ -1,7 +1,7 @@
 """One table in four formats: text for terminals, Markdown, LaTeX, and HTML (by `page`).
 
 Cells hold texts as they are. Each format escapes them, so that a name from a stranger's file stays
-within its cell and does nothing else.
+within its cell and does nothing else. The package tabulate lays out the columns.
 """
 
 import itertools
@@ -10,7 +10,9 @@ import textwrap
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from scenegen.common.text_table import aligned, markdown, piped, printable
+from tabulate import SEPARATING_LINE, DataRow, Line, TableFormat, tabulate
+
+from scenegen.common.text_table import markdown, printable
 
 _LATEX = {c: f"\\{c}" for c in "&%$#_{}"} | {
     "\\": r"\textbackslash{}",
@@ -40,15 +42,11 @@ class Cell:
         value: such as "0.1234"; "-" where there is none.
         rest: what follows in small letters, such as "± 0.01 [0.10, 0.15]"; or empty.
         best: whether the value is bold.
-        drawing: a picture before the value on pages, as a data URL; or empty.
-        link: address that the value leads to; or empty.
     """
 
     value: str = "-"
     rest: str = ""
     best: bool = False
-    drawing: str = ""
-    link: str = ""
 
     def __str__(self) -> str:
         return " ".join(filter(None, (self.value, self.rest)))
@@ -59,7 +57,7 @@ class Row:
     """Cells, one for each column.
 
     Attributes:
-        kind: "" for an ordinary row. Rows of other kinds, such as "floor", have their name in
+        kind: "" for an ordinary row. Rows of other kinds, such as "baseline", have their name in
             italics, and LaTeX has a line between kinds.
     """
 
@@ -92,100 +90,6 @@ def make_table(title: str, head: Sequence[str], rows: Iterable[Iterable[Cell | s
     return Table(title, tuple(head), tuple(map(make_row, rows)))
 
 
-def to_text(
-    title: str, tables: Iterable[Table], notes: Iterable[str] = (), width: int | None = None
-) -> str:
-    """Return tables with aligned columns, each below its title, and the notes, each once.
-
-    Args:
-        width: characters of a line. Notes are wrapped to it, and the heads of tables that are
-            wider; without it nothing is.
-    """
-    lines, told = [title] if title else [], set[str]()
-    for table in tables:
-        rows = [[printable(str(cell)) for cell in row.cells] for row in table.rows]
-        shown = aligned([table.head, *rows])
-        if width is not None and max(map(len, shown)) + 2 > width:
-            shown = aligned([*_narrow_head(table.head, rows), *rows])
-        lines += ["", *filter(None, [table.title])]
-        lines += ["  " + line for line in shown]
-        lines += [line for n in _once(table.notes, told) for line in _wrapped(n, width)]
-    text = [*lines, "", *(line for n in _once(notes, told) for line in _wrapped(n, width))]
-    return "\n".join(map(printable, text)).strip("\n")
-
-
-def to_markdown(
-    title: str, tables: Iterable[Table], notes: Iterable[str] = (), width: int | None = None
-) -> str:
-    """Return Markdown tables, with notes as lists, each note once; `width` is as in `to_text`."""
-    parts, told = [_markdown(title)] if title else [], set[str]()
-    for table in tables:
-        rows = [
-            [_markdown_cell(table, row, i) for i in range(len(row.cells))] for row in table.rows
-        ]
-        parts += [f"**{_markdown(table.title)}**"] if table.title else []
-        parts.append("\n".join(piped([[*map(_markdown, table.head)], *rows])))
-        parts.append(_listed(table.notes, told, width))
-    return "\n\n".join(filter(None, [*parts, _listed(notes, told, width)]))
-
-
-def _once(notes: Iterable[str], told: set[str]) -> list[str]:
-    """Return those notes that are not told yet, and take them for told."""
-    new = [note for note in dict.fromkeys(notes) if note not in told]
-    told.update(new)
-    return new
-
-
-def _wrapped(text: str, width: int | None, first: str = "", rest: str = "") -> list[str]:
-    """Return a text as lines of so many characters, where its words allow that.
-
-    No line but the first begins with what Markdown would take for a list or a heading.
-    """
-    if width is None:
-        return [first + text]
-    lines = textwrap.wrap(
-        text, max(width, 20), initial_indent=first, subsequent_indent=rest,
-        break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
-    safe: list[str] = []
-    for line in lines:
-        if safe and re.match(r"[-+*#>=~|]|[0-9]+[.)]", line.strip()):
-            safe[-1] += f" {line.strip()}"
-        else:
-            safe.append(line)
-    return safe or [first]
-
-
-def _narrow_head(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[list[str]]:
-    """Return lines of heads that are no wider than their columns, where their words allow that."""
-    widths = (
-        [max(map(len, column)) for column in zip(*rows, strict=True)] if rows else [0] * len(head)
-    )
-    lines = [
-        textwrap.wrap(text, max(width, 1), break_long_words=False) or [""]
-        for text, width in zip(head, widths, strict=True)
-    ]
-    most = max(map(len, lines))
-    padded = [[""] * (most - len(one)) + one for one in lines]
-    return [list(line) for line in zip(*padded, strict=True)]
-
-
-def _markdown(text: str) -> str:
-    return markdown(printable(text))
-
-
-def _markdown_cell(table: Table, row: Row, column: int) -> str:
-    cell = row.cells[column]
-    value = _markdown(cell.value)
-    mark = "**" if cell.best else "*" if row.kind and column == table.named_by else ""
-    return " ".join(filter(None, (f"{mark}{value}{mark}", _markdown(cell.rest))))
-
-
-def _listed(notes: Iterable[str], told: set[str], width: int | None) -> str:
-    new = (_markdown(note) for note in _once(notes, told))
-    return "\n".join(line for note in new for line in _wrapped(note, width, "- ", "  "))
-
-
 def without_rests(table: Table) -> Table:
     """Return a table of values alone, without what follows them, such as intervals."""
     rows = (
@@ -193,6 +97,47 @@ def without_rests(table: Table) -> Table:
         for row in table.rows
     )
     return replace(table, rows=tuple(rows))
+
+
+def to_text(
+    title: str, tables: Iterable[Table], notes: Iterable[str] = (), width: int | None = None
+) -> str:
+    """Return tables with aligned columns, each below its title, and the notes, each once.
+
+    Args:
+        title: may have several lines.
+        width: characters of a line. Notes are wrapped to it, and the heads of tables that are
+            wider; without it nothing is.
+    """
+    parts = [[line for text in title.splitlines() for line in _wrapped(text, width)]]
+    told = set[str]()
+    for table in tables:
+        rows = [[printable(str(cell)) for cell in row.cells] for row in table.rows]
+        lines = _layout([[*table.head], *rows], (), "plain").splitlines()
+        if width is not None and max(map(len, lines)) + 2 > width:
+            lines = _layout([_narrow(table.head, rows), *rows], (), "plain").splitlines()
+        below = [line for note in _once(table.notes, told) for line in _wrapped(note, width)]
+        above = [printable(table.title)] if table.title else []
+        parts.append([*above, *(f"  {line}".rstrip() for line in lines), *below])
+    parts.append([line for note in _once(notes, told) for line in _wrapped(note, width)])
+    return "\n\n".join("\n".join(lines) for lines in parts if lines)
+
+
+def to_markdown(
+    title: str, tables: Iterable[Table], notes: Iterable[str] = (), width: int | None = None
+) -> str:
+    """Return Markdown tables, with notes as lists, each note once; `width` does not count."""
+    del width
+    parts, told = list(map(_markdown, title.splitlines())), set[str]()
+    for table in tables:
+        rows = [
+            [_markdown_cell(table, row, i) for i in range(len(row.cells))] for row in table.rows
+        ]
+        parts += [f"**{_markdown(table.title)}**"] if table.title else []
+        parts.append(_layout(rows, [*map(_markdown, table.head)], "github"))
+        parts.append("\n".join(f"- {_markdown(note)}" for note in _once(table.notes, told)))
+    parts.append("\n".join(f"- {_markdown(note)}" for note in _once(notes, told)))
+    return "\n\n".join(filter(None, parts))
 
 
 def to_latex(tables: Iterable[Table], label: str = "") -> str:
@@ -215,19 +160,69 @@ def latex(text: str) -> str:
     return re.sub("-(?=-)", "-{}", escaped)  # two hyphens in a row would become a dash
 
 
+def _layout(rows: Sequence[Sequence[str]], head: Sequence[str], form: str | TableFormat) -> str:
+    return tabulate(rows, head, tablefmt=form, disable_numparse=True)
+
+
+def _narrow(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Return heads in lines no wider than their columns, where their words allow that."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)] if rows else []
+    return [
+        "\n".join(textwrap.wrap(text, max(width, 1), break_long_words=False))
+        for text, width in zip(head, widths or [1] * len(head), strict=True)
+    ]
+
+
+def _once(notes: Iterable[str], told: set[str]) -> list[str]:
+    """Return those notes that are not told yet, and take them for told."""
+    new = [note for note in dict.fromkeys(notes) if note not in told]
+    told.update(new)
+    return new
+
+
+def _wrapped(text: str, width: int | None) -> list[str]:
+    """Return a text as lines of so many characters, where its words allow that."""
+    line = printable(text)
+    if width is None:
+        return [line]
+    return textwrap.wrap(
+        line, max(width, 20), subsequent_indent="  ", break_long_words=False,
+        break_on_hyphens=False,
+    )  # fmt: skip
+
+
+def _markdown(text: str) -> str:
+    return markdown(printable(text))
+
+
+def _markdown_cell(table: Table, row: Row, column: int) -> str:
+    cell = row.cells[column]
+    value = _markdown(cell.value)
+    mark = "**" if cell.best else "*" if row.kind and column == table.named_by else ""
+    return " ".join(filter(None, (f"{mark}{value}{mark}", _markdown(cell.rest))))
+
+
 def _latex_lines(table: Table, label: str) -> Iterator[str]:
     yield from (r"\begin{table}", r"\centering", rf"\caption{{{latex(table.title)}}}")
     if label:
         yield rf"\label{{{label}}}"
     yield r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{%"
     columns = "r" * table.named_by + "l" + "c" * (len(table.head) - table.named_by - 1)
-    yield from (rf"\begin{{tabular}}{{{columns}}}", r"\toprule")
-    yield " & ".join(map(latex, table.head)) + r" \\"
-    for _, rows in itertools.groupby(table.rows, lambda row: row.kind):
-        yield r"\midrule"
-        for row in rows:
-            yield " & ".join(_latex_cell(table, row, i) for i in range(len(row.cells))) + r" \\"
-    yield from (r"\bottomrule", r"\end{tabular}}")
+    form = TableFormat(
+        lineabove=Line(rf"\begin{{tabular}}{{{columns}}}" + "\n" + r"\toprule", "", "", ""),
+        linebelowheader=Line(r"\midrule", "", "", ""),
+        linebetweenrows=None,
+        linebelow=Line("\\bottomrule\n\\end{tabular}}", "", "", ""),
+        headerrow=DataRow("", " & ", r" \\"),
+        datarow=DataRow("", " & ", r" \\"),
+        padding=0,
+        with_header_hide=None,
+    )
+    rows: list[list[str]] = []
+    for _, alike in itertools.groupby(table.rows, lambda row: row.kind):
+        rows += [[SEPARATING_LINE]] * bool(rows)
+        rows += [[_latex_cell(table, row, i) for i in range(len(row.cells))] for row in alike]
+    yield _layout(rows, [*map(latex, table.head)], form)
     yield from (rf"\par\footnotesize {latex(note)}" for note in table.notes)
     yield r"\end{table}"
 

@@ -24,18 +24,17 @@ from scenegen.command_line.options import (
     SCHEDULER,
     SEED,
     WORKERS,
-    Color,
     Names,
-    Numbers,
     Range,
     Reflectance,
     Size,
 )
 from scenegen.command_line.output import on_scheduler, print_line, progress_bar
 from scenegen.command_line.paths import InputPath, NewHdf5
+from scenegen.command_line.settings import setting_options
 
 if TYPE_CHECKING:
-    from scenegen.description.specs import DatasetSpec
+    from scenegen.description.specs import Request
 
 NOISY_SPP = 256  # samples per pixel of pictures that are not denoised
 
@@ -58,63 +57,18 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
               help="Settings to start from, as `scenegen presets` lists them.")
 @SEED
 @click.option("--size", type=Size(), help="Image size in pixels [128].")
-@click.option("--objects", type=Range(int), help="Number of objects in a scene [1-3].")
 @click.option("--shapes", type=Names(), help="Basic shapes to draw from, such as box,sphere [all].")
 @click.option("--classes", type=Names(), help="Object classes to draw from, such as mug,bowl.")
 @click.option("--object-split", type=click.Choice(["all", "train", "val", "test"]),
               help="Which models of a class to draw from [all].")
 @MESHES
-@click.option("--object-radius", type=Range(float),
-              help="Bounding radius of objects in scene units; with several views the default is a"
-              " quarter smaller [0.11-0.22].")
-@click.option("--pose", type=click.Choice(["resting", "any"]),
-              help="Whether objects lie as they would stay, or are turned at random [resting].")
-@click.option("--views", type=Numbers(),
-              help="Views of each scene, in degrees about the vertical axis from the first view,"
-              " such as 0,5,35,55,80 [0].")
-@click.option("--min-visible-pixels", type=int,
-              help="Fewest pixels that show an object, in every view [0.3%].")
-@click.option("--allow-cropped", is_flag=True, default=None,
-              help="Let the image's border cut objects.")
 @click.option("--reflectance", type=Reflectance(),
-              help="Reflectance of objects; also of the room, without --room-reflectance [0.8];"
-              " with own, meshes from a folder keep their colours, times 0.8.")
-@click.option("--room-reflectance", type=Color(), help="Reflectance of floor and walls.")
-@click.option("--random-reflectance/--same-reflectance", default=None,
-              help="Whether each object gets a random colour or all the same [same].")
-@click.option("--specular", type=Range(float), help="Phong's coefficient k_s of objects [0].")
-@click.option("--shininess", type=Range(float), help="Phong's exponent of objects [1].")
-@click.option("--lights", type=Range(int), help="Number of lights in a scene [1-3].")
-@click.option("--light-saturation", type=float,
-              help="How coloured lights are, from 0 (white) to 1 [0.7].")
-@click.option("--light-level", type=float,
-              help="Radiance of a white surface at the target that faces all lights [0.95].")
-@click.option("--light-radius", type=float,
-              help="Distance of lights from the target, scene units [2.5].")
-@click.option("--ambient", type=Color(), help="Ambient light L_a [0.1].")
-@click.option("--attenuation", type=Numbers(),
-              help="k_l,k_q: how light falls off with distance and its square [0.5,0.5].")
-@click.option("--shading", type=click.Choice(["paper", "path"]),
-              help="The paper's shading equation, or path tracing, with shadows and indirect light;"
-              " slower [paper].")
-@click.option("--shadows/--no-shadows", default=None, help="Whether objects cast shadows [no].")
-@click.option("--spp", type=int,
-              help="Colour samples per pixel; with --shading path, 64 by default [1].")
+              help="Reflectance of objects; also of the room, without --room-reflectance. With own,"
+              " meshes from a folder keep their colours, times 0.8 [0.8].")
 @click.option("--fov", type=Range(float),
               help="Field of view of a square image, degrees; each scene draws its own from a range"
               " such as 20-60 [28].")
-@click.option("--camera-radius", type=float,
-              help="Distance of cameras from the target, scene units [1.5].")
-@click.option("--with", "truth", type=Names(),
-              help="More truth to store: some of amodal,coordinates,flow,albedo. That is masks of"
-              " whole objects and their visible fractions, object coordinates (NOCS), optical flow"
-              " to the next view with occlusion, reflectance of each pixel.")
-@click.option("--hours", type=Range(float),
-              help="Hours of the day of interiors; it is night after 18 [7-21].")
-@click.option("--denoise/--no-denoise", default=None,
-              help="Whether pictures of interiors are denoised [if the extra `denoise` is there].")
-@click.option("--sensor-noise", type=float,
-              help="Noise of the camera of interiors, as a share of white [0].")
+@setting_options()
 @ASSETS
 @IMAGE_DTYPE
 @COMPRESSION
@@ -209,9 +163,7 @@ def render(
 
 
 # fmt: on
-def _with_assets(
-    spec: "DatasetSpec", materials: str | None, environment: str | None
-) -> "DatasetSpec":
+def _with_assets(spec: "Request", materials: str | None, environment: str | None) -> "Request":
     """Return a spec with materials and surroundings of others, where they are told.
 
     Raises as `assets.use_assets`, and SpecError where other rooms than interiors should have them.
@@ -227,17 +179,16 @@ def _with_assets(
     return replace(spec, **settings)
 
 
-def _with_denoiser(
-    spec: "DatasetSpec", chosen: Mapping[str, Any]
-) -> "tuple[DatasetSpec, list[str]]":
+def _with_denoiser(spec: "Request", chosen: Mapping[str, Any]) -> "tuple[Request, list[str]]":
     """Return a spec with a denoiser, or with as many samples as do without, unless that is told.
 
     The lines say that there is no denoiser, where it is missed. Raises BackendError where no
     denoiser is installed, and one is asked for.
     """
+    from scenegen.description.specs import InteriorSpec
     from scenegen.rendering.pictures.denoiser import check_denoiser, has_denoiser
 
-    if not spec.interior:
+    if not isinstance(spec, InteriorSpec):
         return spec, []
     if spec.denoise:
         check_denoiser()
@@ -249,7 +200,7 @@ def _with_denoiser(
     return replace(spec, spp=NOISY_SPP), [] if has_denoiser() else [text]
 
 
-def _crowded(spec: "DatasetSpec") -> list[str]:
+def _crowded(spec: "Request") -> list[str]:
     """Return a line that says so where few rooms have room for what is asked for."""
     from scenegen.sampling.interiors.rooms import CROWDED
 

@@ -22,7 +22,7 @@ from scenegen.command_line.paths import (
 )
 
 if TYPE_CHECKING:
-    from scenegen.description.specs import DatasetSpec
+    from scenegen.description.specs import Request
 
 SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 NEEDED = 'pip install "pix2shape-bench[denoise]", or use --items 0: nothing is rendered again'
@@ -120,23 +120,25 @@ def verify(
             if not rooms.has_truth:
                 checks += verify_withheld(rooms, bar.update)
                 continue
-            if items and rooms.spec.interior:
-                _check_pictures(path, rooms.spec)
+            if items:
+                _check_images(path, rooms.spec)
             how = (items, device, file_objects(rooms.spec, **meshes), bar.update)
             checks += verify_set(rooms, manifest, *how) if manifest else verify_file(rooms, *how)
     ctx.exit(print_checks(file, checks))
 
 
-def _check_pictures(path: Path, spec: "DatasetSpec") -> None:
-    """Raise SceneGenError or OSError where pictures of interiors cannot be made again here."""
+def _check_images(path: Path, spec: "Request") -> None:
+    """Raise SceneGenError or OSError where images of interiors cannot be made again here."""
     from scenegen.common.errors import BackendError
+    from scenegen.description.specs import InteriorSpec
     from scenegen.rendering.pictures.assets import environment_of, materials_of
     from scenegen.rendering.pictures.denoiser import has_denoiser
 
-    if spec.denoise and not has_denoiser():
-        raise BackendError(f"{path}: pictures", "denoised, and no denoiser here", hint=NEEDED)
-    materials_of(spec)
-    environment_of(spec)
+    if isinstance(spec, InteriorSpec):
+        if spec.denoise and not has_denoiser():
+            raise BackendError(f"{path}: images", "denoised, and no denoiser here", hint=NEEDED)
+        materials_of(spec)
+        environment_of(spec)
 
 
 @click.command(

@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from scenegen.common.errors import SpecError
 
 T = TypeVar("T")
+Vector3 = tuple[float, float, float]
 LARGEST = 1e9  # no length, colour or angle is larger; keeps later arithmetic from overflowing
 LONGEST_JSON = 4_000_000  # characters; a request with 4,000 class names or 64 views is far shorter
 # What holds for every part of a record, by the part's type in pydantic's core schema.

@@ -6,9 +6,8 @@ the box from the origin to `Interior.size`.
 
 from dataclasses import dataclass
 
-from scenegen.camera import Vector3
 from scenegen.common.names import check_choice
-from scenegen.common.records import check
+from scenegen.common.records import Vector3, check
 
 WALLS = ("west", "east", "north", "south")  # x = 0, x = size[0], z = 0, z = size[2]
 OPENINGS = ("window", "door")

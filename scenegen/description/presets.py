@@ -1,12 +1,12 @@
-"""The paper's data sets, as settings of `DatasetSpec`; `scenegen presets` lists them."""
+"""The paper's data sets and interiors, as settings; `scenegen presets` lists them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from scenegen.common.names import check_choice
 from scenegen.common.records import check
-from scenegen.description.scenes import FAMILY_NAMES, FURNITURE_NAMES
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.names import FAMILY_NAMES, FURNITURE_NAMES
+from scenegen.description.specs import DatasetSpec, InteriorSpec, Request
 
 VESSELS = ("bag", "bottle", "bowl", "can", "cap", "lamp", "mug")
 HOUSEHOLD = {"source": "families", "shapes": VESSELS}
@@ -21,6 +21,7 @@ class Preset:
 
     meaning: str
     settings: dict[str, Any]
+    kind: type[Request] = DatasetSpec
 
 
 PRESETS = {
@@ -58,23 +59,22 @@ PRESETS = {
     "interiors": Preset(
         "closed rooms with furniture in metres, path-traced with textures",
         {
-            "interior": True,
             "source": "families",
             "shapes": FAMILY_NAMES + FURNITURE_NAMES,
             "objects": (12, 60),
-            "shading": "path",
             "spp": 8,
             "fov_degrees": 45.0,
             "fov_spread_degrees": 30.0,
             "height": 256,
             "width": 256,
         },
+        InteriorSpec,
     ),
     "views": Preset("basic shapes seen from 0, 5, 35, 55 and 80 degrees", {"views": PAPER_VIEWS}),
 }
 
 
-def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
+def preset_spec(preset: str, **settings: Any) -> Request:
     """Return the request of a preset, with `settings` in place of the preset's own.
 
     Some settings that are not given follow from others: `object_radius` is smaller by VIEWS_SHRINK
@@ -85,9 +85,11 @@ def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
     one another.
     """
     check_choice("preset", preset, PRESETS)
-    chosen = {**PRESETS[preset].settings, **settings}
-    interior = chosen.get("interior", False)
-    if len(chosen.get("views", ())) > 1 and not interior and "object_radius" not in settings:
+    kind = PRESETS[preset].kind
+    chosen = {**PRESETS[preset].settings, **_of_kind(kind, settings)}
+    if kind is InteriorSpec:
+        return InteriorSpec(**chosen)
+    if len(chosen.get("views", ())) > 1 and "object_radius" not in settings:
         low, high = chosen.get("object_radius", DatasetSpec.object_radius)
         chosen["object_radius"] = (VIEWS_SHRINK * low, VIEWS_SHRINK * high)
     path = chosen.get("shading") == "path"
@@ -99,3 +101,16 @@ def preset_spec(preset: str, **settings: Any) -> DatasetSpec:
     if "reflectance" in settings:
         chosen.setdefault("room_reflectance", settings["reflectance"])
     return DatasetSpec(**chosen)
+
+
+def _of_kind(kind: type[Request], settings: dict[str, Any]) -> dict[str, Any]:
+    """Return the settings without those of the other kind of rooms, which keep their defaults."""
+    other = {DatasetSpec: InteriorSpec, InteriorSpec: DatasetSpec}[kind]
+    names = {row.name for row in fields(kind)}
+    for row in fields(other):
+        if row.name in settings and row.name not in names:
+            # A class attribute, such as the shading of interiors, stands for what is always so.
+            usual, value = getattr(kind, row.name, row.default), settings[row.name]
+            which = "interiors" if kind is InteriorSpec else "a preset other than interiors"
+            check(value == usual, row.name.replace("_", " "), f"{value} with {which}", "none")
+    return {name: value for name, value in settings.items() if name in names}

@@ -5,17 +5,10 @@ Lengths are in scene units (the room's edge; metres in closed rooms), frames as 
 
 from dataclasses import dataclass
 
-from scenegen.camera import Camera, Vector3
-from scenegen.common.records import check, from_json, to_json
+from scenegen.camera import Camera
+from scenegen.common.records import Vector3, check, from_json, to_json
 from scenegen.description.interiors import Interior
-from scenegen.description.shapes import SHAPE_NAMES
-
-FAMILY_NAMES = ("bag", "bottle", "bowl", "can", "cap", "chair", "lamp", "mug", "table")
-FURNITURE_NAMES = (  # families that came with closed rooms
-    "armchair", "basket", "bed", "book", "books", "box", "cabinet", "clock", "coffee_table", "cup",
-    "curtain", "cushion", "desk", "floor_lamp", "nightstand", "pendant", "picture", "plant",
-    "plate", "rug", "screen", "shelf", "sofa", "stool", "tall_plant", "vase",
-)  # fmt: skip
+from scenegen.description.names import SHAPE_NAMES
 
 
 @dataclass(frozen=True)

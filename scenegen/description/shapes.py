@@ -57,5 +57,3 @@ BASIC_SHAPES = (
     BasicShape("dodecahedron", "regular", (15 + 7 * 5**0.5) / 4 * _DODECAHEDRON**3),
     BasicShape("icosahedron", "regular", 5 * (3 + 5**0.5) / 12 * _ICOSAHEDRON**3),
 )  # fmt: skip
-SHAPE_NAMES = tuple(shape.name for shape in BASIC_SHAPES)
-DRAWN_SHAPES = tuple(shape.name for shape in BASIC_SHAPES if shape.drawn)

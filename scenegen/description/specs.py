@@ -1,21 +1,32 @@
 """The request for a data set, as JSON and back. `SceneSpec` describes one scene of it.
 
-Lengths are in scene units (the room's edge), frames as in `camera.py`.
+`DatasetSpec` asks for the paper's rooms, and `InteriorSpec` for closed rooms with furniture. Each
+setting stands once: it is a field, whose metadata has its limits and its text for `--help`. Lengths
+are in scene units (the room's edge; metres in closed rooms), frames as in `camera.py`.
 """
 
 import itertools
+import json
 import math
-from dataclasses import dataclass, fields
-from typing import Any
+from contextlib import suppress
+from dataclasses import Field, dataclass, field, fields
+from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
-import numpy as np
-from numpy.typing import NDArray
-
-from scenegen.camera import Camera, Vector3
 from scenegen.common.names import check_choice
-from scenegen.common.records import check, check_range, from_json, normalise, to_json
-from scenegen.description.scenes import FAMILY_NAMES, FURNITURE_NAMES
-from scenegen.description.shapes import DRAWN_SHAPES, SHAPE_NAMES
+from scenegen.common.records import (
+    LONGEST_JSON,
+    Vector3,
+    check,
+    check_range,
+    from_json,
+    normalise,
+    to_json,
+)
+from scenegen.description.names import DRAWN_SHAPES, FAMILY_NAMES, FURNITURE_NAMES, SHAPE_NAMES
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 IMAGE_DTYPES = ("uint8", "float16", "float32")
 BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES + FURNITURE_NAMES}
@@ -30,52 +41,37 @@ LEAST_SEEN = 4  # objects of a closed room that show `min_visible_pixels`, in ev
 VISIBLE_SHARE = 0.003  # least share of the pixels of an image that show an object, by default
 FROM_SIZE = -(2**62)  # stands for the number that follows from the size of the image
 MOST_TURN = 80.0  # degrees between two views; at 90 all input views would be the same
-LIMITS: dict[str, tuple[float, float]] = {  # of settings that are a number or a range of numbers
-    "spp": (1, 1024),
-    "objects": (0, 100),  # object ids are stored as int8
-    "object_radius": (0.005, 0.5),
-    "specular": (0.0, 10.0),
-    "shininess": (1.0, 10_000.0),
-    "lights": (0, MAX_LIGHTS),
-    "light_level": (0.0, 100.0),
-    "light_saturation": (0.0, 1.0),
-    "hours": (0.0, 24.0),
-    "sensor_noise": (0.0, 1.0),
-}
-# Cameras look at something, and the shell is cast as one more object.
-INTERIOR_LIMITS = {**LIMITS, "objects": (1, 99)}
-# Settings of the paper's room, which closed rooms do not have.
-PAPER_ONLY = (
-    "object_radius", "pose", "lights", "shadows", "allow_cropped", "camera_radius",
-    "camera_target", "light_radius", "light_level", "ambient", "attenuation", "light_saturation",
-    "reflectance", "room_reflectance", "random_reflectance", "specular", "shininess",
-    "own_reflectance",
-)  # fmt: skip
-INTERIOR_ONLY = ("hours", "denoise", "sensor_noise", "materials", "environment")
 FOV = (1.0, 120.0)  # degrees
-LATER: dict[str, object] = {
-    "truth": (),
-    "own_reflectance": False,
-    "fov_spread_degrees": 0.0,
-    "interior": False,
-    "hours": (7.0, 21.0),
-    "denoise": False,
-    "sensor_noise": 0.0,
-    "materials": "",
-    "environment": "",
-}  # fields that came after 1.0, with their defaults
-CHOICES = {
-    "image_dtype": IMAGE_DTYPES,
-    "shading": ("paper", "path"),
-    "pose": ("resting", "any"),
-    "source": (*BUILT_IN, *FOLDERS),
-    "object_split": SPLITS,
-}
+
+
+def setting(
+    default: Any,
+    text: str = "",
+    *,
+    limits: tuple[float, float] | None = None,
+    choices: tuple[str, ...] | None = None,
+    later: bool = False,
+    option: str = "",
+    shown: str = "",
+) -> Any:
+    """Return a field of a request.
+
+    Args:
+        text: what the help of `scenegen render` says; empty for what no option of its own sets.
+        limits: least and largest number; of a range, of both its ends.
+        choices: all values.
+        later: whether the setting came after version 1.0 of the format. Requests that leave it at
+            its default then have the JSON, and so the fingerprint, that they had without it.
+        option: name of the option, where it is not the setting's; `--on/--off` for yes and no.
+        shown: the default as the help shows it, where it is not the field's.
+    """
+    metadata = {"text": text, "limits": limits, "choices": choices, "later": later}
+    return field(default=default, metadata={**metadata, "option": option, "shown": shown})
 
 
 @dataclass(frozen=True)
-class DatasetSpec:
-    """What a file of rooms should hold; item i depends on this and on i alone.
+class RoomSpec:
+    """What `DatasetSpec` and `InteriorSpec` share. Item i depends on the request and on i alone.
 
     Attributes:
         seed: dataset seed, 0 to 2**63 - 1.
@@ -87,20 +83,100 @@ class DatasetSpec:
         shapes: names to draw from, each with the same probability: basic shapes, or classes.
         object_split: which objects of a class are drawn from (see `meshes.listing.object_split`).
         listing: digest of the names of a folder's models; empty for what is built in.
-        object_radius: smallest and largest bounding radius of an object, scene units.
-        pose: "resting" puts every object down in a position where it would stay; "any" turns it
-            uniformly on SO(3) and lowers it until it touches the floor.
-        lights: fewest and most point lights.
         views: degrees about the vertical axis through the target, from the input view, which is
             the first, to each view of a scene; see `sampling.cameras`.
-        shading: "paper" for the paper's equation, "path" for a path tracer on the same scene.
-        shadows: whether lights are occluded (the paper's shading equation has no visibility term).
         spp: colour samples per pixel; 1 shades the ground-truth hit itself.
         image_dtype: "uint8" (linear radiance 0..1 as 0..255), "float16" or "float32" (radiance).
         min_visible_pixels: every object shows at least so many pixels in every view, in closed
             rooms LEAST_SEEN objects; by default VISIBLE_SHARE of the image's, at least 1.
-        allow_cropped: let the image's border cut objects (their centres stay in the image).
         fov_degrees: field of view of a square image; others have its diagonal.
+        fov_spread_degrees: how much wider than `fov_degrees` a scene's field of view can be; each
+            scene draws its own, uniformly.
+        truth: further truth of each row, some of TRUTHS (`rooms.truth`).
+    """
+
+    seed: int = setting(0)
+    height: int = setting(128)
+    width: int = setting(128)
+    objects: tuple[int, int] = setting(
+        # Object ids are stored as int8.
+        (1, 3), "Number of objects in a scene", limits=(0, 100)
+    )  # fmt: skip
+    source: str = setting("shapes", choices=(*BUILT_IN, *FOLDERS))
+    shapes: tuple[str, ...] = setting(DRAWN_SHAPES)
+    object_split: str = setting("all", choices=SPLITS)
+    listing: str = setting("")
+    views: tuple[float, ...] = setting(
+        (0.0,),
+        "Views of each scene, in degrees about the vertical axis from the first view, such as"
+        " 0,5,35,55,80",
+    )
+    spp: int = setting(
+        1, "Colour samples per pixel; with --shading path, 64 by default", limits=(1, 1024)
+    )
+    image_dtype: str = setting("uint8", choices=IMAGE_DTYPES)
+    min_visible_pixels: int = setting(
+        FROM_SIZE, "Fewest pixels that show an object, in every view", shown="0.3%"
+    )
+    fov_degrees: float = setting(28.0)
+    fov_spread_degrees: float = setting(0.0, later=True)
+    truth: tuple[str, ...] = setting(
+        (),
+        "More truth to store: some of amodal,coordinates,flow,albedo. That is masks of whole"
+        " objects and their visible fractions, object coordinates (NOCS), optical flow to the next"
+        " view with occlusion, reflectance of each pixel",
+        later=True, option="with", shown="none",
+    )  # fmt: skip
+
+    def __post_init__(self) -> None:
+        normalise(self)
+        if self.min_visible_pixels == FROM_SIZE:
+            least = max(1, round(VISIBLE_SHARE * self.height * self.width))
+            object.__setattr__(self, "min_visible_pixels", least)
+        check(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2**63 - 1")
+        for row in fields(self):
+            _check_limits(row, getattr(self, row.name))
+        _check_image(self)
+        _check_objects(self)
+        _check_views(self)
+        _check_truth(self)
+
+    @property
+    def object_slots(self) -> int:
+        """Length of the object axis of every array; at least 1, which HDF5 needs."""
+        return max(1, self.objects[1])
+
+    @property
+    def fov_y_degrees(self) -> float:
+        """Vertical field of view; the diagonal is that of a square image with `fov_degrees`.
+
+        Raises SpecError where scenes have different ones.
+        """
+        from scenegen.camera import Camera
+
+        widest = self.fov_degrees + self.fov_spread_degrees
+        scenes = f"scenes of {self.fov_degrees:g} to {widest:g} degrees"
+        check(widest == self.fov_degrees, "fov", scenes, "one field of view for all scenes")
+        return Camera.fov_y_from_square(self.fov_degrees, self.height, self.width)
+
+    def _json(self, more: dict[str, Any]) -> str:
+        later = {row.name: row.default for row in fields(self) if row.metadata["later"]}
+        kept = {name: value for name, value in vars(self).items() if later.get(name, ...) != value}
+        return to_json({**more, **kept}, sort_keys=True)
+
+
+@dataclass(frozen=True)
+class DatasetSpec(RoomSpec):
+    """A request for the paper's rooms: a floor and two walls, with objects on the floor.
+
+    Attributes:
+        object_radius: smallest and largest bounding radius of an object, scene units.
+        pose: "resting" puts every object down in a position where it would stay; "any" turns it
+            uniformly on SO(3) and lowers it until it touches the floor.
+        lights: fewest and most point lights.
+        shading: "paper" for the paper's equation, "path" for a path tracer on the same scene.
+        shadows: whether lights are occluded (the paper's shading equation has no visibility term).
+        allow_cropped: let the image's border cut objects (their centres stay in the image).
         camera_radius: distance from camera to target, scene units.
         camera_target: the fixed point of the room that cameras look at, world.
         light_radius: distance from the target to each light, scene units.
@@ -111,137 +187,203 @@ class DatasetSpec:
         reflectance, room_reflectance: the RGB of rho, of objects and of the room.
         random_reflectance: draw every object's instead, from 0.15 to 0.95 each.
         specular, shininess: ranges of Phong's k_s and exponent of objects; the room is matte.
-        truth: further truth of each row, some of TRUTHS (`rooms.truth`).
         own_reflectance: multiply the reflectance of objects by the colours of their files; the
             truth then has "albedo", as no other column tells it.
-        fov_spread_degrees: how much wider than `fov_degrees` a scene's field of view can be; each
-            scene draws its own, uniformly.
-        interior: closed rooms with furniture, in metres (`description.interiors`), instead of the
-            paper's floor and two walls. The settings of PAPER_ONLY are then unused.
-        hours: earliest and latest hour of the day; each scene draws its own, uniformly.
-        denoise: whether pictures are denoised.
-        sensor_noise: standard deviation of noise that is added to pictures, as a share of white.
-        materials: digest of a folder of materials; empty for those that are drawn.
-        environment: digest of a picture of the surroundings; empty for sun and sky.
+
+    The other settings are those of `RoomSpec`.
     """
 
-    seed: int = 0
-    height: int = 128
-    width: int = 128
-    objects: tuple[int, int] = (1, 3)
-    source: str = "shapes"
-    shapes: tuple[str, ...] = DRAWN_SHAPES
-    object_split: str = "all"
-    listing: str = ""
-    object_radius: tuple[float, float] = (0.11, 0.22)
-    pose: str = "resting"
-    lights: tuple[int, int] = (1, 3)
-    views: tuple[float, ...] = (0.0,)
-    shading: str = "paper"
-    shadows: bool = False
-    spp: int = 1
-    image_dtype: str = "uint8"
-    min_visible_pixels: int = FROM_SIZE
-    allow_cropped: bool = False
-    fov_degrees: float = 28.0
-    camera_radius: float = 1.5
-    camera_target: Vector3 = (0.3, 0.3, 0.3)
-    light_radius: float = 2.5
-    light_level: float = 0.95
-    ambient: Vector3 = (0.1, 0.1, 0.1)
-    attenuation: tuple[float, float] = (0.5, 0.5)
-    light_saturation: float = 0.7
-    reflectance: Vector3 = (0.8, 0.8, 0.8)
-    room_reflectance: Vector3 = (0.8, 0.8, 0.8)
-    random_reflectance: bool = False
-    specular: tuple[float, float] = (0.0, 0.0)
-    shininess: tuple[float, float] = (1.0, 1.0)
-    truth: tuple[str, ...] = ()
-    own_reflectance: bool = False
-    fov_spread_degrees: float = 0.0
-    interior: bool = False
-    hours: tuple[float, float] = (7.0, 21.0)
-    denoise: bool = False
-    sensor_noise: float = 0.0
-    materials: str = ""
-    environment: str = ""
+    interior: ClassVar[bool] = False
+
+    object_radius: tuple[float, float] = setting(
+        (0.11, 0.22),
+        "Bounding radius of objects in scene units; with several views the default is a quarter"
+        " smaller",
+        limits=(0.005, 0.5),
+    )
+    pose: str = setting(
+        "resting",
+        "Whether objects lie as they would stay, or are turned at random",
+        choices=("resting", "any"),
+    )
+    lights: tuple[int, int] = setting((1, 3), "Number of lights in a scene", limits=(0, MAX_LIGHTS))
+    shading: str = setting(
+        "paper",
+        "The paper's shading equation, or path tracing, with shadows and indirect light; slower",
+        choices=("paper", "path"),
+    )
+    shadows: bool = setting(False, "Whether objects cast shadows", option="shadows/--no-shadows")
+    allow_cropped: bool = setting(False, "Let the image's border cut objects")
+    camera_radius: float = setting(1.5, "Distance of cameras from the target, scene units")
+    camera_target: Vector3 = setting((0.3, 0.3, 0.3))
+    light_radius: float = setting(2.5, "Distance of lights from the target, scene units")
+    light_level: float = setting(
+        0.95,
+        "Radiance of a white surface at the target that faces all lights",
+        limits=(0.0, 100.0),
+    )
+    ambient: Vector3 = setting((0.1, 0.1, 0.1), "Ambient light L_a")
+    attenuation: tuple[float, float] = setting(
+        (0.5, 0.5),
+        "k_l,k_q: how light falls off with distance and its square",
+        shown="0.5,0.5",
+    )
+    light_saturation: float = setting(
+        0.7, "How coloured lights are, from 0 (white) to 1", limits=(0.0, 1.0)
+    )
+    reflectance: Vector3 = setting((0.8, 0.8, 0.8))
+    room_reflectance: Vector3 = setting((0.8, 0.8, 0.8), "Reflectance of floor and walls")
+    random_reflectance: bool = setting(
+        False,
+        "Whether each object gets a random colour or all the same",
+        option="random-reflectance/--same-reflectance",
+    )
+    specular: tuple[float, float] = setting(
+        (0.0, 0.0), "Phong's coefficient k_s of objects", limits=(0.0, 10.0)
+    )
+    shininess: tuple[float, float] = setting(
+        (1.0, 1.0), "Phong's exponent of objects", limits=(1.0, 10_000.0)
+    )
+    own_reflectance: bool = setting(False, later=True)
 
     def __post_init__(self) -> None:
-        normalise(self)
-        if self.min_visible_pixels == FROM_SIZE:
-            least = max(1, round(VISIBLE_SHARE * self.height * self.width))
-            object.__setattr__(self, "min_visible_pixels", least)
-        check(0 <= self.seed < 2**63, "seed", self.seed, "a whole number from 0 to 2**63 - 1")
-        _check_limits(self)
-        _check_image(self)
-        _check_objects(self)
+        super().__post_init__()
+        for name in ("ambient", "reflectance", "room_reflectance"):
+            color = getattr(self, name)
+            ok = len(color) == 3 and all(0.0 <= c <= 1.0 for c in color)
+            check(ok, name.replace("_", " "), color, "channels from 0 to 1")
+        allowed = "one of the two: a path tracer always casts shadows"
+        both = self.shadows and self.shading == "path"
+        check(not both, "shadows", "with shading 'path'", allowed)
         _check_places(self)
-        _check_truth(self)
-        _check_interior(self)
-
-    @property
-    def object_slots(self) -> int:
-        """Length of the object axis of every array; at least 1, which HDF5 needs."""
-        return max(1, self.objects[1])
-
-    def seen_enough(self, visible: NDArray[Any], count: NDArray[Any]) -> NDArray[Any]:
-        """Return whether images show enough of their objects, (B,).
-
-        Args:
-            visible: pixels of each object, (B, K).
-            count: of objects of each image, (B,).
-        """
-        seen = (visible >= self.min_visible_pixels) & (np.arange(visible.shape[1]) < count[:, None])
-        least = np.minimum(count, LEAST_SEEN) if self.interior else count
-        return np.asarray(seen.sum(axis=1) >= least)
+        _check_own_reflectance(self)
 
     @property
     def light_slots(self) -> int:
         """Length of the light axis of every array; at least 1, which HDF5 needs."""
         return max(1, self.lights[1])
 
-    @property
-    def fov_y_degrees(self) -> float:
-        """Vertical field of view; the diagonal is that of a square image with `fov_degrees`.
+    def seen_enough(self, visible: "NDArray[Any]", count: "NDArray[Any]") -> "NDArray[np.bool_]":
+        """Return whether images show enough of their objects, (B,): all of them.
 
-        Raises SpecError where scenes have different ones.
+        Args:
+            visible: pixels of each object, (B, K).
+            count: of objects of each image, (B,).
         """
-        widest = self.fov_degrees + self.fov_spread_degrees
-        found = f"scenes of {self.fov_degrees:g} to {widest:g} degrees"
-        check(widest == self.fov_degrees, "fov", found, "one field of view for all scenes")
-        return Camera.fov_y_from_square(self.fov_degrees, self.height, self.width)
+        return _seen(visible, count, self.min_visible_pixels) >= count
+
+    def to_json(self) -> str:
+        """Return the request as one line of JSON with sorted keys."""
+        return self._json({})
+
+
+@dataclass(frozen=True)
+class InteriorSpec(RoomSpec):
+    """A request for closed rooms with furniture, in metres (`description.interiors`).
+
+    Attributes:
+        hours: earliest and latest hour of the day; each scene draws its own, uniformly.
+        denoise: whether images are denoised.
+        sensor_noise: standard deviation of noise that is added to images, as a share of white.
+        materials: digest of a folder of materials; empty for those that are drawn.
+        environment: digest of an image of the surroundings; empty for sun and sky.
+
+    The other settings are those of `RoomSpec`. Class attributes answer for settings of
+    `DatasetSpec` that the renderer asks for.
+    """
+
+    interior: ClassVar[bool] = True
+    shading: ClassVar[str] = "path"
+    shadows: ClassVar[bool] = False
+    own_reflectance: ClassVar[bool] = False
+    specular: ClassVar[tuple[float, float]] = (0.0, 0.0)
+    shininess: ClassVar[tuple[float, float]] = (1.0, 1.0)
+    lights: ClassVar[tuple[int, int]] = (1, 3)  # unused slots, which files of 1.0 have
+    light_slots: ClassVar[int] = 3
+
+    objects: tuple[int, int] = setting(
+        # Cameras look at something, and the shell is cast as one more object.
+        (1, 3), limits=(1, 99)
+    )  # fmt: skip
+    hours: tuple[float, float] = setting(
+        (7.0, 21.0),
+        "Hours of the day of interiors; it is night after 18",
+        limits=(0.0, 24.0),
+        later=True,
+    )
+    denoise: bool = setting(
+        False,
+        "Whether images of interiors are denoised",
+        later=True, option="denoise/--no-denoise", shown="if the extra `denoise` is there",
+    )  # fmt: skip
+    sensor_noise: float = setting(
+        0.0,
+        "Noise of the camera of interiors, as a share of white",
+        limits=(0.0, 1.0),
+        later=True,
+    )
+    materials: str = setting("", later=True)
+    environment: str = setting("", later=True)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        classes = "none: interiors are furnished with classes (--classes)"
+        check(self.source != "shapes", "shapes", "given with interiors", classes)
+
+    def seen_enough(self, visible: "NDArray[Any]", count: "NDArray[Any]") -> "NDArray[np.bool_]":
+        """Return whether images show LEAST_SEEN of their objects, or all; as in `DatasetSpec`."""
+        return _seen(visible, count, self.min_visible_pixels) >= count.clip(max=LEAST_SEEN)
 
     def to_json(self) -> str:
         """Return the request as one line of JSON with sorted keys.
 
-        Fields that came after version 1.0 of the format are left out where they have their default.
+        Files of 1.0 name the settings of the paper's rooms too, at their defaults.
         """
-        later = {name: value for name, value in LATER.items() if getattr(self, name) == value}
-        return to_json({k: v for k, v in vars(self).items() if k not in later}, sort_keys=True)
-
-    @classmethod
-    def from_json(cls, text: str) -> "DatasetSpec":
-        """Read what `to_json` wrote. Raises SpecError on anything else."""
-        return from_json(cls, text, "dataset spec")
+        return self._json({**_PAPER_ONLY, "shading": self.shading, "interior": True})
 
 
-def _check_limits(spec: DatasetSpec) -> None:
-    """Check each setting by itself, where two numbers or a few words limit it."""
-    for name, (low, high) in (INTERIOR_LIMITS if spec.interior else LIMITS).items():
-        value, shown = getattr(spec, name), name.removesuffix("_degrees").replace("_", " ")
-        if isinstance(value, tuple):
-            check_range(shown, value, low, high)
-        else:
-            check(low <= value <= high, shown, value, f"from {low:g} to {high:g}")
-    for name, choices in CHOICES.items():
-        check_choice(name.replace("_", " "), getattr(spec, name), choices)
-    for name in ("ambient", "reflectance", "room_reflectance"):
-        color = getattr(spec, name)
-        ok = len(color) == 3 and all(0.0 <= c <= 1.0 for c in color)
-        check(ok, name.replace("_", " "), color, "channels from 0 to 1")
+Request: TypeAlias = DatasetSpec | InteriorSpec
+_SHARED = {row.name for row in fields(RoomSpec)}
+_PAPER_ONLY = {  # settings of 1.0 that mean nothing in closed rooms
+    row.name: row.default
+    for row in fields(DatasetSpec)
+    if row.name not in _SHARED and not row.metadata["later"]
+}
 
 
-def _check_image(spec: DatasetSpec) -> None:
+def request_from_json(text: str) -> Request:
+    """Read what `to_json` of either request wrote. Raises SpecError on anything else."""
+    if '"interior"' in text and len(text) <= LONGEST_JSON:
+        with suppress(ValueError, RecursionError):  # `from_json` tells what is wrong
+            settings = json.loads(text)
+            unused = json.loads(to_json({**_PAPER_ONLY, "shading": "path"}))
+            if isinstance(settings, dict) and settings.pop("interior", None) is True:
+                kept = {k: v for k, v in settings.items() if k not in unused or v != unused[k]}
+                return from_json(InteriorSpec, json.dumps(kept), "dataset spec")
+    return from_json(DatasetSpec, text, "dataset spec")
+
+
+def _seen(visible: "NDArray[Any]", count: "NDArray[Any]", least: int) -> "NDArray[np.int64]":
+    """Return how many objects of each image show so many pixels, (B,)."""
+    import numpy as np
+
+    slots = np.arange(visible.shape[1])
+    return np.asarray(((visible >= least) & (slots < count[:, None])).sum(axis=1))
+
+
+def _check_limits(row: "Field[Any]", value: Any) -> None:
+    """Check a setting by itself, where two numbers or a few words limit it."""
+    name, limits = row.name.replace("_", " "), row.metadata["limits"]
+    choices = row.metadata["choices"]
+    if choices:
+        check_choice(name, value, choices)
+    elif limits and isinstance(value, tuple):
+        check_range(name, value, *limits)
+    elif limits:
+        check(limits[0] <= value <= limits[1], name, value, "from {:g} to {:g}".format(*limits))
+
+
+def _check_image(spec: RoomSpec) -> None:
     check_range("fov", (spec.fov_degrees, spec.fov_degrees + spec.fov_spread_degrees), *FOV)
     sides, pixels = f"{spec.height}x{spec.width}", spec.height * spec.width
     check(min(spec.height, spec.width) >= 8, "size", sides, "at least 8 pixels a side")
@@ -249,12 +391,9 @@ def _check_image(spec: DatasetSpec) -> None:
     least = spec.min_visible_pixels
     expected = f"from 0 to the image's {pixels} pixels"
     check(0 <= least <= pixels, "min visible pixels", least, expected)
-    allowed = "one of the two: a path tracer always casts shadows"
-    both = spec.shadows and spec.shading == "path"
-    check(not both, "shadows", "with shading 'path'", allowed)
 
 
-def _check_objects(spec: DatasetSpec) -> None:
+def _check_objects(spec: RoomSpec) -> None:
     what = "shapes" if spec.source == "shapes" else "classes"
     names = BUILT_IN.get(spec.source)
     expected = f"some of {', '.join(names)}" if names else "names of classes"
@@ -279,14 +418,6 @@ def _check_places(spec: DatasetSpec) -> None:
     ):
         expected = f"from {corner:.3f} (just around the room) to {most:g} scene units"
         check(corner <= radius <= most, name, radius, expected)
-    views = spec.views
-    rising = all(a < b for a, b in itertools.pairwise(views))
-    check(
-        0 < len(views) <= MAX_VIEWS and views[0] == 0 and rising and views[-1] <= MOST_TURN,
-        "views",
-        ", ".join(f"{v:g}" for v in views) or "none",
-        f"rising degrees from 0, the input view, to at most {MOST_TURN:g}, such as 0,5,35,55,80",
-    )
     both = len(spec.attenuation) == 2 and all(0.0 <= k <= 100.0 for k in spec.attenuation)
     check(
         both and sum(spec.attenuation) >= 1e-6,
@@ -296,7 +427,18 @@ def _check_places(spec: DatasetSpec) -> None:
     )
 
 
-def _check_truth(spec: DatasetSpec) -> None:
+def _check_views(spec: RoomSpec) -> None:
+    views = spec.views
+    rising = all(a < b for a, b in itertools.pairwise(views))
+    check(
+        0 < len(views) <= MAX_VIEWS and views[0] == 0 and rising and views[-1] <= MOST_TURN,
+        "views",
+        ", ".join(f"{v:g}" for v in views) or "none",
+        f"rising degrees from 0, the input view, to at most {MOST_TURN:g}, such as 0,5,35,55,80",
+    )
+
+
+def _check_own_reflectance(spec: DatasetSpec) -> None:
     if spec.own_reflectance:
         where, meshes = "own reflectance", "meshes from a folder"
         check(spec.source in FOLDERS, where, spec.source, meshes)
@@ -304,22 +446,12 @@ def _check_truth(spec: DatasetSpec) -> None:
         both = "one of own and random reflectance"
         check(not spec.random_reflectance, where, "with random reflectance", both)
         object.__setattr__(spec, "truth", (*spec.truth, "albedo"))
+        _check_truth(spec)
+
+
+def _check_truth(spec: RoomSpec) -> None:
     wrong = [name for name in spec.truth if name not in TRUTHS]
     check(not wrong, "truth", ", ".join(wrong), f"some of {', '.join(TRUTHS)}")
     object.__setattr__(spec, "truth", tuple(name for name in TRUTHS if name in spec.truth))
     expected = "two views or more, such as --views 0,35"
     check("flow" not in spec.truth or len(spec.views) > 1, "flow", "one view", expected)
-
-
-def _check_interior(spec: DatasetSpec) -> None:
-    """Refuse settings of closed rooms elsewhere, and the paper's settings in closed rooms."""
-    defaults = {field.name: field.default for field in fields(DatasetSpec)}
-    foreign = PAPER_ONLY if spec.interior else INTERIOR_ONLY
-    for name in foreign:
-        where = "preset interiors" if spec.interior else "a preset other than interiors"
-        unused = getattr(spec, name) == defaults[name]
-        check(unused, name.replace("_", " "), f"{getattr(spec, name)} with {where}", "none")
-    if spec.interior:
-        check(spec.shading == "path", "shading", f"{spec.shading} with interiors", "path")
-        classes = "none: interiors are furnished with classes (--classes)"
-        check(spec.source != "shapes", "shapes", "given with interiors", classes)

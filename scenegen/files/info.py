@@ -1,6 +1,6 @@
 """What a file of rows holds, as lines of text: facts, settings, and a table of its columns."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from scenegen.common.records import changed_settings
@@ -16,16 +16,11 @@ def fact_lines(facts: Mapping[str, str], width: int = 15) -> list[str]:
     return [f"{name:{width}} {_shortened(text, LONGEST_FACT)}" for name, text in facts.items()]
 
 
-def setting_lines(spec: Any, unused: Collection[str] = ()) -> list[str]:
-    """Return a line for each setting, a star before those that differ from the default.
-
-    Settings that are `unused` are left out.
-    """
+def setting_lines(spec: Any) -> list[str]:
+    """Return a line for each setting, a star before those that differ from the default."""
     changed = changed_settings(spec)
     lines = ["spec (* differs from the default)"]
     for name, value in vars(spec).items():
-        if name in unused:
-            continue
         shown = ", ".join(map(str, value)) if isinstance(value, tuple) else value
         star = "*" if name in changed and value is not None else " "
         lines.append(f"{star} {name:24} {'not told' if value is None else shown}")

@@ -13,7 +13,7 @@ from functools import cache
 import numpy as np
 
 from scenegen.common.names import check_choice
-from scenegen.description.shapes import SHAPE_NAMES
+from scenegen.description.names import SHAPE_NAMES
 from scenegen.objects import teapot
 from scenegen.objects.basic_hulls import FILE, all_kept, kept
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded

@@ -6,9 +6,9 @@ from functools import lru_cache
 
 from scenegen.common.errors import SpecError
 from scenegen.common.recent import recent
+from scenegen.description.names import SHAPE_NAMES
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.shapes import SHAPE_NAMES
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families.members import MEMBERS, member_shape
@@ -40,7 +40,7 @@ class Objects:
     problems: dict[str, str] = field(default_factory=dict)
 
 
-def objects_of(spec: DatasetSpec) -> Objects:
+def objects_of(spec: Request) -> Objects:
     """Return the built-in objects of a data set.
 
     Raises:

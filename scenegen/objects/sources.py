@@ -10,7 +10,7 @@ from typing import Any
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check
 from scenegen.description.presets import PRESETS
-from scenegen.description.specs import BUILT_IN, DatasetSpec
+from scenegen.description.specs import BUILT_IN, Request
 from scenegen.objects.cache import default_cache_dir
 from scenegen.objects.catalogue import Objects, furnished_objects, mesh_objects, objects_of
 from scenegen.objects.families.store import MEMBER_STORE
@@ -139,8 +139,8 @@ def object_source(
         families = {} if classes is None else {"source": "families", "shapes": classes}
         return ObjectSource({**families, **split})
     shapenet, part = shapenet_root is not None, object_split or "all"
-    usual = PRESETS[preset].settings if preset in PRESETS else {}
-    wanted, interior = usual.get("shapes", ()), "interior" in usual
+    usual = PRESETS.get(preset, PRESETS["shapes"])
+    wanted, interior = usual.settings.get("shapes", ()), usual.kind.interior
     if interior:
         folder = _open_own(root, shapenet, classes, up, part)
         taken = folder.classes if classes else tuple(map(family_like, folder.classes))
@@ -172,7 +172,7 @@ def mesh_folder(shapenet_root: str | None, objects_root: str | None, up: str) ->
 
 
 def file_objects(
-    spec: DatasetSpec,
+    spec: Request,
     *,
     shapenet_root: str | None = None,
     objects_root: str | None = None,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
 from scenegen.common.rotations import product
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.exact_surfaces import Surface
 from scenegen.objects.solids import Mesh
@@ -155,7 +155,7 @@ def _converted(kind: Any, values: Any) -> Any:
     return kind(values)
 
 
-def padded_rays(spec: DatasetSpec) -> int:
+def padded_rays(spec: Request) -> int:
     """Return the number of rays of an image, padded to a multiple of LANES."""
     return -(-spec.height * spec.width // LANES) * LANES
 

@@ -18,7 +18,7 @@ from scenegen.common.records import check, to_json
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.solids import UnitShape
 
@@ -53,7 +53,7 @@ class SceneBatch:
             an image's bits must not depend on the rest of its batch.
     """
 
-    spec: DatasetSpec
+    spec: Request
     names: tuple[str, ...]
     shape_of: Callable[[str], UnitShape]
     index: Array
@@ -93,7 +93,7 @@ class SceneBatch:
 
 
 def pack(
-    spec: DatasetSpec,
+    spec: Request,
     scenes: Sequence[SceneSpec],
     views: Sequence[int] = (0,),
     objects: Objects | None = None,
@@ -117,7 +117,7 @@ def pack(
 
 
 def pack_arrays(
-    spec: DatasetSpec, scenes: SceneArrays, views: Sequence[int], objects: Objects | None = None
+    spec: Request, scenes: SceneArrays, views: Sequence[int], objects: Objects | None = None
 ) -> SceneBatch:
     """Pack all views of each scene into arrays, scene after scene; their numbers are `views`.
 
@@ -171,7 +171,7 @@ def pack_arrays(
     return batch if spec.source == "shapes" else batch.rows(0, len(batch))
 
 
-def _arrays(spec: DatasetSpec, scenes: Sequence[SceneSpec], views: Sequence[int]) -> SceneArrays:
+def _arrays(spec: Request, scenes: Sequence[SceneSpec], views: Sequence[int]) -> SceneArrays:
     """Return scenes as arrays, with these views alone."""
     shown = {item.shape for scene in scenes for item in scene.objects}
     names = spec.shapes if spec.source == "shapes" else tuple(sorted(shown))

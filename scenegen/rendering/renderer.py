@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.errors import BackendError
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.files.sets.workers import processors
 from scenegen.objects.catalogue import face_count
 from scenegen.objects.solids import UnitShape
@@ -66,13 +66,13 @@ def launch(batch: SceneBatch, device: str = "auto") -> Callable[[], GroundTruth]
     return lambda: GroundTruth(**fetch())
 
 
-def truth_fields(spec: DatasetSpec) -> list[str]:
+def truth_fields(spec: Request) -> list[str]:
     """Return the fields of `GroundTruth` that come from the ray through each pixel's centre."""
     own = ["albedo"] if spec.own_reflectance else []
     return ["depth", "normal", "object_id", *own]
 
 
-def picture_fields(spec: DatasetSpec) -> list[str]:
+def picture_fields(spec: Request) -> list[str]:
     """Return the other ones, which path tracing computes for pictures."""
     if not spec.interior:
         return ["image"]

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.objects.furniture.room_shell import shell_name
 from scenegen.rendering.packing import SceneBatch
 
@@ -44,7 +44,7 @@ def with_shells(batch: SceneBatch) -> SceneBatch:
     )
 
 
-def without_shells(pixels: dict[str, Array], spec: DatasetSpec) -> dict[str, Array]:
+def without_shells(pixels: dict[str, Array], spec: Request) -> dict[str, Array]:
     """Give the pixels that show a shell the room's id, 0."""
     if "object_id" in pixels:
         ids = pixels["object_id"]

@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 
 from scenegen.common.text_table import printable
-from scenegen.description.specs import INTERIOR_ONLY, PAPER_ONLY
 from scenegen.files.content import CONTENT_DIGEST
 from scenegen.files.info import column_lines, fact_lines, setting_lines, size_text
 from scenegen.files.verify import spread_rows
@@ -43,7 +42,7 @@ def describe(path: str | Path) -> str:
         ranges |= {} if shares is None else {"exposure": exposure_text(shares)}
         parts = (
             fact_lines(facts),
-            setting_lines(spec, PAPER_ONLY if spec.interior else INTERIOR_ONLY),
+            setting_lines(spec),
             [f"ranges over {len(sampled)} rows; shapes: {shapes}", *fact_lines(ranges)],
             column_lines(rooms),
         )

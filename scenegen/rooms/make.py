@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from scenegen.common.records import check
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.files.new_file import check_writable
 from scenegen.files.places import as_place
 from scenegen.files.row_file import writer_name
@@ -40,7 +40,7 @@ SHARD_SIZE = 10_000  # scenes
 
 def make_dataset(
     path: str | Path,
-    spec: DatasetSpec,
+    spec: Request,
     count: int,
     *,
     batch: int = DEFAULT_BATCH,
@@ -111,7 +111,7 @@ def check_batch(batch: int, size: Any, views: int = 1, images: int = 1) -> None:
 
 def rooms_plan(
     name: str,
-    spec: DatasetSpec,
+    spec: Request,
     count: int,
     renderer: Mapping[str, str],
     compression: str,
@@ -137,7 +137,7 @@ def rooms_plan(
     return Plan(FORMAT_NAME, spec.to_json(), settings, compression, [bundle])
 
 
-def rooms_part(spec: DatasetSpec, count: int, marks: tuple[Mark, ...] = ()) -> Part:
+def rooms_part(spec: Request, count: int, marks: tuple[Mark, ...] = ()) -> Part:
     """Return the rows of so many scenes."""
     return Part("", "", count, [Sheet(columns(spec))], marks, len(spec.views))
 

@@ -15,7 +15,7 @@ from scenegen.camera import back_project, transform_points
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import request_from_json
 from scenegen.files.attributes import read_root
 from scenegen.files.content import SHA256, joint_digest
 from scenegen.files.input_file import describing
@@ -119,7 +119,7 @@ class RoomsFile(RowFile):
         self.fingerprint = self.attributes["fingerprint"]
         self.stored_truth_digest = self.attributes[TRUTH_DIGEST]
         with describing(f"{self.path}: attribute 'spec'"):
-            self.spec = DatasetSpec.from_json(self.attributes["spec"])
+            self.spec = request_from_json(self.attributes["spec"])
         self.further = [c.name for name in self.spec.truth for c in FURTHER[name]]
         self.further += [c.name for c in INTERIOR if self.spec.interior]
         self._count_rows("image")

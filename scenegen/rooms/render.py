@@ -12,7 +12,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from scenegen.description.scene_arrays import SceneArrays
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.files.sets.plan import Block
 from scenegen.files.sets.sets import Packed
 from scenegen.files.sets.workers import in_threads
@@ -58,7 +58,7 @@ class RoomsWork:
         assets: places of materials and surroundings, as `pictures.places.Places.use` takes them.
     """
 
-    spec: DatasetSpec
+    spec: Request
     batch: int
     device: str
     objects: Objects
@@ -101,7 +101,7 @@ class RoomsWork:
 
 
 def render_items(
-    spec: DatasetSpec,
+    spec: Request,
     indices: Sequence[int],
     batch: int,
     device: str = "auto",

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import pixel_directions, transform_points, transform_vectors
 from scenegen.common.errors import FileFormatError, SceneGenError
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.files.rows import RowBlock
 from scenegen.objects.catalogue import Objects, changed_meshes
 from scenegen.rendering.ground_truth import visible_pixels
@@ -47,12 +47,12 @@ _FURTHER_RULES = {
 }
 
 
-def row_rules(spec: DatasetSpec) -> dict[str, str]:
+def row_rules(spec: Request) -> dict[str, str]:
     """Return what is checked of each row, by name of the check."""
     return {**_pixel_rules(spec), **{name: _FURTHER_RULES[name] for name in spec.truth}}
 
 
-def _pixel_rules(spec: DatasetSpec) -> dict[str, str]:
+def _pixel_rules(spec: Request) -> dict[str, str]:
     if spec.shading == "path":
         return {**_RULES, "image": "finite and not negative"}
     if spec.spp > 1 or spec.shadows:
@@ -167,7 +167,7 @@ def _rays(height: int, width: int, fov_y_degrees: float) -> Array:
     return np.asarray(rays / np.linalg.norm(rays, axis=-1, keepdims=True))
 
 
-def _object_problems(spec: DatasetSpec, room: Room, shown: Array) -> Iterable[str]:
+def _object_problems(spec: Request, room: Room, shown: Array) -> Iterable[str]:
     count = len(room.scene.objects)
     if room.object_id.min() < -1 or room.object_id.max() > count:
         yield f"object ids {room.object_id.min()} to {room.object_id.max()}, {count} objects"
@@ -179,9 +179,7 @@ def _object_problems(spec: DatasetSpec, room: Room, shown: Array) -> Iterable[st
         yield f"too few objects show {spec.min_visible_pixels} pixels"
 
 
-def _image_problems(
-    spec: DatasetSpec, room: Room, points: Array, batch: SceneBatch
-) -> Iterable[str]:
+def _image_problems(spec: Request, room: Room, points: Array, batch: SceneBatch) -> Iterable[str]:
     radiance = room.radiance
     if not np.isfinite(radiance).all() or (radiance < 0).any():
         yield "a value is negative or not finite"

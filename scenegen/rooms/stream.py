@@ -11,7 +11,7 @@ import numpy as np
 
 from scenegen.common.records import check
 from scenegen.description.presets import preset_spec
-from scenegen.description.specs import BUILT_IN, TRUTHS, DatasetSpec
+from scenegen.description.specs import BUILT_IN, TRUTHS, Request, RoomSpec
 from scenegen.files.schema import Column
 from scenegen.files.stream import (
     Columns,
@@ -49,7 +49,7 @@ class RoomStream(RowStream):
 
     def __init__(
         self,
-        preset_or_spec: "str | DatasetSpec | Mapping[str | DatasetSpec, float]",
+        preset_or_spec: "str | Request | Mapping[str | Request, float]",
         *,
         fields: Sequence[str] = ("image", "depth", "normal", "object_id"),
         batch: int = DEFAULT_BATCH,
@@ -83,7 +83,7 @@ class RoomStream(RowStream):
         PlacementError where no scene meets the request, and LostWorkerError where a process ended.
         """
         variant = select_variant(device)
-        shares = requests_and_shares(preset_or_spec, DatasetSpec)
+        shares = requests_and_shares(preset_or_spec, RoomSpec)
         given = [
             preset_spec(request) if isinstance(request, str) else request for request in shares
         ]
@@ -110,7 +110,7 @@ class RoomStream(RowStream):
         )  # fmt: skip
 
 
-def _asked(spec: DatasetSpec, fields: Sequence[str]) -> tuple[DatasetSpec, Columns]:
+def _asked(spec: Request, fields: Sequence[str]) -> tuple[Request, Columns]:
     """Return a request for the truth that some fields need and no more, and their columns."""
     truth = tuple(name for name in TRUTHS if name != "flow" or len(spec.views) > 1)
     asked = chosen_columns(fields, columns(replace(spec, truth=truth)))
@@ -119,7 +119,7 @@ def _asked(spec: DatasetSpec, fields: Sequence[str]) -> tuple[DatasetSpec, Colum
 
 
 def _rows(
-    spec: DatasetSpec,
+    spec: Request,
     objects: Objects,
     fields: Columns,
     kept: Sequence[str],

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import back_project, pixel_directions, transform_points, transform_vectors
 from scenegen.derived import albedo, object_coordinates, optical_flow, seen_from
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.rendering.packing import SceneBatch
 
 Array = NDArray[Any]
@@ -121,7 +121,7 @@ def flow(view: Any, other: Any) -> tuple[NDArray[np.float32], NDArray[np.uint8]]
 
 
 def truth_problems(
-    spec: DatasetSpec, stored: Mapping[str, Array], view: Any, other: Any, scene: Any
+    spec: Request, stored: Mapping[str, Array], view: Any, other: Any, scene: Any
 ) -> Iterable[tuple[str, str]]:
     """Yield name of the truth and a sentence for each problem of one row.
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.files.content import fingerprint
 from scenegen.files.rows import RowBlock, content_problems
 from scenegen.files.sets.manifest import Manifest
@@ -293,9 +293,7 @@ def _same_picture(name: str, a: Array, b: Array) -> bool:
     return bool(np.abs(off.mean(axis=(1, 3))).max() <= PATCH_TOLERANCE * scale)
 
 
-def _within_tolerance(
-    name: str, stored: Array, again: Array, edges: Array, spec: DatasetSpec
-) -> bool:
+def _within_tolerance(name: str, stored: Array, again: Array, edges: Array, spec: Request) -> bool:
     """Return whether two arrays of pixels, (H, W, ...), agree as far as other variants can."""
     most: float | Array
     a, b = stored.astype(np.float64), again.astype(np.float64)

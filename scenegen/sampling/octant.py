@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import Vector3
+from scenegen.common.records import Vector3
 from scenegen.common.rotations import cos_sin
 
 Array = NDArray[Any]

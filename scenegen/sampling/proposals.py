@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from scenegen.common.errors import PlacementError
 from scenegen.description.scene_arrays import SceneArrays, joined
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.objects.catalogue import Objects
 from scenegen.sampling.scenes import MAX_RENDERED, most_attempts, refusal, sample_scenes
 
@@ -18,7 +18,7 @@ RETRIES = 3  # least number of attempts that are drawn at once for an item that 
 class ProposalQueue:
     """The proposals of items that ascend, each of which is proposed until it is accepted."""
 
-    def __init__(self, spec: DatasetSpec, items: Sequence[int], objects: Objects) -> None:
+    def __init__(self, spec: Request, items: Sequence[int], objects: Objects) -> None:
         """Draw nothing yet; `objects` are what the scenes are made of."""
         self._spec, self._objects, self._items = spec, objects, items
         self._ahead = AHEAD_INTERIORS if spec.interior else AHEAD

@@ -17,7 +17,7 @@ from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.common.rotations import product, rotation_matrix
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import LEAST_SEEN, DatasetSpec
+from scenegen.description.specs import LEAST_SEEN, DatasetSpec, InteriorSpec, Request
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.sampling.bodies import MARGIN, bodies_of
 from scenegen.sampling.cameras import sample_cameras, sample_fov_y
@@ -47,7 +47,7 @@ _NUMBERS = _POSE_NUMBERS + 2 * CANDIDATES  # of one pose
 
 
 def sample_scenes(
-    spec: DatasetSpec, index: Any, attempt: Any, objects: Objects | None = None
+    spec: Request, index: Any, attempt: Any, objects: Objects | None = None
 ) -> tuple[Array, SceneArrays]:
     """Propose scenes of items, many at once.
 
@@ -66,7 +66,7 @@ def sample_scenes(
     Raises SpecError where no model of a class can be used.
     """
     index, attempt = np.asarray(index, np.int64), np.asarray(attempt, np.int64)
-    if spec.interior:
+    if isinstance(spec, InteriorSpec):
         return sample_interiors(spec, index, attempt, objects or objects_of(spec))
     unplaced = sample_objects(spec, index, objects or objects_of(spec))
     cameras, fov_y_degrees = sample_cameras(spec, index), sample_fov_y(spec, index)
@@ -105,20 +105,20 @@ def sample_scenes(
 
 
 def sample_scene(
-    spec: DatasetSpec, index: int, attempt: int = 0, objects: Objects | None = None
+    spec: Request, index: int, attempt: int = 0, objects: Objects | None = None
 ) -> SceneSpec | None:
     """Propose the scene of one item, as `sample_scenes`; None where this attempt found no room."""
     _, scenes = sample_scenes(spec, [index], [attempt], objects)
     return scenes.scene(0) if len(scenes) else None
 
 
-def most_attempts(spec: DatasetSpec) -> int:
+def most_attempts(spec: Request) -> int:
     """Return how many scenes are proposed for an item before a request is called impossible."""
     return MAX_FURNISHED if spec.interior else MAX_ATTEMPTS
 
 
 def refusal(
-    spec: DatasetSpec,
+    spec: Request,
     index: int,
     placed_but_hidden: int,
     attempts: int = MAX_ATTEMPTS,
@@ -131,7 +131,7 @@ def refusal(
         attempts: how many were made.
         problems: reasons, by name, why models were refused.
     """
-    if spec.interior:
+    if isinstance(spec, InteriorSpec):
         refused = [f"; {name} was passed over: {why}" for name, why in (problems or {}).items()]
         return PlacementError(
             f"item {index}",

@@ -155,7 +155,7 @@ def default_license(rooms: Sequence[RoomsFile]) -> str:
         what, source = "none, and meshes that somebody made", file.spec.source
         expected = f"the licence under which pictures of {source} may be handed on"
         check(source in BUILT_IN, "license", what, expected)
-        assets = " and ".join(n for n in ("materials", "environment") if getattr(file.spec, n))
+        assets = " and ".join(n for n in ("materials", "environment") if getattr(file.spec, n, ""))
         what, expected = f"none, and {assets} of others", "the licence of their pictures"
         check(not assets, "license", what, expected)
     return "CC-BY-4.0"

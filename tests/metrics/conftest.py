@@ -86,16 +86,8 @@ def hints(hint_truth: Path, tmp_path: Path) -> Callable[..., list[str]]:
 
 
 @pytest.fixture(scope="session")
-def answers_db(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a file with answers of 12 people who finished and one who did not."""
-    from quizzes import made_answers
-
-    return made_answers(tmp_path_factory.mktemp("people") / "answers.db", 12)
-
-
-@pytest.fixture(scope="session")
 def quiz_split(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a folder with 24 test questions of 32x32 pixels, their answers, and 3 to calibrate."""
+    """Return a folder with 24 test questions of 32x32 pixels, their answers, and 3 to practise."""
     from iqtt.files.make import make_split
     from iqtt.questions.specs import SplitSpec
 

@@ -9,24 +9,24 @@ from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from typing import Any
 
-from iqtt.vlm.ask import Server
-
 KEY = "sk-secret-of-this-test"
 Reply = Callable[[dict[str, Any], int], tuple[int, bytes]]
 
 
-def completion(text: Any, **usage: int) -> tuple[int, bytes]:
-    return choice({"message": {"content": text}}, **usage)
-
-
-def choice(value: dict[str, Any], **usage: int) -> tuple[int, bytes]:
-    """Return a whole choice: message, finish_reason and so on."""
-    return 200, json.dumps({"choices": [value], "usage": usage}).encode()
+def completion(text: str, ended: str = "stop") -> tuple[int, bytes]:
+    """Return a reply, of two tokens to a prompt of ten."""
+    message = {"role": "assistant", "content": text}
+    usage = {"prompt_tokens": 10, "completion_tokens": 2, "total_tokens": 12}
+    content = {
+        "id": "1", "object": "chat.completion", "created": 0, "model": "tiny", "usage": usage,
+        "choices": [{"index": 0, "message": message, "finish_reason": ended}],
+    }  # fmt: skip
+    return 200, json.dumps(content).encode()
 
 
 @contextmanager
-def serving(reply: Reply) -> Iterator[tuple[Server, list[dict[str, Any]]]]:
-    """Serve `reply`, told the body of a request and how often it came before."""
+def serving(reply: Reply) -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """Serve `reply`, told the body of a request and how often it came before; give the address."""
     bodies: list[dict[str, Any]] = []
     seen: Counter[str] = Counter()
     lock = threading.Lock()
@@ -43,8 +43,8 @@ def serving(reply: Reply) -> Iterator[tuple[Server, list[dict[str, Any]]]]:
             status, answer = reply(body, times)
             self.send_response(status)
             self.send_header("Retry-After", "0")
-            cut = status == 200 and answer.endswith(b"...")
-            self.send_header("Content-Length", str(len(answer) + 100 * cut))
+            self.send_header("Content-Type", "application/json")
+            self.send_header("Content-Length", str(len(answer)))
             self.end_headers()
             self.wfile.write(answer)
 
@@ -55,8 +55,7 @@ def serving(reply: Reply) -> Iterator[tuple[Server, list[dict[str, Any]]]]:
     thread = threading.Thread(target=server.serve_forever, args=(0.01,))
     thread.start()
     try:
-        url = f"http://127.0.0.1:{server.server_address[1]}/v1"
-        yield Server("tiny", url, KEY, timeout=1.0, tries=4, concurrency=2, pause=0.01), bodies
+        yield f"http://127.0.0.1:{server.server_address[1]}/v1", bodies
     finally:
         server.shutdown()
         thread.join()
@@ -65,4 +64,6 @@ def serving(reply: Reply) -> Iterator[tuple[Server, list[dict[str, Any]]]]:
 
 def picture_of(body: dict[str, Any]) -> bytes:
     """Return the first picture of a request, as a PNG file."""
-    return base64.b64decode(body["messages"][0]["content"][0]["image_url"]["url"].split(",")[1])
+    (message,) = body["messages"]
+    (url,) = [part["image_url"]["url"] for part in message["content"] if "image_url" in part]
+    return base64.b64decode(url.split(",")[1])

@@ -3,7 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-from scenegen.description.scenes import FAMILY_NAMES, SceneSpec
+from scenegen.description.names import FAMILY_NAMES
+from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import Objects, mesh_objects
 from scenegen.objects.meshes.folders import open_objects

@@ -22,7 +22,7 @@ from baselines.training.streams import NEIGHBOURS, Shown, TrainingStreams
 from iqtt import QuestionsFile
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check, to_json
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import Request
 from scenegen.rooms.reader import RoomsFile
 
 OF_NETWORKS = ("networks", "opacity", "material", "lights", "depth_middle", "depth_reach")
@@ -135,9 +135,7 @@ def _suited(config: ModelConfig, files: Files, labels: int, conditional: bool) -
     return config if labels else replace(config, questions=0.0)
 
 
-def _for_rooms(
-    config: ModelConfig, spec: DatasetSpec, labels: int, conditional: bool
-) -> ModelConfig:
+def _for_rooms(config: ModelConfig, spec: Request, labels: int, conditional: bool) -> ModelConfig:
     """Return the configuration for rooms; what is of questions alone is off."""
     networks = config.networks
     check(labels == 0, "labels", labels, "0 for rooms, which ask no questions")

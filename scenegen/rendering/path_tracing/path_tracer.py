@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import pixel_size
 from scenegen.common.random.seeding import Purpose, item_seed
+from scenegen.description.specs import DatasetSpec
 from scenegen.objects.scene_mesh import room_mesh
 from scenegen.rendering.ground_truth import encode_image
 from scenegen.rendering.meshes.unit_scene import triangle_mesh
@@ -117,6 +118,7 @@ def _scene(batch: SceneBatch, b: int) -> Any:
         normals = shape.normals @ (placed[:3, :3] / batch.object_scale[b, k]).T
         contents[f"object{k}"] = triangle_mesh(f"object{k}", triangles, normals, bsdf)
     k_l, k_q = batch.attenuation[b].tolist()
+    assert isinstance(batch.spec, DatasetSpec)
     for j in range(int(batch.light_count[b])):
         distance = float(np.linalg.norm(batch.light_position[b, j] - batch.spec.camera_target))
         scale = np.pi * distance / (k_l + k_q * distance)

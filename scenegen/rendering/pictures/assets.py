@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import InteriorSpec
 from scenegen.files.places import files_below
 from scenegen.rendering.backend import point_to_llvm
 from scenegen.rendering.materials.folders import MapFiles, check_maps, from_folder
@@ -25,7 +25,7 @@ MEAN = 0.09  # radiance that the upper half of the surroundings is scaled to, th
 MOST_COLUMNS = 4096
 
 
-def materials_of(spec: DatasetSpec) -> Mapping[str, tuple[MapFiles, ...]] | None:
+def materials_of(spec: InteriorSpec) -> Mapping[str, tuple[MapFiles, ...]] | None:
     """Return the folder of materials that a data set names; None if it has none.
 
     Raises SpecError where its place is not told, or it is another one.
@@ -35,7 +35,7 @@ def materials_of(spec: DatasetSpec) -> Mapping[str, tuple[MapFiles, ...]] | None
     return _folder(_checked("materials", spec.materials, ASSETS.materials))
 
 
-def environment_of(spec: DatasetSpec) -> Array | None:
+def environment_of(spec: InteriorSpec) -> Array | None:
     """Return radiance by direction, (H, W, 3), of the surroundings that a data set names.
 
     None if it has none. Raises as `materials_of`, and FileFormatError.

@@ -16,7 +16,7 @@ from scenegen.camera import pixel_size
 from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import from_json
 from scenegen.description.interiors import Interior
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import InteriorSpec
 from scenegen.objects.furniture.room_shell import REVEAL
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pictures.assets import environment_of, materials_of
@@ -51,8 +51,9 @@ def trace_pictures(batch: SceneBatch, names: Sequence[str], variant: str) -> dic
 
 def _lit_room(batch: SceneBatch, b: int) -> tuple[Surfaces, Lights, float]:
     """Return what an image's room holds, its lights, and the mean radiance of its walls."""
-    assert batch.interior is not None
     spec = batch.spec
+    assert isinstance(spec, InteriorSpec)
+    assert batch.interior is not None
     interior = from_json(Interior, batch.interior[b], "interior")
     matter = gather_matter(batch, b, interior.lit, materials_of(spec))
     around = environment_of(spec)
@@ -71,6 +72,7 @@ def _trace_one(
     batch: SceneBatch, b: int, room: tuple[Surfaces, Lights, float], names: Sequence[str]
 ) -> dict[str, Array]:
     spec, (surfaces, lights, mean) = batch.spec, room
+    assert isinstance(spec, InteriorSpec)
     camera = device_camera(batch, b)
     seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, int(batch.view[b]))
     places = sample_positions(spec.spp)
@@ -113,7 +115,7 @@ def device_camera(batch: SceneBatch, b: int) -> Camera:
     return Camera(*(mi.Vector3f(*values[i : i + 3]) for i in (0, 3, 6, 9)), *values[12:])
 
 
-def _albedo(spec: DatasetSpec, surfaces: Surfaces, camera: Camera) -> Array:
+def _albedo(spec: InteriorSpec, surfaces: Surfaces, camera: Camera) -> Array:
     """Return the base colour where the ray through each pixel's centre hits; NaN for nothing."""
     index = dr.arange(mi.UInt32, spec.height * spec.width)
     d = camera.ray(mi.Float(index % spec.width) + 0.5, mi.Float(index // spec.width) + 0.5)

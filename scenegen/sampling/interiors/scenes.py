@@ -1,4 +1,4 @@
-"""Propose closed rooms: `DatasetSpec`, indices and attempts -> `SceneArrays`.
+"""Propose closed rooms: `InteriorSpec`, indices and attempts -> `SceneArrays`.
 
 The room, its light, the number of objects and the field of view are drawn once for an item.
 Another attempt draws the furniture and the cameras again.
@@ -18,7 +18,7 @@ from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.common.records import to_json
 from scenegen.description.interiors import Interior
 from scenegen.description.scene_arrays import SceneArrays
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import InteriorSpec
 from scenegen.objects.catalogue import Objects, furniture_models
 from scenegen.objects.furniture.shapes import Piece, piece
 from scenegen.objects.meshes.as_furniture import OBJECT
@@ -36,7 +36,7 @@ STOCK = 10  # models of each family in it: models take longer to make than rooms
 _Drawn = tuple[Room, list[Placed], list[tuple[float, float, float]], tuple[float, float, float]]
 
 
-def item_room(spec: DatasetSpec, index: int) -> tuple[Room, int, float]:
+def item_room(spec: InteriorSpec, index: int) -> tuple[Room, int, float]:
     """Return the room of an item, its number of objects, and its field of view in degrees."""
     draws = Draws(spec.seed, index, Purpose.ROOM)
     count = draws.count(*spec.objects)
@@ -44,7 +44,7 @@ def item_room(spec: DatasetSpec, index: int) -> tuple[Room, int, float]:
     return room, count, spec.fov_degrees + spec.fov_spread_degrees * draws.unit()
 
 
-def draw_interior(spec: DatasetSpec, index: int, attempt: int, objects: Objects) -> _Drawn | None:
+def draw_interior(spec: InteriorSpec, index: int, attempt: int, objects: Objects) -> _Drawn | None:
     """Return room, objects, camera positions and target of a proposal; None if it found no room."""
     room, count, fov = item_room(spec, index)
     draws = Draws(spec.seed, index, Purpose.ARRANGEMENT, attempt)
@@ -76,7 +76,7 @@ def _stock(seed: int, street: int, family: str) -> tuple[float, ...]:
 
 
 def sample_interiors(
-    spec: DatasetSpec, index: Array, attempt: Array, objects: Objects
+    spec: InteriorSpec, index: Array, attempt: Array, objects: Objects
 ) -> tuple[Array, SceneArrays]:
     """Propose closed rooms, as `sampling.scenes.sample_scenes`."""
     pairs = list(zip(index.tolist(), attempt.tolist(), strict=True))
@@ -94,7 +94,7 @@ def _numbers(objects: Objects, classes: tuple[str, ...]) -> dict[str, int]:
 
 
 def _arrays(
-    spec: DatasetSpec, index: Array, drawn: Sequence[_Drawn], objects: Objects
+    spec: InteriorSpec, index: Array, drawn: Sequence[_Drawn], objects: Objects
 ) -> SceneArrays:
     count, slots, views = len(drawn), spec.object_slots, len(spec.views)
     number = _numbers(objects, spec.shapes)
@@ -125,7 +125,7 @@ def _arrays(
     def same(values: Any, *size: int) -> Array:
         return np.broadcast_to(np.array(values, float), (count, *size))
 
-    rho = np.broadcast_to(np.array(spec.reflectance), (count, slots, 3))
+    rho = np.broadcast_to(np.array((0.8,) * 3), (count, slots, 3))
     gloss = np.broadcast_to(np.array((0.0, 1.0)), (count, slots, 2))
     return SceneArrays(
         names=tuple(number),
@@ -145,8 +145,8 @@ def _arrays(
         light_position=np.zeros((count, spec.light_slots, 3)),
         light_color=np.zeros((count, spec.light_slots, 3)),
         ambient=same((0.0, 0.0, 0.0), 3),
-        attenuation=same(spec.attenuation, 2),
-        room_reflectance=same(spec.room_reflectance, 3),
+        attenuation=same((0.5, 0.5), 2),
+        room_reflectance=same((0.8,) * 3, 3),
         background=same((0.0, 0.0, 0.0), 3),
         interior=interior,
     )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from scenegen.camera import Camera, half_angle
 from scenegen.common.rotations import cos_sin
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import InteriorSpec
 from scenegen.sampling.interiors.draws import Draws
 from scenegen.sampling.interiors.spaces import Box, Space
 
@@ -32,7 +32,7 @@ Place = tuple[float, float, float]
 
 
 def draw_cameras(
-    spec: DatasetSpec, space: Space, draws: Draws, fov_degrees: float
+    spec: InteriorSpec, space: Space, draws: Draws, fov_degrees: float
 ) -> tuple[list[Place], Place] | None:
     """Draw the positions of the cameras of all views, and the point they look at; None for none.
 
@@ -79,7 +79,7 @@ def _table(boxes: list[Box]) -> Array:
 
 
 def _shown(
-    place: Place, target: Place, space: Space, boxes: Array, fov_y: float, spec: DatasetSpec
+    place: Place, target: Place, space: Space, boxes: Array, fov_y: float, spec: InteriorSpec
 ) -> float:
     """Return how much a camera shows; 0 where it is not free, or something stands right before it.
 

@@ -19,7 +19,7 @@ from metrics.submissions.reader import open_predictions
 from scenegen.camera import look_at
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.presets import preset_spec
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import request_from_json
 from scenegen.rooms.make import make_dataset
 from scenegen.rooms.reader import RoomsFile
 
@@ -79,7 +79,7 @@ def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
 def test_samples_of_a_class_have_its_proportions(tmp_path: Path) -> None:
     """Of the same codes, cameras and lights; and what is told the class predicts no submission."""
     model, card = open_weights(CLASSES)
-    spec, noise = DatasetSpec.from_json(card.data), np.random.default_rng(0).normal(size=(32, 128))
+    spec, noise = request_from_json(card.data), np.random.default_rng(0).normal(size=(32, 128))
     camera = torch.from_numpy(look_at(np.array([[1.2, 1.0, 1.2]]), np.array(spec.camera_target)))
     cameras = Cameras(camera.float().expand(32, 4, 4), spec.fov_y_degrees)
     width_to_height = {}

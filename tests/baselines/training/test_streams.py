@@ -19,8 +19,9 @@ from baselines.relief.network import Settings
 from baselines.training.checkpoint import load_weights
 from baselines.training.machine import Machine
 from baselines.training.streams import TrainingStreams
-from scenegen import DatasetSpec, RoomStream
+from scenegen import RoomStream
 from scenegen.common.errors import SpecError
+from scenegen.description.specs import request_from_json
 from scenegen.rooms.make import MAX_COUNT
 
 HERE = Machine("cpu", workers=0)
@@ -31,7 +32,7 @@ SHAPES = TrainingStreams("shapes")
 def test_blocks_are_rows_beyond_those_of_any_file():
     shown = SHAPES.shown(32, 7)
     block = next(shown.blocks(8, 4, 0))
-    spec = DatasetSpec.from_json(shown.card()["data"])
+    spec = request_from_json(shown.card()["data"])
     start = MAX_COUNT + 8
     (rows,) = RoomStream(spec, fields=["image", "depth"], batch=4, start=start, stop=start + 4)
     assert block.read("scene_index", slice(None)).tolist() == list(range(start, start + 4))
@@ -45,7 +46,7 @@ def test_networks_learn_from_streams_and_their_cards_tell_it(tmp_path):
     both = TrainingStreams("shapes,albedo")
     whole = depth_supervised.train(both, tmp_path / "whole", SMALL, HERE)
     card = load_weights(whole, depth_supervised.METHOD)[1]
-    specs = [DatasetSpec.from_json(line) for line in card.data.splitlines()]
+    specs = [request_from_json(line) for line in card.data.splitlines()]
     assert [spec.random_reflectance for spec in specs] == [False, True]
     assert (card.rows, {spec.seed for spec in specs}) == (8, {7})
     objects = TrainingStreams("shapenet").shown(32, 7).specs

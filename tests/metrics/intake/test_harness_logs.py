@@ -11,11 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chat_server import completion, serving
 
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
-from iqtt.vlm.ask import ask
 from iqtt.vlm.export import CIRCULAR, export_for_models, row_values
 from iqtt.vlm.harness import process_results
 from iqtt.vlm.reading import LETTERS
@@ -424,11 +422,26 @@ def test_an_order_that_was_never_asked_is_refused(
         returned_score(log, split / "iqtt-val.h5")
 
 
-def test_a_log_of_bench_ask_may_end_in_a_line_that_was_cut(split: Path, tmp_path: Path) -> None:
-    asked, log = Asked(split / "iqtt-val.h5", rotations=3, size=64), tmp_path / "log.jsonl"
-    with serving(lambda *_: completion("C")) as (server, _):
-        ask(asked, server, log)
+def test_what_bench_ask_kept_before_it_ran_inspect_is_read(
+    split: Path, rows: list[Row], tmp_path: Path
+) -> None:
+    heading = {
+        "format": "pix2shape-bench/asked", "model": "tiny", "temperature": 0.0, "max_tokens": 9,
+        "layout": "composed", "size": 64, "control": False, "digest": rows[0].digest,
+    }  # fmt: skip
+    lines = [
+        {"id": row.id, "question_index": row.question_index, "rotation": row.rotation,
+         "answer": row.original(2), "outcome": "answered", "text": "C"}
+        for row in rows
+    ]  # fmt: skip
+    lines[0] |= {"answer": None, "outcome": "unparsed"}
+    log = tmp_path / "log.jsonl"
+    again = [*lines, heading, lines[1] | {"answer": 0}]  # two processes; the first reply counts
+    log.write_text("".join(json.dumps(line) + "\n" for line in [heading, *again]) + '{"id": "9-')
+    assert is_log(log)
     whole = read_returned(log)
     assert (whole.model, len(whole.answers)) == ("tiny", 24)
-    log.write_bytes(log.read_bytes() + b'{"id": "9-')
-    assert read_returned(log).answers == whole.answers
+    assert [answer.answer for answer in whole.answers[:3]] == [-1, 0, 1]
+    write_returned(tmp_path / "p.h5", split / "iqtt-val.h5", whole)
+    scores = score([tmp_path / "p.h5"], split / "iqtt-val.h5")
+    assert scores.answer_groups["by_outcome"]["unparsed"].n == 1

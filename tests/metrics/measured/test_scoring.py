@@ -18,7 +18,7 @@ from metrics.submissions.validation import validate
 from metrics.submissions.writer import RoomPredictionWriter
 from metrics.viewing import predicted_scenes
 from metrics.views.compare.compare import compare
-from metrics.views.leaderboard.ranking import rankings
+from metrics.views.leaderboard import rankings
 from metrics.views.protocols import protocols_report
 from metrics.views.report import html_report
 from metrics.views.score_tables import text_report
@@ -113,7 +113,7 @@ def test_two_protocols_never_share_a_table(measured, predicted, tmp_path):
     assert compare([first, second]).differences[0].difference < 0.0
     with pytest.raises(OtherTruthError):
         compare([first, other])
-    assert [len(r.entries) for r in rankings([first, second, other])] == [2, 1]
+    assert [len(r.files) for r in rankings([first, second, other])] == [2, 1]
     with pytest.raises(OtherTruthError):
         html_report(first, beside=[other])
 
@@ -159,7 +159,7 @@ def test_truth_of_twenty_points_has_depth_alone(measured, predicted):
     names = [name for name in scores.metrics if "boundary" in name or "normal" in name]
     assert not names
     lines = " ".join(text_report(scores).split())
-    assert (lines.count("boundaries: none"), lines.count("normals: none")) == (1, 1)
+    assert (lines.count("boundaries, as"), lines.count("normals, unless")) == (1, 1)
 
 
 def test_points_are_scored_on_the_rays_of_the_matrix(measured, predicted):

@@ -17,13 +17,13 @@ from metrics.score_file import Skill
 from metrics.scoring.evaluate import open_runs, score
 from metrics.scoring.records import Submission
 from metrics.scoring.truth_digests import OtherTruthError
-from metrics.views.headline import headline_section, kinds_sections
 from metrics.views.report import html_report
 from metrics.views.score_tables import (
     all_scores,
     group_tables,
-    headline_rows,
+    main_table,
     notes_of,
+    side_by_side,
     text_report,
     title_of,
     write_csv,
@@ -36,42 +36,87 @@ HOSTILE = "</title></style><script>alert(1)</script>\"'><img src=http://x.y>&"
 SKILLS = {"chamfer": Skill(-0.25, -0.5, -0.1, 0.16, "empty_room_chamfer")}
 
 
-def test_every_score_stands_beside_its_reference():
+def test_each_main_metric_has_value_baseline_and_skill_in_one_row():
     scores = simple_rooms(skills=SKILLS)
-    table = all_scores(scores)
-    cells = cells_of(table)
-    for name, value in scores.metrics.items():
-        assert cells[name][:2] == [*with_interval(value.value, value.low, value.high)]
-    assert cells["chamfer"][3] == "0.1600"
-    head = cells_of(headline_rows(scores))
-    assert head["skill of chamfer"] == ["-0.2", "[-0.5, -0.1]", "0: empty room"]
-    assert head["chamfer"][-1] == "0.1600: empty room"
+    assert cells_of(main_table(scores)) == {
+        "mse_depth": ["down", *_value(scores, "mse_depth"), "-", "-", ""],
+        "chamfer": ["down", "0.2000", "[0.2000, 0.2000]", "0.1600 empty room", "-0.2",
+                    "[-0.5, -0.1]"],
+        "hausdorff": ["down", "0.5000", "[0.5000, 0.5000]", "-", "-", ""],
+    }  # fmt: skip
+    itself = simple_rooms(skills={"chamfer": Skill(0.0, 0.0, 0.0, 0.2, "empty_room_chamfer")})
+    assert cells_of(main_table(itself))["chamfer"][-2:] == ["0", "baseline itself"]
+    cells = cells_of(all_scores(scores))
+    for name in scores.metrics:
+        assert cells[name][:2] == _value(scores, name)
+    assert cells["chamfer"][2:] == ["-", "0.1600", "scene unit", "lower"]
+    several = rooms_scores("a", {"chamfer": [[0.1, 0.2], [0.2, 0.3]]}, [0, 1], runs=2)
+    assert cells_of(main_table(several))["chamfer"][1] == "0.20 ± 0.07"
 
 
-def test_questions_have_the_floor_of_their_kind():
+def _value(scores, name):
+    value = scores.metrics[name]
+    return [*with_interval(value.value, value.low, value.high)]
+
+
+def test_what_bench_score_prints_is_short_and_begins_with_warnings():
+    columns = {f"abs_rel{ending}": [0.1, 0.3, 0.2, 0.2] for ending in ("", "_after_scale")}
+    columns |= {f"{name}{ending}": [0.5] * 4 for name in ("rmse", "delta_1")
+                for ending in ("", "_after_scale")}  # fmt: skip
+    columns |= dict.fromkeys(("mse_depth", "chamfer", "hausdorff", "shape_error"), [0.2] * 4)
+    skills = {
+        "chamfer": SKILLS["chamfer"],
+        "shape_error": Skill(0, 0, 0, 0.2, "cut_out_shape_error"),
+    }
+    scores = rooms_scores("m", columns, [0, 0, 1, 1], skills=skills, truth_given=False)
+    lines = text_report(scores, width=100).splitlines()
+    assert len(lines) <= 25
+    assert max(map(len, lines)) <= 100
+    assert (
+        lines[0]
+        == "m on rooms.h5: 4 images, 2 scenes   alignment: none (metric)   unit: scene unit"
+    )
+    assert lines[1].startswith("WARNING  not comparable: ")
+    table = [line.split()[0] for line in lines if line.startswith("  ") and "[" in line]
+    assert table[:2] == ["abs_rel", "delta_1"]
+    notes = notes_of(scores)
+    assert len(notes) == 5
+    assert "none 0.2000 | scale 0.2000;" in next(n for n in notes if n.startswith("abs_rel by"))
+    baselines = next(note for note in notes if note.startswith("baselines: "))
+    assert ("empty room = " in baselines, "cut-out = " in baselines) == (True, True)
+    assert "shuffled" not in baselines
+    assert scores.meta.truth_digest[:12] in notes[-1]
+    whole = text_report(scores, whole=True)
+    assert all(name in whole for name in ("all metrics", "depth after each alignment"))
+
+
+def test_questions_have_the_baseline_of_their_kind():
     floors = (Floor("mirror", "outline", 0.5, 2500),)
     accuracy = {"iqtt_accuracy": Skill(0.0, None, None, 0.5, "outline")}
     group = {"mirror": {"iqtt_accuracy": make_score("iqtt_accuracy", 1 / 3)}}
     by_kind, by_answer = {"skills": accuracy, "by_distractor": group}, {"2": group["mirror"]}
     scores = iqtt_scores("a", [1, 0], **by_kind, by_position=by_answer, question_floors=floors)
-    head = cells_of(headline_rows(scores))
-    assert head["skill of iqtt_accuracy"][-1] == "0: outline"
-    assert head["iqtt_accuracy"][-1] == "0.5: outline; chance 0.3"
-    assert cells_of(all_scores(scores))["  chance"][0] == "0.3"
+    row = cells_of(main_table(scores))["iqtt_accuracy"]
+    assert (row[3], row[4:]) == ("0.5 outline", ["0", "baseline itself"])
+    assert any("chance is 0.33" in note for note in notes_of(scores))
     kinds, places = group_tables(scores)
     assert list(cells_of(places)) == ["C"]
-    assert len(text_report(scores).splitlines()) < len(text_report(scores, whole=True).splitlines())
-    assert cells_of(kinds) == {"mirror": ["0.3333", "2", "-0.3333", "0.5000: outline"]}
+    assert cells_of(kinds) == {"mirror": ["0.3333", "2", "-0.3333", "0.5000 outline"]}
+    known = iqtt_scores("a", [1, 0], kinds=["mirror", "near"])
+    assert "iqtt floors rooms.h5" in notes_of(known)[0]
+    assert "by kind of question" in text_report(known)
+    assert "by kind of question" not in text_report(iqtt_scores("a", [1, 0]))
 
 
-def test_titles_and_notes_say_where_scores_come_from():
-    scores = simple_rooms(truth_given=False)
-    assert title_of(scores) == "mine: 4 images of 2 scenes of rooms.h5"
-    notes = list(notes_of(scores))
-    assert notes[0] == f"warning: {scores.warnings[0]}"
-    (truth,) = (note for note in notes if note.startswith("truth: "))
-    assert scores.meta.truth_digest[:12] in truth
-    assert title_of(iqtt_scores("many", [1, 0], runs=3)).endswith("of rooms.h5, mean of 3 runs")
+def test_titles_say_what_was_scored():
+    assert title_of(iqtt_scores("many", [1, 0], runs=3)) == (
+        "many on rooms.h5: 2 questions, mean of 3 runs"
+    )
+    fitted = simple_rooms(alignment="scale", truth_path="a/b\\c.h5")
+    assert title_of(fitted).split("   ")[:2] == [
+        "mine on c.h5: 4 images, 2 scenes",
+        "alignment: scale (fitted to the truth of each image)",
+    ]
 
 
 @pytest.mark.parametrize("form", ["text", "markdown", "html"])
@@ -128,27 +173,23 @@ def test_the_page_is_whole_escapes_names_and_loads_nothing(rooms_path, tmp_path)
     assert "row 0 " in worst
 
 
-def test_the_headline_stands_beside_floor_paper_and_other_methods(tmp_path):
+def test_other_methods_and_the_paper_stand_on_the_page():
     mine, other = simple_rooms(skills=SKILLS), simple_rooms("other", skills={})
-    (table,) = headline_section([mine, other]).tables
-    row = next(row for row in table.rows if row.cells[0].value == "Chamfer")
-    cells = {name: cell.value for name, cell in zip(table.head, row.cells, strict=True)}
-    assert cells.pop("on its scale") == ""
-    assert cells == {"score": "Chamfer", "skill": "-0.2", "mine": "0.2000", "floor": "0.1600",
-                     "paper †": "0.103", "other": "0.2000"}  # fmt: skip
+    table = side_by_side([mine, other])
+    assert table.head == ("", "mine", "other", "baseline")
+    assert cells_of(table)["skill of chamfer"] == ["-0.2 [-0.5, -0.1]", "-", "empty room"]
+    page = Page(html_report(mine, beside=[other]))
+    assert ["hausdorff", "down", "0.5000"] in [row[:3] for row in page.rows]
+    rows = [row for row in page.rows if row[:3] == ["Pix2Shape", "Shape scenes", "35°"]]
+    assert rows == [["Pix2Shape", "Shape scenes", "35°", "-", "2", "0.112", "0.191", "0.021"]]
     elsewhere = simple_rooms("other", digest="0" * 64)
     with refused(OtherTruthError, "other"):
         html_report(mine, beside=[elsewhere])
-
-
-def test_questions_stand_by_kind_beside_chance_floor_and_people():
     group = {"iqtt_accuracy": make_score("iqtt_accuracy", 1 / 3)}
-    kinds = {"other": group, "near-2": group, "<b>": group}
-    told = {"by_distractor": kinds, "question_floors": (Floor("other", "trees", 0.591, 2500),)}
-    section, *_ = kinds_sections([iqtt_scores("mine", [1, 0, 1], **told)])
-    cells = cells_of(section.tables[0])
-    assert cells["other"][3:] == ["0.3333", "-0.6300", "0.5910 trees", "0.7329 ± 0.148"]
-    assert cells["near-2"][4:] == cells["<b>"][4:] == ["-", "-", "-"]
+    people = iqtt_scores("mine", [1, 0, 1], by_distractor={"other": group})
+    rows = [row for row in Page(html_report(people)).rows if row[0] == "Human Evaluation"]
+    assert rows[0][-1] == "0.7329 ± 0.148"
+    assert "Human Evaluation" not in html_report(iqtt_scores("mine", [1, 0, 1]))
 
 
 def test_examples_of_questions_say_what_is_right(truths, tmp_path):

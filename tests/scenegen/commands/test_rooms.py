@@ -12,7 +12,7 @@ import trimesh
 
 import cli
 from scenegen.description.presets import PATH_SAMPLES
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import DatasetSpec, InteriorSpec
 
 SOME = "render --n 4 --out x.h5 --seed 3 --size 32x48 --shapes box,teapot --compression lzf"
 TINY = ("--size", "32", "--min-visible-pixels", "3")
@@ -21,7 +21,7 @@ TINY = ("--size", "32", "--min-visible-pixels", "3")
 BY_OTHERS = {
     "height", "width", "source", "listing", "own_reflectance", "fov_degrees", "fov_spread_degrees",
 }  # fmt: skip
-FIXED = {"camera_target", "interior"}  # the latter by its preset
+FIXED = {"camera_target"}
 NOT_SETTINGS = {
     "count", "out", "preset", "size", "classes", "shapenet_root", "objects_root", "up", "cache_dir",
     "compression", "batch", "workers", "shard_size", "scheduler", "device", "overwrite",
@@ -82,7 +82,7 @@ def options() -> dict[str, click.Option]:
 
 
 def test_every_setting_has_an_option(options: dict[str, click.Option]) -> None:
-    settings = {field.name for field in fields(DatasetSpec)}
+    settings = {row.name for kind in (DatasetSpec, InteriorSpec) for row in fields(kind)}
     assert settings - set(options) == BY_OTHERS | FIXED
     assert set(options) - settings == NOT_SETTINGS
 

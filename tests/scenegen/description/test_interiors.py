@@ -1,12 +1,15 @@
 """Settings of closed rooms, and the description of one."""
 
+import json
+from dataclasses import fields
+
 import pytest
 
 from scenegen.common.errors import SpecError
 from scenegen.description.interiors import Interior, Opening
 from scenegen.description.presets import PRESETS, preset_spec
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import PAPER_ONLY, DatasetSpec
+from scenegen.description.specs import DatasetSpec, InteriorSpec, request_from_json
 from scenegen.layout import columns
 
 OTHER = {
@@ -19,9 +22,25 @@ OTHER = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", PAPER_ONLY)
+NAMES_OF_1_0 = [
+    "allow_cropped", "ambient", "attenuation", "camera_radius", "camera_target",
+    "fov_degrees", "height", "image_dtype", "light_level", "light_radius",
+    "light_saturation", "lights", "listing", "min_visible_pixels", "object_radius",
+    "object_split", "objects", "pose", "random_reflectance", "reflectance",
+    "room_reflectance", "seed", "shading", "shadows", "shapes", "shininess", "source",
+    "specular", "spp", "views", "width",
+]  # fmt: skip
+CHANGED = [
+    "fov_degrees", "height", "min_visible_pixels", "objects", "shapes", "source", "spp", "width",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("name", OTHER)
 def test_settings_of_the_papers_room_are_refused(name):
-    assert OTHER.keys() == {*PAPER_ONLY}
+    of_paper, of_interiors = (
+        {row.name for row in fields(kind)} for kind in (DatasetSpec, InteriorSpec)
+    )
+    assert OTHER.keys() == of_paper - of_interiors - {"shading"}
     with pytest.raises(SpecError):
         preset_spec("interiors", **{name: OTHER[name]})
 
@@ -46,11 +65,29 @@ def test_what_closed_rooms_cannot_have_is_refused(settings):
         preset_spec("interiors", **settings)
 
 
-def test_a_request_without_interiors_has_the_json_that_it_had():
-    for name in PRESETS.keys() - {"interiors"}:
-        assert "interior" not in preset_spec(name).to_json()
-    spec = preset_spec("interiors", hours=(8, 9))
-    assert DatasetSpec.from_json(spec.to_json()) == spec
+def test_requests_that_leave_later_settings_alone_have_the_json_of_1_0():
+    """Another text would be another fingerprint, and `verify` of published files would fail."""
+    assert sorted(json.loads(preset_spec("shapes").to_json())) == NAMES_OF_1_0
+    settings = json.loads(preset_spec("interiors").to_json())
+    assert sorted(settings) == sorted([*NAMES_OF_1_0, "fov_spread_degrees", "interior"])
+    usual = json.loads(DatasetSpec().to_json()) | {"shading": "path", "interior": True}
+    assert {k for k, v in settings.items() if usual.get(k) != v} == {*CHANGED, "fov_spread_degrees"}
+
+
+@pytest.mark.parametrize("preset", PRESETS)
+def test_every_request_is_read_as_what_it_was(preset):
+    spec = preset_spec(preset, seed=7)
+    assert request_from_json(spec.to_json()) == spec
+    assert request_from_json(json.dumps(json.loads(spec.to_json()), indent=1)) == spec
+
+
+@pytest.mark.parametrize(
+    "change", [{"shadows": True}, {"lights": [2, 3]}, {"interior": 1}, {"x": 1}]
+)
+def test_interiors_with_other_settings_are_refused(change):
+    text = json.dumps(json.loads(preset_spec("interiors").to_json()) | change)
+    with pytest.raises(SpecError):
+        request_from_json(text)
 
 
 def test_pictures_of_8_bits_are_srgb_and_others_are_radiance():

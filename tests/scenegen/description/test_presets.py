@@ -18,7 +18,7 @@ from scenegen.description.presets import (
     VIEWS_SHRINK,
     preset_spec,
 )
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import DatasetSpec, request_from_json
 from scenegen.rooms.make import make_dataset
 
 Array = NDArray[Any]
@@ -26,7 +26,7 @@ SMALL = {"height": 40, "width": 48, "min_visible_pixels": 4, "image_dtype": "flo
 SCENES = 3
 # A closed room costs more than all scenes of the other presets: one, with few paths and objects.
 INTERIOR = {**SMALL, "height": 24, "width": 32, "spp": 1, "objects": (12, 12)}
-PAPER = [name for name, it in PRESETS.items() if not it.settings.get("interior")]
+PAPER = [name for name, it in PRESETS.items() if not it.kind.interior]
 
 
 def request(name: str) -> tuple[DatasetSpec, int]:
@@ -97,7 +97,7 @@ def test_every_preset_is_verified(name: str, preset_file: Callable[[str], Path])
     checks = checks_of(path)
     assert [check for check in checks if not check.ok] == []
     with h5py.File(path) as file:
-        spec = DatasetSpec.from_json(file.attrs["spec"])
+        spec = request_from_json(file.attrs["spec"])
         assert (spec, len(file["image"]) // len(spec.views)) == request(name)
 
 
@@ -106,7 +106,7 @@ def rows_of(path: Path) -> tuple[DatasetSpec, dict[str, Any]]:
         found: dict[str, Any] = {}
         file.visititems(lambda name, x: found.update({name: x[:]}) if hasattr(x, "dtype") else None)
         found["names"] = list(file["object/shape"].attrs["names"])
-        return DatasetSpec.from_json(file.attrs["spec"]), found
+        return request_from_json(file.attrs["spec"]), found
 
 
 @pytest.mark.parametrize("name", ["shapes-single", "shapenet-single"])

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from scenegen.description.shapes import BASIC_SHAPES, DRAWN_SHAPES
+from scenegen.description.names import DRAWN_SHAPES
+from scenegen.description.shapes import BASIC_SHAPES
 
 DOCS = Path(__file__).parents[3] / "docs" / "objects.md"
 

@@ -10,8 +10,9 @@ from shape_checks import check_body, check_size, unit_vectors
 from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
 from scenegen.common.rotations import rotation_matrix
+from scenegen.description.names import SHAPE_NAMES
 from scenegen.description.scenes import PlacedObject, SceneSpec
-from scenegen.description.shapes import BASIC_SHAPES, SHAPE_NAMES
+from scenegen.description.shapes import BASIC_SHAPES
 from scenegen.objects import basic_hulls
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.scene_mesh import room_mesh, scene_parts, welded, world_from_object

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from scenegen.description.scenes import FAMILY_NAMES, SHAPE_NAMES
+from scenegen.description.names import FAMILY_NAMES, SHAPE_NAMES
 from scenegen.objects import basic_shapes
 from scenegen.objects.cast_meshes import corner_table, normal_table, overlapping
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded

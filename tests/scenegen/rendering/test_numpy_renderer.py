@@ -10,8 +10,9 @@ from other_engines import cast_whole_scene, near_silhouettes
 from scipy.ndimage import maximum_filter, minimum_filter
 
 from scenegen.camera import Camera, pixel_directions
+from scenegen.description.names import SHAPE_NAMES
 from scenegen.description.presets import preset_spec
-from scenegen.description.scenes import SHAPE_NAMES, PlacedObject, SceneSpec
+from scenegen.description.scenes import PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import objects_of
 from scenegen.rendering.numpy_renderer import render_in_numpy

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from scenegen.camera import Camera, pixel_directions
-from scenegen.description.scenes import SHAPE_NAMES, Light, PlacedObject, SceneSpec
+from scenegen.description.names import SHAPE_NAMES
+from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render

@@ -119,7 +119,7 @@ def test_a_fork_of_a_process_that_has_rendered_renders():
 @pytest.mark.slow
 @pytest.mark.parametrize("preset", PRESETS)
 def test_all_presets_have_the_bits_of_files(preset, tmp_path):
-    small = {"spp": 2} if PRESETS[preset].settings.get("interior") else {}
+    small = {"spp": 2} if PRESETS[preset].kind.interior else {}
     spec = preset_spec(preset, height=32, width=32, **small)
     views = len(spec.views)
     count = 3 if small else 75 // views

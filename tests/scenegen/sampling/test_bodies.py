@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from shape_checks import support
 
-from scenegen.description.scenes import SHAPE_NAMES
+from scenegen.description.names import SHAPE_NAMES
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.coarse_hulls import COARSE_CORNERS, rounded
 from scenegen.sampling.bodies import DIRECTION_STEP, Bodies

@@ -10,7 +10,7 @@ from scipy.stats import chisquare, kstest
 from scenegen.camera import Camera
 from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.common.rotations import rotation_matrix
-from scenegen.description.scenes import SHAPE_NAMES
+from scenegen.description.names import SHAPE_NAMES
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
 from scenegen.sampling.bodies import Bodies

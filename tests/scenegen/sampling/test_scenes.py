@@ -11,7 +11,7 @@ from scipy.stats import chisquare, kstest
 
 from scenegen.camera import Camera
 from scenegen.common.errors import PlacementError
-from scenegen.description.scenes import SHAPE_NAMES
+from scenegen.description.names import SHAPE_NAMES
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import pack, pack_arrays
 from scenegen.sampling import scenes as sampling

@@ -15,7 +15,7 @@ from scenegen import open_rooms
 from scenegen.camera import look_at
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import SceneSpec
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import DatasetSpec, request_from_json
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
 from scenegen.rooms import render as dataset
@@ -164,7 +164,7 @@ def test_what_two_views_see_is_one_scene(views_path):
 
 def test_a_view_is_the_same_alone_and_among_the_others(views_path):
     with h5py.File(views_path) as file:
-        spec = DatasetSpec.from_json(file.attrs["spec"])
+        spec = request_from_json(file.attrs["spec"])
         scenes = [SceneSpec.from_json(text) for text in file["scene"].asstr()[::5]]
         stored = {n: file[n][:] for n in ("image", "depth", "normal", "object_id")}
     for view in range(5):

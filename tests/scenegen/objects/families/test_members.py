@@ -11,7 +11,7 @@ from scipy.sparse.csgraph import connected_components
 from shape_checks import DOWN, check_body, check_centred, check_size, support, unit_vectors
 
 from scenegen.common.errors import SpecError
-from scenegen.description.scenes import FAMILY_NAMES
+from scenegen.description.names import FAMILY_NAMES
 from scenegen.objects.families.members import MEMBERS, member_shape
 
 FAMILIES = pytest.mark.parametrize("family", FAMILY_NAMES)

@@ -7,7 +7,7 @@ from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 
 from scenegen.common.errors import SpecError
-from scenegen.description.scenes import FAMILY_NAMES
+from scenegen.description.names import FAMILY_NAMES
 from scenegen.objects.families.members import member_shape
 from scenegen.objects.furniture.furnishing import CLEAR, FAMILIES_FACTS, WHOLE, furnishing, supports
 from scenegen.objects.furniture.unwrapping import stretches

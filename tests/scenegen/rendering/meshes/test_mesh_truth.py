@@ -28,7 +28,7 @@ ROOMS = 40
 FAMILY_PRESETS = [
     name
     for name, it in PRESETS.items()
-    if it.settings.get("source") == "families" and not it.settings.get("interior")
+    if it.settings.get("source") == "families" and not it.kind.interior
 ]
 
 

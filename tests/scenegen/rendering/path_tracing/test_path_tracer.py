@@ -9,7 +9,8 @@ from scipy.ndimage import minimum_filter
 from verified import checks_of
 
 from scenegen.camera import Camera
-from scenegen.description.scenes import FAMILY_NAMES, Light, PlacedObject, SceneSpec
+from scenegen.description.names import FAMILY_NAMES
+from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import launch_fields, render

@@ -12,7 +12,7 @@ import trimesh
 from scenegen import open_rooms
 from scenegen.camera import pixel_directions, transform_vectors
 from scenegen.common.errors import SpecError
-from scenegen.description.scenes import SHAPE_NAMES
+from scenegen.description.names import SHAPE_NAMES
 from scenegen.objects.scene_mesh import scene_parts
 from scenegen.rooms.export.encoding import Encoding
 from scenegen.rooms.export.single import PICTURES, export_paths, export_room

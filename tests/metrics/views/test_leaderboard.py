@@ -14,11 +14,8 @@ from metrics.score_file import Skill, read_scores, write_scores
 from metrics.scoring.evaluate import score
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import UnknownMetricError
-from metrics.views.leaderboard.cards import HEAD, read_cards, unmatched
-from metrics.views.leaderboard.floors import FloorError
-from metrics.views.leaderboard.ranking import LeaderboardError, leaderboard, rankings
+from metrics.views.leaderboard import FloorError, LeaderboardError, leaderboard, rankings
 from metrics.views.paper import TABLES
-from scenegen.common.errors import SpecError
 
 SCENES = [0, 0, 1, 1]
 
@@ -52,7 +49,7 @@ def test_ranks_and_best_cells():
     assert table.head[2] == "Chamfer ↓ (scene unit)"
     assert rests(table)["a"][0] == "[0.1000, 0.1000]"
     assert table.title == "Rooms: 2 scenes in 2 views, rooms.h5"
-    assert table.notes[0].endswith(f"truth {DIGEST[:12]}.")
+    assert table.notes[0].endswith(f"truth {DIGEST[:12]}")
 
 
 def test_higher_is_better_where_it_is():
@@ -61,7 +58,7 @@ def test_higher_is_better_where_it_is():
     files = [iqtt_scores(name, right, question_floors=floors) for name, right in rights.items()]
     (table,) = leaderboard(files, paper=False)
     assert best(table) == [[True, True], [False, False], [False, False]]
-    floor = f"floor: {CHANCE}"
+    floor = f"baseline: {CHANCE}"
     assert ranks(table) == [("1", "high"), ("", floor), ("", "low")]
     assert table.head[2:] == ("IQTT accuracy: skill ↑", "IQTT accuracy ↑ (fraction)")
     assert table.title == "Mental rotation: 15 questions of the kind mirror, rooms.h5"
@@ -82,7 +79,7 @@ def test_test_sets_are_never_ranked_together():
     other = "f" * 64
     files = [rooms("a", 0.3), rooms("b", 0.1, truth=other, digest=other), rooms("c", 0.2)]
     first, second = leaderboard(files, paper=False)
-    assert not any(note.startswith("Not ranked with") for note in (*first.notes, *second.notes))
+    assert not any(note.startswith("not ranked with") for note in (*first.notes, *second.notes))
     assert ranks(first) == [("1", "c"), ("2", "a")]
     assert ranks(second) == [("1", "b")]
     # One fingerprint, two tasks: still two test sets.
@@ -93,7 +90,7 @@ def test_truths_of_one_request_but_other_bits_are_not_ranked_together():
     first, second = leaderboard([rooms("a"), rooms("b", digest="f" * 64)], paper=False)
     assert [len(table.rows) for table in (first, second)] == [1, 1]
     for table, other in ((first, "f" * 12), (second, DIGEST[:12])):
-        assert any(note.startswith(f"Not ranked with truth {other}") for note in table.notes)
+        assert any(note.startswith(f"not ranked with truth {other}") for note in table.notes)
 
 
 def test_known_test_sets_bear_their_name(monkeypatch):
@@ -133,41 +130,6 @@ def test_labels_tell_runs_and_claims():
     assert rest.startswith("± 0.002000 [")
 
 
-def test_cards_stand_beside_the_scores(tmp_path):
-    path = tmp_path / "cards.yaml"
-    path.write_text("a: {supervised: true, date: 2026-01-02, code: 'https://a.b', paper: P}\n")
-    cards = read_cards(path)
-    table = leaderboard([rooms("a"), rooms("b")], paper=False, cards=cards)[0]
-    assert table.head[-6:] == HEAD
-    assert values(table)["a (supervised)"][-6:] == [
-        *("-", "-", "the scored view", "P", "https://a.b", "2026-01-02")
-    ]
-    assert [cell.link for cell in table.rows[0].cells[-3:]] == ["", "https://a.b", ""]
-    assert values(table)["b"][-6:] == ["-", "-", "the scored view", "-", "-", "-"]
-    twice = ("a: {}\na: {}", "a: {paper: P, paper: Q}")
-    for text in ("a: {shoes: 3}", "a: [", "[1]", "a: &x {}\nb: *x", "[" * 5000, *twice,
-                 "a: {supervised: perhaps}", "? [a]\n: {}"):  # fmt: skip
-        path.write_text(text)
-        with pytest.raises(SpecError) as refusal:
-            read_cards(path)
-        assert refusal.value.where.startswith(str(path))
-
-
-def test_names_of_cards_are_taken_as_written_and_the_others_told(tmp_path):
-    names = ["42", "False", "1e3", "007", "2026-01-02", "null", "0x1F", "NO", "~", "1_000", "12:30"]
-    path = tmp_path / "cards.yaml"
-    path.write_text("".join(f"{name}: {{told: 1.0, supervised: yes}}\n" for name in names))
-    cards = read_cards(path)
-    assert list(cards) == names
-    assert {(card.told, card.supervised) for card in cards.values()} == {("1.0", True)}
-    assert unmatched(cards, [rooms(name) for name in names]) == []
-    path.write_text("my-metod: {}\nother: {}\nmine: {}\n")
-    told = unmatched(read_cards(path), [rooms("my-method"), rooms("mine")])
-    assert ["my-metod" in told[0], "my-method?" in told[0], "other" in told[1]] == [True] * 3
-    path.write_text("# none yet\n")
-    assert read_cards(path) == {}
-
-
 def skilled(name, chamfer=0.2, **other):
     """Rooms with a skill over a floor of 0.4."""
     columns = {"hausdorff": [0.3] * 4, "chamfer": [chamfer] * 4}
@@ -181,19 +143,19 @@ def test_skill_stands_before_the_score_and_floors_below_the_methods():
     table = leaderboard([skilled("worse", 0.3), skilled("better")], names, paper=False)[0]
     heads = ("Hausdorff ↓ (scene unit)", "Chamfer ↓ (scene unit)")
     assert table.head[2:] == (*heads, "Chamfer: skill ↑")
-    assert [row.kind for row in table.rows] == ["", "", "floor"]
+    assert [row.kind for row in table.rows] == ["", "", "baseline"]
     # The first column is tied, the second decides.
     assert ranks(table)[:2] == [("1", "better"), ("1", "worse")]
     cells = values(table)
     assert cells["better"][2] == "0.5"
-    assert cells["floor: empty room"] == ["-", "0.4000", "0"]
+    assert cells["baseline: empty room"] == ["-", "0.4000", "0"]
     assert rests(table)["better"][2] == "[-0.5, 0.9]"
     assert best(table)[2:] == [[False] * 3]
     right = Skill(0.25, 0.1, 0.4, 0.5, "outline")
     table = leaderboard([iqtt_scores("q", [1, 0], skills={"iqtt_accuracy": right})])[0]
     assert table.head[2] == "IQTT accuracy: skill ↑"
-    assert values(table)["floor: outline"] == ["0", "0.5000"]
-    assert values(table)["floor: chance"] == ["-", "0.3333"]
+    assert values(table)["baseline: outline"] == ["0", "0.5000"]
+    assert values(table)["baseline: chance"] == ["-", "0.3333"]
 
 
 def test_methods_that_are_not_above_the_floor_have_no_rank_and_the_next_column_orders_them():
@@ -208,10 +170,10 @@ def test_methods_that_are_not_above_the_floor_have_no_rank_and_the_next_column_o
         for n, ends in shapes.items()
     ]  # fmt: skip
     table = leaderboard(files, paper=False)[0]
-    floor = "floor: flat cut-out"
+    floor = "baseline: cut-out"
     assert ranks(table)[:4] == [("1", "knows"), ("", floor), ("", "tries"), ("", "flat")]
     (ranking,) = rankings(files[:2], paper=False)
-    assert ranks(ranking.tables[0])[:3] == [("", floor), ("", "tries"), ("", "flat")]
+    assert ranks(ranking.table)[:3] == [("", floor), ("", "tries"), ("", "flat")]
 
 
 def relief(name, iou, floor):
@@ -229,20 +191,9 @@ def test_the_skill_of_relief_ranks_and_its_floor_stands_beside_each_score():
         "Segmentation (relief IoU) ↑ (fraction)",
     )
     rest = rests(table)
-    assert list(rest) == ["seen", "guess", "floor: empty room"]
-    assert [rest[n][1].split("floor ")[-1] for n in ("seen", "guess")] == ["0.2000", "0.3600"]
-    assert values(table)["floor: empty room"] == ["0", "-"]
-
-
-def test_what_is_too_wide_becomes_two_tables():
-    names = ("chamfer", "hausdorff", "mse_depth", "relief_iou")
-    columns = {name: [0.2] * 4 for name in names}
-    skills = {name: Skill(0.5, None, None, 0.4, f"empty_room_{name}") for name in names[:3]}
-    ranking, scores = leaderboard([rooms_scores("a", columns, SCENES, skills=skills)], paper=False)
-    names = ("Chamfer", "Hausdorff", "MSE-depth")
-    assert ranking.head[2:] == tuple(f"{name}: skill ↑" for name in names)
-    assert scores.head[2] == "Segmentation (relief IoU) ↑ (fraction)"
-    assert [ranks(table)[0][0] for table in (ranking, scores)] == ["1", ""]
+    assert list(rest) == ["seen", "guess", "baseline: empty room"]
+    assert [rest[n][1].split("baseline ")[-1] for n in ("seen", "guess")] == ["0.2000", "0.3600"]
+    assert values(table)["baseline: empty room"] == ["0", "-"]
 
 
 def test_a_test_set_has_one_floor():
@@ -286,8 +237,8 @@ def test_a_set_that_cannot_tell_methods_apart_says_so():
         files = [rooms_scores(n, c, range(4)) for n, c in zip("ab", columns, strict=True)]
         (ranking,) = rankings(files, ["chamfer"], paper=False)
         assert ranking.mute
-        assert [entry.rank for entry in ranking.entries] == ["", ""]
-        assert best(ranking.tables[0]) == [[False]] * 2
+        assert ranking.ranks == ("", "")
+        assert best(ranking.table) == [[False]] * 2
     assert not rankings([rooms("a"), rooms("b")], paper=False)[0].mute
 
 
@@ -296,8 +247,7 @@ def test_a_method_that_is_the_floor_says_so():
     files = [skilled("room", 0.4, skills={"chamfer": floor}), skilled("better")]
     table = leaderboard(files, ["chamfer"], paper=False)[0]
     ((cell, *_),) = [row.cells[3:] for row in table.rows if row.cells[1].value == "room"]
-    assert (cell.value, cell.rest, cell.best) == ("0", "is the floor", False)
-    assert sum(note.startswith("room: ") for note in table.notes) == 1
+    assert (cell.value, cell.rest, cell.best) == ("0", "baseline itself", False)
 
 
 def test_the_papers_figures_of_the_shown_scores_are_marked_and_unranked():
@@ -315,7 +265,7 @@ def test_the_papers_figures_of_the_shown_scores_are_marked_and_unranked():
     assert (values(people)[label][-1], rests(people)[label][-1]) == ("0.7329", "± 0.148")
     # The questions are of mirror images, and the paper's are not.
     kinds = {row.kind for row in leaderboard([iqtt_scores("b", [1, 0])])[0].rows}
-    assert kinds == {"", "floor"}
+    assert kinds == {"", "baseline"}
 
 
 def test_methods_that_see_the_first_view_alone_are_ranked_apart():
@@ -323,17 +273,14 @@ def test_methods_that_see_the_first_view_alone_are_ranked_apart():
     shown = {"a": "scored_view", "b": "first_view", "c": "no_view", "d": "first_view"}
     files = [replace(rooms_scores(n, columns, SCENES), shown=s) for n, s in shown.items()]
     looks, first, none = rankings(files, paper=False)
-    assert [[entry.label for entry in r.entries] for r in (looks, first, none)] == [
-        ["a"],
-        ["b", "d"],
-        ["c"],
-    ]
-    heads = [ranking.tables[0].head[2:] for ranking in (looks, first, none)]
+    methods = [[file.method for file in r.files] for r in (looks, first, none)]
+    assert methods == [["a"], ["b", "d"], ["c"]]
+    heads = [ranking.table.head[2:] for ranking in (looks, first, none)]
     assert [head[0].split()[0] for head in heads] == ["Shape", "Depth", "Depth"]
     assert not any("behind" in column for column in heads[0])
     alone = [replace(file, columns={**file.columns, "view_index": 0 * file.ids}) for file in files]
     (together,) = rankings(alone, paper=False)
-    assert len(together.entries) == 4
+    assert len(together.files) == 4
 
 
 def test_closed_rooms_are_in_metres_and_beside_no_figure_of_the_paper(interior_path, tmp_path):
