@@ -40,8 +40,8 @@ JOBS = {
     "scores": Job(
         [
             f"scenegen render --n 20000 {SMALL}",
-            "bench baseline constant --train rooms.h5 --data rooms.h5 --out constant.h5",
-            "bench score constant.h5 --truth rooms.h5 --json scores.json --workers 1",
+            "bench baseline oracle --data rooms.h5 --out scored.h5",
+            "bench score scored.h5 --truth rooms.h5 --json scores.json --workers 1",
         ],
         700,
     ),
