@@ -3,14 +3,13 @@
 Heavy imports happen inside the commands, so that `--help` is quick and works without torch.
 """
 
-import inspect
 import json
 import shlex
 from collections.abc import Mapping
 from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -34,6 +33,9 @@ from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import LARGEST, OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputFolder
+
+if TYPE_CHECKING:
+    from baselines.training.baseline import Baseline
 
 UNTRAINED = {
     "constant": "rooms: one depth everywhere, the mean of the training rooms",
@@ -61,18 +63,21 @@ REFERENCE = ("pix2shape", "pix2shape-compact", "pix2shape-rays", "pix2shape-view
 CUT_OUTS = (
     "cut-out", "picture-outline", "balls", "outline-regression", "outline-relief", "nearest",
 )  # fmt: skip
-# Baselines that are trained with `bench train NAME`: their modules, see `baselines.training`, and
-# what they are. A new one is a line here.
+# Baselines that are trained with `bench train NAME`: the modules of their `BASELINE`, and what they
+# are. A new one is a line here.
 HOMES = {
     "cnn": ("resnets.cnn", "questions: ResNets and a softmax over the answers"),
     "depth-completed": ("relief.depth_completed", "rooms: a network that completes the first view"),
-    "depth-match": ("depth_match", "questions: depth from a network, turned until views agree"),
+    "depth-match": (
+        "depth_match.training",
+        "questions: depth from a network, turned until views agree",
+    ),
     "depth-supervised": (
         "relief.depth_supervised",
         "rooms: a network trained with true depth",
     ),
-    "ptn": ("ptn", "rooms and questions: voxels, learned from silhouettes"),
-    "rezende": ("rezende", "questions: meshes, by a renderer without gradients"),
+    "ptn": ("ptn.training", "rooms and questions: voxels, learned from silhouettes"),
+    "rezende": ("rezende.training", "questions: meshes, by a renderer without gradients"),
     "siamese": ("resnets.siamese", "questions: the answer whose features are nearest"),
     "view-pairs": (
         "relief.view_pairs",
@@ -165,7 +170,9 @@ def baseline(
         with shown_rows() as show:
             how: dict[str, Any] = {"overwrite": overwrite, "progress": show}
             if name in TRAINED:
-                _module(name).write_submission(data, out, weights, **how)
+                from baselines.training.submission import write_submission
+
+                write_submission(_baseline(name), data, out, weights, **how)
             elif name in CUT_OUTS:
                 from baselines.cut_outs import write_cut_outs
 
@@ -212,10 +219,10 @@ def _check_task(name: str, data: str) -> None:
         return  # its reader says so, after what is missing otherwise
     task = ALL[name].partition(":")[0]
     with OpenFile(data, "file of rooms or questions") as opened:
-        found = DATA_FORMATS.get(read_text(opened.file, "format", data) or "", task)
-    if task in ("rooms", "questions") and task != found:
-        others = ", ".join(other for other in ALL if ALL[other].startswith(f"{found}:"))
-        raise click.UsageError(f"{name} predicts {task}, and {data} holds {found}; try {others}")
+        stored = DATA_FORMATS.get(read_text(opened.file, "format", data) or "", task)
+    if task in ("rooms", "questions") and task != stored:
+        others = ", ".join(other for other in ALL if ALL[other].startswith(f"{stored}:"))
+        raise click.UsageError(f"{name} predicts {task}, and {data} holds {stored}; try {others}")
 
 
 def _answer_by_cubes(data: str, out: str, how: Mapping[str, Any]) -> None:
@@ -299,20 +306,15 @@ def train_baseline(
         raise click.UsageError(f"{message}; leave them out")
     if minutes is not None and iterations is not None:
         raise click.UsageError("--minutes decides --iterations; leave one of them out")
-    module = _module(name)
-    if stream is not None and not hasattr(module, "STREAMED"):
+    home = _baseline(name)
+    if stream is not None and home.streamed is None:
         raise click.UsageError(f"--stream: {name} learns from files")
+    from baselines.training.baseline import train
     from baselines.training.machine import Machine
     from scenegen.common.records import check, from_json
 
-    machine = Machine(device, minutes=minutes)
-    parameters = inspect.signature(module.train).parameters.values()
-    arguments = {p.name for p in parameters if p.kind is p.KEYWORD_ONLY} - {
-        "resume",
-        "progress",
-        "streamed",
-    }
-    names = {field.name for field in fields(module.Settings)}
+    machine, arguments = Machine(device, minutes=minutes), set(home.options)
+    names = {field.name for field in fields(home.settings)}
     if labels is not None and "labels" not in arguments:
         raise click.UsageError(f"--labels: {name} has no such setting")
     others = sorted((names | arguments) - options.keys())
@@ -323,26 +325,27 @@ def train_baseline(
             check(isinstance(value, str), key, repr(value), "a text")
         chosen[key] = value
     how = {key: chosen.pop(key) for key in arguments & chosen.keys()}
-    made = from_json(module.Settings, json.dumps(chosen), "settings")
+    made = from_json(home.settings, json.dumps(chosen), "settings")
     text = ""
-    given = training_data((*data, *more), stream, allow_test_set)
-    with given as files, shown_training(out, machine.every) as show:
+    opened = training_data((*data, *more), stream, allow_test_set)
+    with opened as files, shown_training(out, machine.every) as show:
 
         def remember(done: int, total: int, numbers: Mapping[str, float]) -> None:
             nonlocal text
             text = ", ".join(f"{key} {value:.3g}" for key, value in numbers.items())
             show(done, total, numbers)
 
-        weights = module.train(files, out, made, machine, **how, resume=resume, progress=remember)
+        weights = train(home, files, out, made, machine, resume=resume, progress=remember, **how)
     reached = f" ({text})" if text else ""
     use = f"bench baseline {name} --weights {shlex.quote(str(weights))} --data ..."
     print_line(f"{weights}: {name} trained on {files.where}{reached}; now `{use}`")
 
 
-def _module(name: str) -> Any:
-    """Return the module of a trained baseline. Raises UserError where torch is missing."""
+def _baseline(name: str) -> "Baseline":
+    """Return a trained baseline. Raises UserError where torch is missing."""
     needs_torch(name, ("torch", "safetensors"))
-    return import_module(f"baselines.{HOMES[name][0]}")
+    home: Baseline = import_module(f"baselines.{HOMES[name][0]}").BASELINE
+    return home
 
 
 @click.command(epilog=f"{EXAMPLE}bench probe hf:facebook/dinov2-base --data iqtt --out dinov2")
@@ -375,8 +378,8 @@ def probe(model: str, data: str, out: str, device: str, batch: int) -> None:
     kinds = list(encoders.accuracies(scores[0]))
     floors = scores[0].question_floors
     rows = [["layer", *kinds]]
-    for i, one in enumerate(scores):
-        values = encoders.accuracies(one).values()
+    for i, layer in enumerate(scores):
+        values = encoders.accuracies(layer).values()
         rows.append([str(i), *(" ".join(with_interval(v.value, v.low, v.high)) for v in values)])
     rows.append(["floor", *(number(floors[k].accuracy) if k in floors else "" for k in kinds)])
     for line in aligned(rows):

@@ -81,12 +81,20 @@ class View:
 
 @dataclass(frozen=True, eq=False)
 class RecordedScene:
-    """A scene: `steps` are its places on timelines, `objects` their names, `text` is Markdown."""
+    """A scene that is recorded.
+
+    Attributes:
+        steps: its places on timelines, by their names.
+        objects: names of its objects.
+        text: in Markdown.
+        absent: names of views that other scenes of the recording may have.
+    """
 
     steps: Mapping[str, int]
     views: Sequence[View]
     objects: Sequence[str]
     text: str
+    absent: Sequence[str] = ()
 
 
 def scene_rows(rooms: RoomsFile, items: Sequence[int] | None = None) -> list[list[int]]:
@@ -110,7 +118,10 @@ def room_scenes(rooms: RoomsFile, scenes: Iterable[Sequence[int]]) -> Iterator[R
         names = [item.shape for item in scene.objects]
         listed = markdown(printable(", ".join(names) or "none"))
         text = f"# Scene {scene.index}\n\nObjects: {listed}"
-        yield RecordedScene({SCENE: scene.index}, [room_view(r) for r in of_scene], names, text)
+        views, steps = [room_view(room) for room in of_scene], {SCENE: scene.index}
+        every = {f"view_{k}" for k in range(len(scene.cameras))}
+        absent = sorted(every - {view.name for view in views})
+        yield RecordedScene(steps, views, names, text, absent)
 
 
 def room_view(room: Room) -> View:
@@ -157,12 +168,18 @@ def write_recording(
 
 
 def _start_scene(recording: "RecordingStream", scene: RecordedScene) -> None:
-    """Go to the steps of a scene, in the place of what is there, and record all but its views."""
+    """Go to the steps of a scene, and record all but its views.
+
+    What it records takes the place of what is there. Views that it lacks are cleared by name: where
+    all is cleared first, the viewer shows no cameras.
+    """
     import rerun as rr
 
     for timeline, step in scene.steps.items():
         recording.set_time(timeline, sequence=step)
-    recording.log("/", rr.Clear(recursive=True))
+    for name in scene.absent:
+        for place in ("pixels", "world/cameras", "world/truth", "world/prediction"):
+            recording.log(f"{place}/{name}", rr.Clear(recursive=True))
     recording.log("about", rr.TextDocument(scene.text, media_type="text/markdown"))
     first = scene.views[0]
     across = np.ptp([0.0, *first.truth.points[first.truth.in_view][:, 0]])
@@ -240,7 +257,7 @@ def _layout(panels: Mapping[str, Sequence[str]], timeline: str) -> "Blueprint":
             rrb.Spatial3DView(origin="world", name="points and cameras"),
             rrb.Vertical(rrb.Tabs(*tabs), about, row_shares=[3, 1]),
         ),
-        rrb.TimePanel(timeline=timeline, state="collapsed"),
+        rrb.TimePanel(timeline=timeline, state="collapsed", play_state="paused"),
         collapse_panels=True,
         auto_views=False,
     )

@@ -1,5 +1,6 @@
 """Pages name modules, commands and options that there are."""
 
+import ast
 import re
 import shlex
 from functools import cache
@@ -112,6 +113,15 @@ def test_commands_and_options_are_there(page):
     spans = " ".join(s for s in SPAN.findall(text) if s.startswith("--"))
     options = set(re.findall(r"(?<![\w-])--[a-z][a-z-]+", spans))
     assert sorted(options - every_option() - OTHERS) == []
+
+
+def test_what_benchmarks_and_examples_import_is_there():
+    """No other check reads them."""
+    for path in [*(ROOT / "benchmarks").rglob("*.py"), *(ROOT / "examples").rglob("*.py")]:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and re.match(PACKAGES, node.module or ""):
+                names = [f"{node.module}.{alias.name}" for alias in node.names]
+                assert [name for name in names if not is_there(name)] == [], path
 
 
 def test_what_is_gone_is_seen():

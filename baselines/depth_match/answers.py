@@ -7,20 +7,16 @@ beside the outline. What lies behind is hidden, and may be there.
 """
 
 import math
-from pathlib import Path
 
 import torch
 from torch import Tensor
 
-from baselines.depth_match.network import METHOD, seen_depth
-from baselines.training.checkpoint import bundled, load_weights
-from baselines.training.questions import Progress, each_question, open_test
+from baselines.depth_match.network import Card, seen_depth
+from baselines.relief.network import UNet
+from baselines.training.baseline import Answers
 from baselines.training.rotations import finer, rotation_grid
-from iqtt import SplitSpec
-from metrics.prediction_writer import write_answers
-from scenegen.files.new_file import check_writable
+from iqtt import QuestionsFile, SplitSpec
 
-FILES = Path(__file__).with_name("files")
 NOTES = (
     "told: in training, true depth and camera distances; the field of view, and that pictures of a"
     " question have one camera distance and the shape's centre on their axis"
@@ -33,28 +29,15 @@ FINER = (0.12, 0.07, 0.04, 0.02)  # radians of these turns, in each round
 MOST = 0.2  # camera distances; a point is denied by no more
 
 
-@torch.inference_mode()
-def write_submission(
-    data: str | Path,
-    out: str | Path,
-    weights: str | Path | None = None,
-    *,
-    overwrite: bool = False,
-    progress: Progress = lambda done, total: None,
-) -> None:
-    """Write answers to the questions of a file, and their scores, as `baselines.training` says."""
-    check_writable(Path(out), overwrite)
-    network, card = load_weights(weights or bundled(FILES, METHOD), METHOD)
-    with open_test(data, card.settings.size) as questions:
-        fov = (questions.spec or SplitSpec()).fov_y_degrees
+def answers_of(network: UNet, _card: Card, questions: QuestionsFile) -> Answers:
+    """Return how a network of depth answers questions."""
+    fov = (questions.spec or SplitSpec()).fov_y_degrees
 
-        def scores(images: Tensor) -> Tensor:
-            depth = [seen_depth(network, pictures) for pictures in images]
-            return -torch.stack([least_denials(one, fov) for one in depth])
+    def scores(images: Tensor) -> Tensor:
+        depth = [seen_depth(network, pictures) for pictures in images]
+        return -torch.stack([least_denials(maps, fov) for maps in depth])
 
-        values = each_question(questions, card.settings.size, scores, 1, progress=progress)
-    numbers = values.double().numpy()
-    write_answers(out, data, method="depth-match", scores=numbers, notes=NOTES, overwrite=overwrite)
+    return Answers(scores, notes=NOTES)
 
 
 @torch.inference_mode()
@@ -66,7 +49,7 @@ def least_denials(depth: Tensor, fov_y_degrees: float) -> Tensor:
             first.
     """
     half = math.tan(math.radians(fov_y_degrees) / 2)
-    points = [surface_points(one, half) for one in depth]
+    points = [surface_points(maps, half) for maps in depth]
     start, least = torch.from_numpy(rotation_grid(GRID)), []
     for answer, shown in zip(points[1:], depth[1:], strict=True):
 

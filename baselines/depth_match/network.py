@@ -12,10 +12,10 @@ from torch import Tensor
 from baselines.pix2shape.network.architecture import contrast
 from baselines.relief import network as relief
 from baselines.relief.network import UNet
-from baselines.training.checkpoint import Card as BaseCard
+from baselines.training import checkpoint
 from baselines.training.checkpoint import Method
 
-INPUTS = 3 + 3
+INPUTS = 3 + 3  # colours, and their contrast
 BACKGROUND = 0.02  # largest difference from the corner's colour, of square roots of radiance
 
 
@@ -28,7 +28,7 @@ class Settings(relief.Settings):
 
 
 @dataclass(frozen=True)
-class Card(BaseCard):
+class Card(checkpoint.Card):
     """The card of a network of depth."""
 
     settings: Settings

@@ -13,19 +13,22 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from baselines.depth_match.answers import answers_of
 from baselines.depth_match.network import METHOD, Card, Settings, channels, symmetric
+from baselines.relief.network import UNet
 from baselines.relief.training import learning_rate, shape_loss
-from baselines.training.checkpoint import WEIGHTS
-from baselines.training.data import TrainingFiles, requests
-from baselines.training.fit import Loss, Progress, fit
-from baselines.training.images import Array, Draws, check_reducible, read_ahead
-from baselines.training.machine import Machine, chosen_device
+from baselines.training.baseline import Baseline, Lesson, Run
+from baselines.training.checkpoint import State
+from baselines.training.data import requests
+from baselines.training.fit import Loss
+from baselines.training.images import Array, Draws, check_reducible
 from baselines.training.questions import UNLABELED, check_truth, question_images
-from baselines.training.run_folder import alone_in, begun, earlier_state
 from baselines.training.streams import TrainingStreams
 from iqtt import QuestionsFile, SplitSpec
 from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
+
+STREAMED = {"with_depth": True}  # settings of the questions of streams
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,60 +39,39 @@ class Pictures:
     height: Tensor
 
 
-STREAMED = {"with_depth": True}  # settings of the questions of streams
-
-
-def train(
-    data: TrainingFiles | TrainingStreams,
-    run_folder: str | Path,
-    settings: Settings = Settings(),  # noqa: B008 (it is frozen)
-    machine: Machine | None = None,
-    *,
-    resume: bool = False,
-    progress: Progress = lambda done, total, losses: None,
-) -> Path:
-    """Train on the unlabelled questions of files with depth, or on streams.
-
-    The arguments are those that `baselines.training` says.
+def lesson(run: Run) -> Lesson:
+    """Return what a run learns: the unlabelled questions of files with depth, or of streams.
 
     The loss is the mean absolute error of height, plus `shape_loss` of each whole shape. Pictures
     are shown turned and mirrored.
     """
-    folder, machine = Path(run_folder), machine or Machine()
-    device = chosen_device(machine.device)
-    with alone_in(folder):
-        earlier = earlier_state(folder, METHOD, resume)
-        settings = settings if earlier is None else earlier.card.settings
-        shown, each = None, 0
-        if isinstance(data, TrainingStreams):
-            shown = data.shown(settings.size, settings.seed, **STREAMED)
-            each = -(-settings.batch // (1 + SplitSpec.answers))  # questions
-            card = Card("depth-match", settings, **shown.card())
-        else:
-            files = data.questions(UNLABELED)
-            pictures = read_pictures(files, settings.size)
-            card = Card("depth-match", settings, **requests(files))
-        state = begun(METHOD, card, earlier, data.where, device)
-        at = state.card.iteration
-        source: Iterator[Pictures]
-        if shown:
-            blocks = shown.blocks(at * each, each, machine.workers)
-            source = (read_pictures([cast(QuestionsFile, b)], settings.size) for b in blocks)
-        else:
-            source = batches_of(pictures, settings, at)
-        batches = read_ahead(source, device)
+    settings, rows = run.settings, 0
+    if isinstance(run.data, TrainingStreams):
+        shown = run.data.shown(settings.size, settings.seed, **STREAMED)
+        rows = -(-settings.batch // (1 + SplitSpec.answers))  # questions
+        told = shown.card()
+    else:
+        files = run.data.questions(UNLABELED)
+        pictures = read_pictures(files, settings.size)
+        told = requests(files)
 
-        def losses(number: int) -> Iterator[Loss]:
-            batch = next(batches)
-            form = int(item_rng(settings.seed, number, Purpose.TRAINING).integers(8))
-            image, height = (symmetric(one.float(), form) for one in (batch.image, batch.height))
-            shown = height.isfinite()
-            errors = torch.where(shown, state.network.relief(channels(image)) - height, 0)
-            off = errors.abs().sum() / shown.sum().clamp(min=1)
-            yield Loss(off + shape_loss(errors, shown.int()), {"error of depth": off})
+    def batches(first: int) -> Iterator[Pictures]:
+        if rows == 0:
+            return batches_of(pictures, settings, first)
+        blocks = shown.blocks(first * rows, rows, run.machine.workers)
+        return (read_pictures([cast(QuestionsFile, b)], settings.size) for b in blocks)
 
-        fit(folder, METHOD, state, losses, learning_rate, machine, rows=each, progress=progress)
-    return folder / WEIGHTS
+    return Lesson(Card("depth-match", settings, **told), batches, _loss, learning_rate, rows=rows)
+
+
+def _loss(state: State[Card, UNet], batch: Pictures, number: int) -> Loss:
+    seed = state.card.settings.seed
+    form = int(item_rng(seed, number, Purpose.TRAINING).integers(8))
+    image, height = (symmetric(maps.float(), form) for maps in (batch.image, batch.height))
+    shown = height.isfinite()
+    errors = torch.where(shown, state.network.relief(channels(image)) - height, 0)
+    off = errors.abs().sum() / shown.sum().clamp(min=1)
+    return Loss(off + shape_loss(errors, shown.int()), {"error of depth": off})
 
 
 def batches_of(pictures: Pictures, settings: Settings, first: int) -> Iterator[Pictures]:
@@ -119,7 +101,7 @@ def read_pictures(files: Sequence[QuestionsFile], size: int) -> Pictures:
             distance = float(questions.read("camera_distance", row))
             height[row] = 1 - depth_medians(questions.read("depth", row), size) / distance
         parts.append((image.reshape(-1, 3, size, size), height.reshape(-1, size, size)))
-    return Pictures(*(torch.from_numpy(np.concatenate(one)) for one in zip(*parts, strict=True)))
+    return Pictures(*(torch.from_numpy(np.concatenate(part)) for part in zip(*parts, strict=True)))
 
 
 def depth_medians(depth: Array, size: int) -> Array:
@@ -128,3 +110,13 @@ def depth_medians(depth: Array, size: int) -> Array:
     blocks = depth.reshape(count, size, block, size, block).swapaxes(2, 3)
     ordered = np.sort(blocks.reshape(count, size, size, block * block), axis=-1)  # NaN comes last
     return np.asarray(ordered[..., (block * block - 1) // 2])
+
+
+BASELINE = Baseline(
+    METHOD,
+    Settings,
+    Path(__file__).with_name("files"),
+    lesson,
+    answers=answers_of,
+    streamed=STREAMED,
+)

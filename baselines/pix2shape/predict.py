@@ -3,7 +3,8 @@
 Of the truth only the cameras of rooms are read.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,21 +20,20 @@ from baselines.pix2shape.network.surfels import extrapolated, normals_from_depth
 from baselines.pix2shape.questions import check_background
 from baselines.pix2shape.training.losses import squared_distances
 from baselines.pix2shape.weights import open_weights
+from baselines.training.baseline import Answers, Views
 from baselines.training.images import Array, check_reducible, row_batches
 from baselines.training.machine import chosen_device
-from baselines.training.questions import each_question, is_question_file, open_test
+from baselines.training.questions import is_question_file
 from baselines.training.rooms import camera_poses, input_views, room_images
-from metrics.prediction_writer import RoomPredictionWriter, write_answers
-from scenegen import open_rooms
+from baselines.training.submission import Progress, answer_questions, predict_rooms
+from iqtt import QuestionsFile
 from scenegen.common.errors import SpecError
-from scenegen.files.new_file import check_writable
 from scenegen.rooms.reader import RoomsFile
 
 BATCH = 64  # images at a time
 TOLD = "told: one image of each scene, the cameras, and where the empty room's floor and walls are"
 DEPTH = "told: in training, true depth maps"
 TAUGHT = "told: in training, the lights of its images and the answers of {} questions"
-Progress = Callable[[int, int], Any]  # rows done, rows in all
 
 
 def predict_file(
@@ -55,34 +55,24 @@ def predict_file(
         run: name of this run among several of the method.
         method: the name that the submission must have; None for whatever the weights' is.
 
-    Raises as `open_weights`, `predict_rooms` and `answer_file`, and SpecError for weights of
-    another method.
+    Raises as `open_weights`, `views_of` and `answers_of`, and SpecError for weights of another
+    method.
     """
     model, card = open_weights(weights)
     if method not in (None, card.submission):
         hint = "names tell what a model was told and taught; `pix2shape predict` takes any weights"
         raise SpecError("weights", f"{weights}, whose method is {card.submission}", method, hint)
     model.to(chosen_device(device))
-    check_writable(Path(out), overwrite)
-    how: dict[str, Any] = {"run": run, "overwrite": overwrite, "progress": progress}
+    how: dict[str, Any] = {"overwrite": overwrite, "progress": progress}
     if is_question_file(data):
-        answer_file(model, data, out, labels=card.labels + card.earlier_labels, **how)
+        answers = partial(answers_of, model, card.labels + card.earlier_labels, run)
+        answer_questions(data, out, model.config.method, model.config.networks.size, answers, **how)
     else:
-        predict_rooms(model, data, out, earlier_depth=card.earlier_depth, **how)
+        predict_rooms(data, out, partial(views_of, model, card.earlier_depth, run), **how)
 
 
-@torch.inference_mode()
-def predict_rooms(
-    model: Pix2Shape,
-    data: str | Path,
-    out: str | Path,
-    *,
-    earlier_depth: bool = False,
-    run: str = "",
-    overwrite: bool = False,
-    progress: Progress = lambda done, total: None,
-) -> None:
-    """Write depth and normals of every view of a rooms file, each scene from one image alone.
+def views_of(model: Pix2Shape, earlier_depth: bool, run: str, rooms: RoomsFile) -> Views:
+    """Return depth and normals of every view of a rooms file, each scene from one image alone.
 
     That image is the scene's view 0, or the first of its views that the file holds, which is
     warned about. The encoder sees it once; the decoder is asked for each view of the scene.
@@ -92,7 +82,7 @@ def predict_rooms(
             began; the submission's name and notes tell this.
 
     Raises SpecError where the model does not suit rooms; FileFormatError where a camera is not
-    known or the file is damaged; OSError.
+    known or the file is damaged.
     """
     spec = model.config.networks
     if not spec.camera or spec.classes:
@@ -101,88 +91,60 @@ def predict_rooms(
     device = next(model.parameters()).device
     method = TAUGHT_DEPTH if earlier_depth else model.config.method
     notes = "; ".join([TOLD] * spec.rays + [DEPTH] * (method == TAUGHT_DEPTH))
-    with open_rooms(data) as rooms:
-        check_reducible(data, rooms.spec.height, rooms.spec.width, spec.size)
-        poses = torch.from_numpy(camera_poses(rooms).astype(np.float32)).to(device)
-        condition, fov = poses[:, :3, 3], rooms.spec.fov_y_degrees
-        inputs, scene_of = input_views(rooms)
-        codes = []
-        for places in row_batches(len(inputs), BATCH):
-            rows = inputs[places]
-            images = room_images(rooms, rows, spec.size).to(device)
-            codes.append(model.codes(images, condition[rows], Cameras(poses[rows], fov)))
-        code = torch.cat(codes)
+    check_reducible(rooms.path, rooms.spec.height, rooms.spec.width, spec.size)
+    poses = torch.from_numpy(camera_poses(rooms).astype(np.float32)).to(device)
+    condition, fov = poses[:, :3, 3], rooms.spec.fov_y_degrees
+    inputs, scene_of = input_views(rooms)
+    codes = []
+    for places in row_batches(len(inputs), BATCH):
+        rows = inputs[places]
+        images = room_images(rooms, rows, spec.size).to(device)
+        codes.append(model.codes(images, condition[rows], Cameras(poses[rows], fov)))
+    code = torch.cat(codes)
 
-        def depth(rows: Array) -> Tensor:
-            views = condition[rows], Cameras(poses[rows], fov)
-            return model.surfels(code[scene_of[rows]], *views).depth
+    def depth(rows: Array) -> Tensor:
+        views = condition[rows], Cameras(poses[rows], fov)
+        return model.surfels(code[scene_of[rows]], *views).depth
 
-        how: dict[str, Any] = {"method": method, "notes": notes, "run": run, "shown": "first_view"}
-        write_depths(rooms, out, data, depth, progress, overwrite=overwrite, **how)
+    return Views(enlarged_views(rooms, depth), "first_view", method, notes, run)
 
 
-def answer_file(
-    model: Pix2Shape,
-    data: str | Path,
-    out: str | Path,
-    *,
-    labels: int = 0,
-    run: str = "",
-    overwrite: bool = False,
-    progress: Progress = lambda done, total: None,
-) -> None:
-    """Write answers to the questions of a file, from images alone.
+def answers_of(model: Pix2Shape, labels: int, run: str, questions: QuestionsFile) -> Answers:
+    """Return how a model answers questions, from images alone.
 
     An answer's score is minus the distance of its z_scene from the reference's, as in the paper.
 
     Args:
         labels: answers that training was given; the submission's notes tell this.
 
-    Raises SpecError where the model does not suit questions; else as `iqtt.QuestionsFile`.
+    Raises SpecError where the model does not suit questions.
     """
     spec, device = model.config.networks, next(model.parameters()).device
     if spec.condition:
         raise SpecError("weights", "a model that is told the camera", "one for questions")
+    check_background(questions, model.config)
 
     def scores(images: Tensor) -> Tensor:
         flat = images.flatten(0, 1).to(device)
         codes = model.codes(flat, flat.new_empty(len(flat), 0))[:, : spec.z_scene]
         return -squared_distances(codes.view(*images.shape[:2], -1)).sqrt()
 
-    with open_test(data, spec.size) as questions:
-        check_background(questions, model.config)
-        batch = BATCH // (1 + questions.answers)
-        values = each_question(questions, spec.size, scores, batch, progress=progress)
-    how: dict[str, Any] = {"method": model.config.method, "run": run, "overwrite": overwrite}
-    notes = TAUGHT.format(labels)
-    write_answers(out, data, scores=values.double().numpy(), notes=notes, **how)
+    return Answers(scores, BATCH // (1 + questions.answers), TAUGHT.format(labels), run)
 
 
-def write_depths(
-    rooms: RoomsFile,
-    out: str | Path,
-    data: str | Path,
-    depth_of: Callable[[Array], Tensor],
-    progress: Progress,
-    **how: Any,
-) -> None:
-    """Write the depth of every row of an open rooms file, and the normals that follow from it.
+def enlarged_views(
+    rooms: RoomsFile, depth_of: Callable[[Array], Tensor]
+) -> Iterator[tuple[Array, Array, Array]]:
+    """Yield rows, their depth, and the normals that follow from it, at the size of the images.
 
     Args:
-        data: path of the rooms, as the submission records it.
         depth_of: returns planar depth, (B, S, S), of some rows, which have one field of view.
-        how: as for `RoomPredictionWriter`.
     """
     size, fov = rooms.spec.height, rooms.read("camera/fov_y_degrees", slice(None))
     runs = np.split(np.arange(len(fov)), np.flatnonzero(np.diff(fov)) + 1)
-    batches = (run[places] for run in runs for places in row_batches(len(run), BATCH))
-    with RoomPredictionWriter(out, data, **how) as submission:
-        for rows in batches:
-            depth, normal = enlarged(depth_of(rows), float(fov[rows[0]]), size)
-            normals = np.moveaxis(normal.cpu().numpy(), 1, -1)
-            for row, z, n in zip(rows, depth.cpu().numpy(), normals, strict=True):
-                submission.add(int(row), z, n)
-            progress(len(rows), len(rooms))
+    for rows in (run[places] for run in runs for places in row_batches(len(run), BATCH)):
+        depth, normal = enlarged(depth_of(rows), float(fov[rows[0]]), size)
+        yield rows, depth.cpu().numpy(), np.moveaxis(normal.cpu().numpy(), 1, -1)
 
 
 def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Tensor]:

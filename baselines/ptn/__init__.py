@@ -6,13 +6,8 @@
     rooms.py        batches of rooms of several views
     questions.py    batches of polycubes
     matching.py     which of the answers shows the reference's volume
-    submission.py   `write_submission`
-    training.py     `train`
+    submission.py   what is predicted of rooms, and how questions are answered
+    training.py     what is learned; start reading here
 
 docs/baselines.md says what it is told that other baselines are not, and what it reaches.
 """
-
-from scenegen.common.lazy_names import lazy_names
-
-HOMES = {"network": "Settings", "training": "train", "submission": "write_submission"}
-__getattr__ = lazy_names(__name__, HOMES)

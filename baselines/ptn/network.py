@@ -8,14 +8,15 @@ in the paper.
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 from torch.optim import Adam
 
-from baselines.training.checkpoint import Card as BaseCard
-from baselines.training.checkpoint import Method, check_numbers
-from scenegen.common.records import LARGEST, check
+from baselines.training import checkpoint
+from baselines.training.checkpoint import Method, Ranges
+from scenegen.common.records import check
 
 VOXELS = 32  # along each side of the volume; the decoder's layers give no other number
 FIRST_BIAS = -2.0  # of the occupancies' logits: most of a volume is empty
@@ -23,46 +24,40 @@ Corner = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(checkpoint.Settings):
     """Settings of networks and training; defaults suit one core, `width` 64 is the paper's.
 
     Attributes:
         silhouettes: where those of rooms come from, "image" or "ids".
-        size: side of the images that the encoder takes, pixels; a multiple of 8.
-        batch: images of an iteration.
+        size: a multiple of 8.
         views: silhouettes that each image's volume is compared with.
         rays: pixels of each silhouette that an iteration looks at.
         samples: places along each ray.
-        learning_rate: of Adam; it falls to zero over the second half of the iterations.
-        seed: of the first weights and of every random choice of training.
+        learning_rate: it falls to zero over the second half of the iterations.
     """
 
+    RANGES: ClassVar[Ranges] = {
+        "size": (8, 512), "width": (2, 256), "views": (1, 10**7), "rays": (1, 10**7),
+        "samples": (2, 1024), "weight_decay": (0, 1),
+    }  # fmt: skip
     silhouettes: str = "image"
-    size: int = 64
     width: int = 16
     iterations: int = 1700
     batch: int = 12
     views: int = 3
     rays: int = 160
     samples: int = 32
-    learning_rate: float = 1e-3
     weight_decay: float = 0.0
-    seed: int = 0
 
     def __post_init__(self) -> None:
         check(self.silhouettes in ("image", "ids"), "silhouettes", self.silhouettes, "image or ids")
-        ranges = {
-            "size": (8, 512), "width": (2, 256), "iterations": (1, 10**7), "batch": (1, 10**7),
-            "views": (1, 10**7), "rays": (1, 10**7), "samples": (2, 1024),
-            "learning_rate": (1e-12, 1), "weight_decay": (0, 1), "seed": (0, LARGEST),
-        }  # fmt: skip
-        check_numbers(self, ranges)
+        super().__post_init__()
         check(self.size % 8 == 0, "size", self.size, "a multiple of 8")
         check(self.width % 2 == 0, "width", self.width, "an even number")
 
 
 @dataclass(frozen=True)
-class Card(BaseCard):
+class Card(checkpoint.Card):
     """The card of a model.
 
     Attributes:

@@ -1,4 +1,4 @@
-"""`train`: the projection loss, and what batches are drawn from.
+"""What networks learn: the projection loss, and what batches are drawn from.
 
 The loss is the projection loss of Yan et al. (NeurIPS 2016): the mean squared difference of the
 volume's silhouettes from the true ones, over the views of each image. There is no loss on volumes.
@@ -7,6 +7,7 @@ volume's silhouettes from the true ones, over the views of each image. There is 
 import itertools
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import torch
@@ -18,12 +19,12 @@ from baselines.ptn.network import METHOD, Card, Ptn, Settings
 from baselines.ptn.projection import Batch
 from baselines.ptn.questions import BOX, TrainingShapes
 from baselines.ptn.rooms import TrainingRooms, room_box
-from baselines.ptn.submission import AT_ONCE
-from baselines.training.checkpoint import WEIGHTS, load_weights, save_weights
-from baselines.training.data import TrainingFiles, only
-from baselines.training.fit import Loss, Progress, falling_late, fit
-from baselines.training.images import check_reducible, read_ahead
-from baselines.training.machine import Machine, chosen_device
+from baselines.ptn.submission import AT_ONCE, answers_of, views_of
+from baselines.training.baseline import Baseline, Lesson, Run
+from baselines.training.checkpoint import State, load_weights
+from baselines.training.data import only
+from baselines.training.fit import Loss
+from baselines.training.images import check_reducible
 from baselines.training.questions import (
     LABELED,
     UNLABELED,
@@ -31,24 +32,13 @@ from baselines.training.questions import (
     each_question,
     training_answers,
 )
-from baselines.training.run_folder import alone_in, begun, earlier_state
 from iqtt import QuestionsFile
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
 
 
-def train(
-    data: TrainingFiles,
-    run_folder: str | Path,
-    settings: Settings = Settings(),  # noqa: B008 (it is frozen)
-    machine: Machine | None = None,
-    *,
-    labels: int = 0,
-    networks: str | None = None,
-    resume: bool = False,
-    progress: Progress = lambda done, total, losses: None,
-) -> Path:
-    """Train on a file of rooms of several views or of questions, as `baselines.training` says.
+def lesson(run: Run, *, labels: int = 0, networks: str | None = None) -> Lesson:
+    """Return what a run learns from a file of rooms of several views, or of questions.
 
     Args:
         labels: how many answers to learn from, the first ones; they weigh what tells answers apart
@@ -56,52 +46,41 @@ def train(
         networks: weights of another run, whose networks are taken as they are: only `labels` are
             learnt from then.
     """
-    folder, machine = Path(run_folder), machine or Machine()
-    device = chosen_device(machine.device)
-    with alone_in(folder):
-        earlier = earlier_state(folder, METHOD, resume)
-        model = None
-        if earlier is not None:
-            card = earlier.card
-        elif networks is not None:
-            alone = replace(settings, seed=0) == Settings()
-            check(alone, "networks", networks, "no other settings: they have their own")
-            model, card = load_weights(networks, METHOD)
-            card = replace(card, labels=labels, head=())
-        else:
-            card = Card("ptn", settings, labels=labels)
-        source: TrainingShapes | TrainingRooms
-        if data.hold_questions:
-            unlabelled = only(data.questions(UNLABELED), "ptn")
-            source, task, box = TrainingShapes(unlabelled, card.settings), "questions", BOX
-        else:
-            check(card.labels == 0, "labels", card.labels, "0 for rooms, which ask no questions")
-            rooms = only(data.rooms(), "ptn")
-            source, task, box = TrainingRooms(rooms, card.settings), "rooms", room_box(rooms.spec)
-        trained = earlier is not None or model is not None
-        check(not trained or card.task == task, "data", task, f"{card.task}, as the run began with")
-        labelled = None
-        if card.labels:  # looked at before hours of training
-            labelled = only(data.questions(LABELED), "ptn")
-            check_labels(labelled, card.labels)
-            check_reducible(data.where, labelled.height, labelled.width, card.settings.size)
-        if model is None:
-            card = replace(card, task=task, low=box[0], high=box[1])
-            card = replace(card, data=source.data, fingerprint=source.fingerprint)
-            state = begun(METHOD, card, earlier, data.where, device)
-            first = state.card.iteration
-            batches = read_ahead(_batches(source, card.settings.seed, first), device)
+    model = None
+    if run.earlier is not None:
+        card = run.earlier
+    elif networks is not None:
+        alone = replace(run.settings, seed=0) == Settings()
+        check(alone, "networks", networks, "no other settings: they have their own")
+        model, card = load_weights(networks, METHOD)
+        card = replace(card, labels=labels, head=())
+    else:
+        card = Card(run.method, run.settings, labels=labels)
+    source: TrainingShapes | TrainingRooms
+    if run.data.hold_questions:
+        unlabelled = only(run.data.questions(UNLABELED), run.method)
+        source, task, box = TrainingShapes(unlabelled, card.settings), "questions", BOX
+    else:
+        check(card.labels == 0, "labels", card.labels, "0 for rooms, which ask no questions")
+        rooms = only(run.data.rooms(), run.method)
+        source, task, box = TrainingRooms(rooms, card.settings), "rooms", room_box(rooms.spec)
+    trained = run.earlier is not None or model is not None
+    check(not trained or card.task == task, "data", task, f"{card.task}, as the run began with")
+    labelled = None
+    if card.labels:  # looked at before hours of training
+        labelled = only(run.data.questions(LABELED), run.method)
+        check_labels(labelled, card.labels)
+        check_reducible(run.data.where, labelled.height, labelled.width, card.settings.size)
+    if model is None:
+        told = {"data": source.data, "fingerprint": source.fingerprint}
+        card = replace(card, task=task, low=box[0], high=box[1], **told)
+    batches = partial(_batches, source, card.settings.seed)
+    return Lesson(card, batches, _loss, network=model, finish=partial(_with_head, labelled))
 
-            def losses(_number: int) -> Iterator[Loss]:
-                loss = projection_loss(state.network, next(batches))
-                yield Loss(loss, {"loss": loss})
 
-            fit(folder, METHOD, state, losses, falling_late, machine, progress=progress)
-            model, card = state.network.cpu(), state.card
-        if labelled is not None:
-            card = replace(card, head=_head(model.eval(), labelled, card.labels))
-        save_weights(folder / WEIGHTS, METHOD, model, card)
-    return folder / WEIGHTS
+def _loss(state: State[Card, Ptn], batch: Batch, _number: int) -> Loss:
+    loss = projection_loss(state.network, batch)
+    return Loss(loss, {"loss": loss})
 
 
 def _batches(source: TrainingShapes | TrainingRooms, seed: int, first: int) -> Iterator[Batch]:
@@ -110,12 +89,15 @@ def _batches(source: TrainingShapes | TrainingRooms, seed: int, first: int) -> I
         yield source.batch(item_rng(seed, number, Purpose.TRAINING))
 
 
-def _head(model: Ptn, labelled: QuestionsFile, labels: int) -> tuple[float, ...]:
-    """Return how features of answers are weighted, by what the first answers tell."""
+def _with_head(labelled: QuestionsFile | None, model: Ptn, card: Card) -> Card:
+    """Return the card with the weights of features of answers, by what the first answers tell."""
+    if labelled is None:
+        return card
+    model.cpu().eval()
     values = each_question(
-        labelled, model.settings.size, lambda images: features(model, images), AT_ONCE, labels
+        labelled, model.settings.size, lambda images: features(model, images), AT_ONCE, card.labels
     )
-    return fitted_head(values, training_answers(labelled, labels))
+    return replace(card, head=fitted_head(values, training_answers(labelled, card.labels)))
 
 
 def projection_loss(model: Ptn, batch: Batch) -> Tensor:
@@ -124,3 +106,14 @@ def projection_loss(model: Ptn, batch: Batch) -> Tensor:
     rays = batch.origin, batch.direction
     shown = projection.silhouettes(volume, model.box, *rays, model.settings.samples)
     return torch.mean((shown - batch.silhouette) ** 2)
+
+
+BASELINE = Baseline(
+    METHOD,
+    Settings,
+    Path(__file__).with_name("files"),
+    lesson,
+    options=("labels", "networks"),
+    answers=answers_of,
+    views=views_of,
+)

@@ -14,18 +14,16 @@ from torch import Tensor
 from baselines.pix2shape.matching.search import STEPS, paper_rooms_only, reliefs, reprojected
 from baselines.pix2shape.network.architecture import RAY_PLANES
 from baselines.pix2shape.network.empty_rooms import NEAREST, Cameras, empty_rooms, planes_of
-from baselines.relief import depth_supervised, predict, training
+from baselines.relief import depth_supervised, training
 from baselines.relief.network import Card, Relief, Settings, UNet, predicted_depth
+from baselines.relief.predict import FILES, views_of
 from baselines.relief.training import Lessons
+from baselines.training.baseline import Baseline, Lesson, Run
 from baselines.training.checkpoint import Method, bundled, load_weights
-from baselines.training.data import TrainingFiles
-from baselines.training.fit import Progress
-from baselines.training.machine import Machine
 from baselines.training.rooms import Rooms
 from scenegen.common.records import check
 
 THICK = 0.2  # scene units; how far before or behind a surface is told, at most
-__all__ = ["Settings", "train", "write_submission"]
 
 
 class Completion(Relief):
@@ -66,9 +64,6 @@ class Completion(Relief):
         return self.completed.relief(channels)
 
 
-METHOD = Method("depth-completed", Card, Completion)
-
-
 def lessons_of(rooms: Rooms, settings: Settings, folder: Path | None, progress: Any) -> Lessons:
     """Return the lessons of `depth-supervised`, for any view of the scene of each image."""
     lessons = depth_supervised.lessons_of(rooms, settings, folder, progress)
@@ -86,36 +81,32 @@ def views_of_scenes(rooms: Rooms) -> list[Tensor]:
     return views
 
 
-def train(
-    data: TrainingFiles,
-    run_folder: str | Path,
-    settings: Settings = Settings(),  # noqa: B008 (it is frozen)
-    machine: Machine | None = None,
-    *,
-    start: str | None = None,
-    resume: bool = False,
-    progress: Progress = lambda done, total, losses: None,
-) -> Path:
-    """Train the network that completes on files of rooms, as `baselines.training` says.
+def lesson(run: Run, *, start: str | None = None) -> Lesson:
+    """Return what a run learns: to complete what the first view of each scene shows.
 
     Args:
         start: weights of `depth-supervised`, whose network sees; those of the package by default.
 
     Raises SpecError where its size or width is another one, too.
     """
-    check(start is None or not resume, "start", start, "none, as --resume goes on with a run")
+    new = run.earlier is None
+    check(start is None or new, "start", start, "none, as --resume goes on with a run")
 
     def begin(network: Completion) -> None:
-        path = start or bundled(predict.FILES, depth_supervised.METHOD)
+        path = start or bundled(FILES, depth_supervised.METHOD)
         seen, card = load_weights(path, depth_supervised.METHOD)
-        sizes = [(s.size, s.width) for s in (card.settings, settings)]
+        sizes = [(s.size, s.width) for s in (card.settings, run.settings)]
         check(sizes[0] == sizes[1], "start", f"size and width {sizes[0]}", f"{sizes[1]}")
         network.seen.load_state_dict(seen.state_dict())
 
-    return training.train(
-        METHOD, lessons_of, True, begin, data, run_folder, settings, machine,
-        resume=resume, progress=progress,
-    )  # fmt: skip
+    return training.lesson(lessons_of, run, with_depth=True, prepare=begin)
 
 
-write_submission = partial(predict.write_submission, METHOD, told_in_training=depth_supervised.TOLD)
+BASELINE = Baseline(
+    Method("depth-completed", Card, Completion),
+    Settings,
+    FILES,
+    lesson,
+    options=("start",),
+    views=partial(views_of, depth_supervised.TOLD),
+)

@@ -8,15 +8,16 @@ import torch
 from torch import Tensor
 
 from baselines.pix2shape.network.empty_rooms import empty_rooms
-from baselines.relief import predict, training
+from baselines.relief import training
 from baselines.relief.network import Card, Settings, relief_network
+from baselines.relief.predict import FILES, views_of
 from baselines.relief.training import Lessons
+from baselines.training.baseline import Baseline
 from baselines.training.checkpoint import Method
 from baselines.training.rooms import Rooms
 
 METHOD = Method("depth-supervised", Card, relief_network)
 TOLD = "; in training, true depth and object ids"
-__all__ = ["Settings", "train", "write_submission"]
 
 
 def lessons_of(rooms: Rooms, settings: Settings, _folder: Path | None, _progress: Any) -> Lessons:
@@ -34,6 +35,11 @@ def lessons_of(rooms: Rooms, settings: Settings, _folder: Path | None, _progress
     return Lessons(torch.arange(len(rooms)), target, inside=rooms.inside)
 
 
-STREAMED: dict[str, Any] = {}  # settings of the rooms of streams
-train = partial(training.train, METHOD, lessons_of, True, training.as_it_is)
-write_submission = partial(predict.write_submission, METHOD, told_in_training=TOLD)
+BASELINE = Baseline(
+    METHOD,
+    Settings,
+    FILES,
+    partial(training.lesson, lessons_of, with_depth=True),
+    views=partial(views_of, TOLD),
+    streamed={},
+)

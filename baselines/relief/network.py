@@ -8,6 +8,7 @@ room is its longest one.
 
 import itertools
 from dataclasses import dataclass
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
@@ -15,8 +16,8 @@ from torch.nn import functional
 
 from baselines.pix2shape.network.architecture import RAY_PLANES, contrast
 from baselines.pix2shape.network.empty_rooms import FLAT, Cameras, empty_rooms, planes_of
-from baselines.training.checkpoint import Card as BaseCard
-from baselines.training.checkpoint import check_numbers
+from baselines.training import checkpoint
+from baselines.training.checkpoint import Ranges
 from scenegen.common.records import LARGEST, check
 
 SIZES = (32, 64, 128, 256)  # pixels a side
@@ -25,35 +26,26 @@ FINE = 16  # channels at full size
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(checkpoint.Settings):
     """How large a network is, and how it is trained.
 
     Attributes:
-        size: image size, pixels a side.
         width: multiplies the channels.
-        seed: of the first weights and of every random choice of training.
-        iterations, batch: length of training, and images in each batch.
-        learning_rate: of Adam; it rises over WARM_UP iterations and falls to 0 along a cosine.
+        learning_rate: it rises over WARM_UP iterations and falls to 0 along a cosine.
     """
 
-    size: int = 64
+    RANGES: ClassVar[Ranges] = {"width": (0.05, 4), "batch": (2, LARGEST)}
     width: float = 1.0
-    seed: int = 0
     iterations: int = 1200
-    batch: int = 16
     learning_rate: float = 0.003
 
     def __post_init__(self) -> None:
         check(self.size in SIZES, "size", self.size, f"one of {', '.join(map(str, SIZES))}")
-        ranges = {
-            "width": (0.05, 4), "seed": (0, LARGEST), "iterations": (1, LARGEST),
-            "batch": (2, LARGEST), "learning_rate": (1e-12, 1),
-        }  # fmt: skip
-        check_numbers(self, ranges)
+        super().__post_init__()
 
 
 @dataclass(frozen=True)
-class Card(BaseCard):
+class Card(checkpoint.Card):
     """The card of a relief network."""
 
     settings: Settings

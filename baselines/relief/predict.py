@@ -1,20 +1,18 @@
-"""Submissions of relief networks. Of the rooms only images and cameras are read."""
+"""What relief networks predict of rooms. Only images and cameras are read."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from baselines.pix2shape.network.empty_rooms import Cameras
-from baselines.pix2shape.predict import Progress, write_depths
-from baselines.relief.network import Card, predicted_depth
-from baselines.training.checkpoint import Method, bundled, load_weights
+from baselines.pix2shape.predict import enlarged_views
+from baselines.relief.network import Card, Relief, predicted_depth
+from baselines.training.baseline import Views
 from baselines.training.images import Array, check_reducible
 from baselines.training.rooms import camera_poses, input_views, room_images, room_sizes
-from scenegen import open_rooms
-from scenegen.files.new_file import check_writable
+from scenegen.rooms.reader import RoomsFile
 
 FILES = Path(__file__).with_name("files")
 TOLD = "told: the camera, and where the empty room's floor and walls are"
@@ -22,44 +20,30 @@ FROM = "each view is predicted from its own image"
 FROM_FIRST = "each view is predicted from the image of the scene's first one"
 
 
-@torch.inference_mode()
-def write_submission(
-    method: Method[Card, Any],
-    data: str | Path,
-    out: str | Path,
-    weights: str | Path | None = None,
-    *,
-    told_in_training: str = "",
-    overwrite: bool = False,
-    progress: Progress = lambda done, total: None,
-) -> None:
-    """Write depth and normals of every view of a file of rooms, as `baselines.training` says.
+def views_of(told_in_training: str, network: Relief, card: Card, rooms: RoomsFile) -> Views:
+    """Return what a network predicts of every view of a file of rooms.
 
-    A network may predict each view from its own image, or each scene from one image alone, view 0
-    or the first that the file holds. The submission's notes say it, too.
+    It predicts each view from its own image, or each scene from one image alone, view 0 or the
+    first that the file holds. The submission's notes say it, too.
     """
-    check_writable(Path(out), overwrite)
-    network, card = load_weights(weights or bundled(FILES, method), method)
     size, from_first = card.settings.size, network.from_first_view
-    with open_rooms(data) as rooms:
-        check_reducible(data, rooms.spec.height, rooms.spec.width, size)
-        poses = torch.from_numpy(camera_poses(rooms, closed=True).astype(np.float32))
-        fov = rooms.read("camera/fov_y_degrees", slice(None))
-        sizes = room_sizes(rooms) if rooms.spec.interior else None
-        source = np.arange(len(rooms))
+    check_reducible(rooms.path, rooms.spec.height, rooms.spec.width, size)
+    poses = torch.from_numpy(camera_poses(rooms, closed=True).astype(np.float32))
+    fov = rooms.read("camera/fov_y_degrees", slice(None))
+    sizes = room_sizes(rooms) if rooms.spec.interior else None
+    source = np.arange(len(rooms))
+    if from_first:
+        inputs, place = input_views(rooms)
+        source = inputs[place]
+
+    def depth(rows: Array) -> Tensor:
+        image = room_images(rooms, source[rows], size)
+        own = float(fov[rows[0]]), None if sizes is None else sizes[rows]
+        cameras = target_cameras = Cameras(poses[source[rows]], *own)
         if from_first:
-            inputs, place = input_views(rooms)
-            source = inputs[place]
+            target_cameras = Cameras(poses[rows], *own)
+        return predicted_depth(network, image, cameras, target_cameras)
 
-        def depth(rows: Array) -> Tensor:
-            image = room_images(rooms, source[rows], size)
-            own = float(fov[rows[0]]), None if sizes is None else sizes[rows]
-            cameras = target_cameras = Cameras(poses[source[rows]], *own)
-            if from_first:
-                target_cameras = Cameras(poses[rows], *own)
-            return predicted_depth(network, image, cameras, target_cameras)
-
-        notes = f"{FROM_FIRST if from_first else FROM}; {TOLD}{told_in_training}"
-        how = {"method": method.name, "notes": notes, "overwrite": overwrite}
-        shown = "first_view" if from_first else "scored_view"
-        write_depths(rooms, out, data, depth, progress, shown=shown, **how)
+    notes = f"{FROM_FIRST if from_first else FROM}; {TOLD}{told_in_training}"
+    shown = "first_view" if from_first else "scored_view"
+    return Views(enlarged_views(rooms, depth), shown, card.method, notes)

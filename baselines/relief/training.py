@@ -13,13 +13,12 @@ from torch import Tensor
 
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.relief.network import Card, Relief, Settings
-from baselines.training.checkpoint import WEIGHTS, Method
-from baselines.training.data import TrainingFiles, requests
-from baselines.training.fit import Loss, Progress, fit
-from baselines.training.images import Draws, read_ahead
-from baselines.training.machine import Machine, chosen_device
+from baselines.training.baseline import Lesson, Run
+from baselines.training.checkpoint import State
+from baselines.training.data import requests
+from baselines.training.fit import Loss
+from baselines.training.images import Draws
 from baselines.training.rooms import Rooms, read_rooms
-from baselines.training.run_folder import alone_in, begun, earlier_state
 from baselines.training.streams import Shown, TrainingStreams
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.rooms.reader import RoomsFile
@@ -78,21 +77,15 @@ class Batch:
     place: Tensor
 
 
-def train(
-    method: Method[Card, Any],
+def lesson(
     teach: Teach,
-    with_depth: bool,
-    begin: Callable[[Any], Any],
-    data: TrainingFiles | TrainingStreams,
-    run_folder: str | Path,
-    settings: Settings = Settings(),  # noqa: B008 (it is frozen)
-    machine: Machine | None = None,
+    run: Run,
     *,
+    with_depth: bool = False,
     streamed: Mapping[str, Any] = MappingProxyType({}),
-    resume: bool = False,
-    progress: Progress = lambda done, total, losses: None,
-) -> Path:
-    """Train a relief network on files or streams of rooms, as `baselines.training` says.
+    prepare: Callable[[Any], Any] = lambda network: None,
+) -> Lesson:
+    """Return what a run of a relief network learns, of files or streams of rooms.
 
     The loss is the mean absolute difference of relief: in contrast to the squared one it lets a
     pixel be either floor or object, rather than something between them. `shape_loss` is added
@@ -102,51 +95,41 @@ def train(
         teach: finds the relief to learn; it gets the rooms, the settings, the run's folder (None
             for rooms of a stream) and a function to call with the images done and in all.
         with_depth: whether the rooms' depth and objects are read.
-        begin: is given the network of a new run.
         streamed: settings of the rooms of streams.
+        prepare: is given the network of a new run.
     """
-    folder, machine = Path(run_folder), machine or Machine()
-    device = chosen_device(machine.device)
-    with alone_in(folder):
-        earlier = earlier_state(folder, method, resume)
-        settings = settings if earlier is None else earlier.card.settings
-        shown = None
-        if isinstance(data, TrainingStreams):
-            shown = data.shown(settings.size, settings.seed, **streamed)
-            card = Card(method.name, settings, **shown.card())
-        else:
-            files = data.rooms()
-            rooms = read_rooms(files, settings.size, depth=with_depth)
-            card = Card(method.name, settings, **requests(files))
-        state = begun(method, card, earlier, data.where, device)
-        if earlier is None:
-            begin(state.network)
-        at, last = state.card.iteration, settings.iterations
-        if shown:
-            source = batches_of_stream(shown, machine.workers, teach, with_depth, settings, at)
-        else:
-            lessons = teach(
-                rooms,
-                settings,
-                folder,
-                lambda done, total: progress(at, last, {"share of images matched": done / total}),
-            )
-            source = batches_of(rooms, lessons, settings, at)
-        state.network.to(memory_format=torch.channels_last)  # faster
-        batches = read_ahead(source, device)
+    settings, rows = run.settings, 0
+    if isinstance(run.data, TrainingStreams):
+        shown = run.data.shown(settings.size, settings.seed, **streamed)
+        told, rows = shown.card(), shown.whole(settings.batch)
+    else:
+        files = run.data.rooms()
+        rooms = read_rooms(files, settings.size, depth=with_depth)
+        told = requests(files)
 
-        def losses(number: int) -> Iterator[Loss]:
-            windows_only = number < (1 - WHOLE) * state.card.settings.iterations
-            loss = _loss(state.network, next(batches), windows_only)
-            yield Loss(loss, {"loss": loss})
+    def batches(first: int) -> Iterator[Batch]:
+        if rows:
+            workers = run.machine.workers
+            return batches_of_stream(shown, workers, teach, with_depth, settings, first)
 
-        each = shown.whole(settings.batch) if shown else 0
-        fit(folder, method, state, losses, learning_rate, machine, rows=each, progress=progress)
-    return folder / WEIGHTS
+        def matched(done: int, total: int) -> None:
+            share = {"share of images matched": done / total}
+            run.progress(first, settings.iterations, share)
 
+        return batches_of(rooms, teach(rooms, settings, run.folder, matched), settings, first)
 
-def as_it_is(_network: Any) -> None:
-    """Begin with the first weights."""
+    def prepared(network: Any) -> None:
+        if run.earlier is None:
+            prepare(network)
+        network.to(memory_format=torch.channels_last)  # faster
+
+    def loss_of(state: State[Card, Relief], batch: Batch, number: int) -> Loss:
+        windows_only = number < (1 - WHOLE) * state.card.settings.iterations
+        loss = _loss(state.network, batch, windows_only)
+        return Loss(loss, {"loss": loss})
+
+    card = Card(run.method, settings, **told)
+    return Lesson(card, batches, loss_of, learning_rate, rows=rows, prepare=prepared)
 
 
 def learning_rate(settings: Settings, iteration: int) -> float:
@@ -259,9 +242,9 @@ def windows(maps: Sequence[Tensor], shown: Tensor, side: int, place: Tensor) -> 
         for axis in (middle // size, middle % size)
     )
     images = torch.arange(len(shown), device=shown.device)[:, None, None]
-    found = []
+    cut = []
     for each in maps:
         channels_last = each.movedim(1, -1) if each.dim() == 4 else each
         window = channels_last[images, row[:, :, None], column[:, None]]
-        found.append(window.movedim(-1, 1) if each.dim() == 4 else window)
-    return found
+        cut.append(window.movedim(-1, 1) if each.dim() == 4 else window)
+    return cut

@@ -14,15 +14,14 @@ import torch
 from torch import Tensor
 
 from baselines.pix2shape.matching.relief import matched_rows, relief_of_rows
-from baselines.relief import predict, training
+from baselines.relief import training
 from baselines.relief.network import Card, Settings, relief_network
+from baselines.relief.predict import FILES, views_of
 from baselines.relief.training import Lessons
+from baselines.training.baseline import Baseline
 from baselines.training.checkpoint import Method
 from baselines.training.rooms import Rooms
 from baselines.training.streams import NEIGHBOURS
-
-METHOD = Method("view-pairs", Card, relief_network)
-__all__ = ["Settings", "train", "write_submission"]
 
 
 def lessons_of(
@@ -38,6 +37,11 @@ def lessons_of(
     return Lessons(matched_rows(rooms), target)
 
 
-STREAMED = NEIGHBOURS
-train = partial(training.train, METHOD, lessons_of, False, training.as_it_is, streamed=STREAMED)
-write_submission = partial(predict.write_submission, METHOD)
+BASELINE = Baseline(
+    Method("view-pairs", Card, relief_network),
+    Settings,
+    FILES,
+    partial(training.lesson, lessons_of, streamed=NEIGHBOURS),
+    views=partial(views_of, ""),
+    streamed=NEIGHBOURS,
+)

@@ -1,68 +1,48 @@
-"""Answers to questions, from their images alone: scores of a network, submissions, accuracy."""
+"""Answers to questions, from their images alone: scores of a network, and its accuracy."""
 
 from pathlib import Path
 
 from torch import Tensor, nn
 
-from baselines.resnets.card import Answerer
-from baselines.training.checkpoint import bundled, load_weights
+from baselines.resnets.card import Card
+from baselines.training.baseline import Answers
 from baselines.training.machine import chosen_device
-from baselines.training.questions import Progress, each_question, open_test
+from baselines.training.questions import each_question
 from iqtt import QuestionsFile, open_questions
-from metrics.prediction_writer import write_answers
 from scenegen.common.errors import SpecError
-from scenegen.files.new_file import check_writable
 
-FILES = Path(__file__).with_name("files")
 BATCH = 32  # questions at a time
 
 
-def write_submission(
-    kind: Answerer,
-    data: str | Path,
-    out: str | Path,
-    weights: str | Path | None = None,
-    *,
-    device: str = "auto",
-    overwrite: bool = False,
-    progress: Progress = lambda done, total: None,
-) -> None:
-    """Write answers to the questions of a file, and their scores, as `baselines.training` says.
+def answers_of(
+    any_number: bool, network: nn.Module, card: Card, questions: QuestionsFile
+) -> Answers:
+    """Return how a network answers questions.
 
     Args:
-        device: "auto", "cpu" or "cuda".
+        any_number: whether it answers questions of another number of answers than it was trained
+            on.
+
+    Raises SpecError where it does not.
     """
-    name = kind.method.name
-    network, card = load_weights(weights or bundled(FILES, kind.method), kind.method)
-    check_writable(Path(out), overwrite)
-    with open_test(data, card.settings.size) as questions:
-        count = questions.answers
-        if count != card.answers and not kind.any_number:
-            raise SpecError(
-                data,
-                f"questions of {count} answers",
-                f"{card.answers}, as those that {name} was trained on",
-                f"its last layer has an output for each answer; train it on questions of {count}",
-            )
-        network.to(chosen_device(device))
-        scores = answer_scores(network, questions, card.settings.size, progress)
+    count = questions.answers
+    if count != card.answers and not any_number:
+        raise SpecError(
+            questions.path,
+            f"questions of {count} answers",
+            f"{card.answers}, as those that {card.method} was trained on",
+            f"its last layer has an output for each answer; train it on questions of {count}",
+        )
+    device = chosen_device("auto")
+    network.to(device)
     run = f"{card.labels} labels, seed {card.settings.seed}"
-    numbers = scores.double().numpy()
-    write_answers(out, data, method=name, scores=numbers, run=run, overwrite=overwrite)
+    return Answers(lambda images: scores(network, images.to(device)), BATCH, run=run)
 
 
-def answer_scores(
-    network: nn.Module,
-    questions: QuestionsFile,
-    size: int,
-    progress: Progress = lambda done, total: None,
-) -> Tensor:
-    """Return the score of each answer, (Q, K); the network is put in evaluation mode."""
-    network.eval()
-    device = next(network.parameters()).device
-    return each_question(
-        questions, size, lambda images: network(images.to(device)), BATCH, progress=progress
-    )
+def scores(network: nn.Module, images: Tensor) -> Tensor:
+    """Return the score of each answer, (Q, K), of images on the network's device."""
+    answered: Tensor = network.eval()(images)
+    return answered
 
 
 def accuracy(network: nn.Module, path: Path, size: int, answers: int) -> float | None:
@@ -72,8 +52,12 @@ def accuracy(network: nn.Module, path: Path, size: int, answers: int) -> float |
     """
     if not path.is_file():
         return None
+    device = next(network.parameters()).device
     with open_questions(path) as questions:
         if not len(questions) or not questions.has_answers or questions.answers != answers:
             return None
-        chosen = answer_scores(network, questions, size).argmax(dim=1).numpy()
+        values = each_question(
+            questions, size, lambda images: scores(network, images.to(device)), BATCH
+        )
+        chosen = values.argmax(dim=1).numpy()
         return float((chosen == questions.read("answers", slice(None))).mean())

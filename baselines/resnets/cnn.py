@@ -3,18 +3,14 @@
 Pix2Shape (IJCV 2020), section 3D-IQTT and the appendix's figure "3D-IQTT baseline architecture".
 """
 
-from functools import partial
-
 import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from baselines.resnets import answering, training
 from baselines.resnets.architecture import ResNet
-from baselines.resnets.card import Answerer, Card, Settings
+from baselines.resnets.card import Card
+from baselines.resnets.training import resnet_baseline
 from baselines.training.checkpoint import Method
-
-__all__ = ["Settings", "train", "write_submission"]
 
 HIDDEN = (2048, 512, 256)
 
@@ -50,6 +46,6 @@ class AnswerClassifier(nn.Module):
         return torch.stack(scores).mean(dim=0)
 
 
-KIND = Answerer(Method("cnn", Card, AnswerClassifier), functional.nll_loss, any_number=False)
-train = partial(training.train, KIND)
-write_submission = partial(answering.write_submission, KIND)
+BASELINE = resnet_baseline(
+    Method("cnn", Card, AnswerClassifier), functional.nll_loss, any_number=False
+)

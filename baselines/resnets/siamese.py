@@ -3,17 +3,13 @@
 Pix2Shape (IJCV 2020), section 3D-IQTT, and the loss of the appendix (Hadsell et al. 2006).
 """
 
-from functools import partial
-
 import torch
 from torch import Tensor, nn
 
-from baselines.resnets import answering, training
 from baselines.resnets.architecture import ResNet
-from baselines.resnets.card import Answerer, Card, Settings
+from baselines.resnets.card import Card
+from baselines.resnets.training import resnet_baseline
 from baselines.training.checkpoint import Method
-
-__all__ = ["Settings", "train", "write_submission"]
 
 FEATURES = 2048
 MARGIN = 2.0
@@ -54,6 +50,6 @@ def contrastive_loss(scores: Tensor, right: Tensor) -> Tensor:
     return torch.where(same, distance.square(), apart.square()).mean() / 2
 
 
-KIND = Answerer(Method("siamese", Card, NearestAnswer), contrastive_loss, any_number=True)
-train = partial(training.train, KIND)
-write_submission = partial(answering.write_submission, KIND)
+BASELINE = resnet_baseline(
+    Method("siamese", Card, NearestAnswer), contrastive_loss, any_number=True
+)

@@ -1,77 +1,87 @@
 """Training on labelled questions: each iteration takes one step on one batch."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
-from baselines.resnets.answering import accuracy
-from baselines.resnets.card import Answerer, Card, Settings
-from baselines.training.checkpoint import WEIGHTS, save_weights
-from baselines.training.data import TrainingFiles, only, requests
-from baselines.training.fit import Loss, Progress, fit
-from baselines.training.images import Draws, check_reducible, read_ahead
-from baselines.training.machine import Machine, chosen_device
+from baselines.resnets.answering import accuracy, answers_of
+from baselines.resnets.card import Card, Settings
+from baselines.training.baseline import Baseline, Lesson, Run
+from baselines.training.checkpoint import Method, State
+from baselines.training.data import only, requests
+from baselines.training.fit import Loss
+from baselines.training.images import Draws, check_reducible
 from baselines.training.questions import LABELED, check_labels, question_images, training_answers
-from baselines.training.run_folder import alone_in, begun, earlier_state
 from iqtt import QuestionsFile
 from scenegen.common.random.seeding import Purpose, item_rng
 
 VALIDATION = "iqtt-val.h5"
+AnswerLoss = Callable[[Tensor, Tensor], Tensor]
 
 
-def train(
-    kind: Answerer,
-    data: TrainingFiles,
-    run_folder: str | Path,
-    settings: Settings = Settings(),  # noqa: B008 (it is frozen)
-    machine: Machine | None = None,
-    *,
-    labels: int | None = None,
-    resume: bool = False,
-    progress: Progress = lambda done, total, numbers: None,
-) -> Path:
-    """Train on the labelled questions of a file, as `baselines.training` says.
+def resnet_baseline(
+    method: Method[Card, nn.Module], loss: AnswerLoss, *, any_number: bool
+) -> Baseline:
+    """Return a baseline that answers questions with a ResNet.
+
+    Args:
+        method: its network takes images of questions, (Q, 1 + K, 3, S, S), the reference first, and
+            gives the scores of the K answers, (Q, K), the highest of which is its answer.
+        loss: of scores, (Q, K), and right answers, (Q,).
+        any_number: as `answers_of`.
+    """
+    return Baseline(
+        method,
+        Settings,
+        Path(__file__).with_name("files"),
+        partial(lesson, loss),
+        options=("labels",),
+        answers=partial(answers_of, any_number),
+    )
+
+
+def lesson(loss: AnswerLoss, run: Run, *, labels: int | None = None) -> Lesson:
+    """Return what a run learns: the labelled questions of a file.
+
+    At the end progress is called once more, with the accuracy on iqtt-val.h5 if it lies beside the
+    file.
 
     Args:
         labels: how many of the labelled questions to use, the first ones; None for all.
-        progress: called once more at the end, with the accuracy on iqtt-val.h5 if it lies beside
-            `data`.
     """
-    folder, method, machine = Path(run_folder), kind.method, machine or Machine()
-    device = chosen_device(machine.device)
-    with alone_in(folder):
-        earlier = earlier_state(folder, method, resume)
-        if earlier is not None:
-            settings, labels = earlier.card.settings, earlier.card.labels
-        questions = only(data.questions(LABELED), method.name)
-        labels = len(questions) if labels is None else labels
-        check_labels(questions, labels, 1)
-        check_reducible(questions.path, questions.height, questions.width, settings.size)
-        told = requests([questions])
-        card = Card(method.name, settings, labels=labels, answers=questions.answers, **told)
-        state = begun(method, card, earlier, data.where, device)
-        right = training_answers(questions, labels)
-        first = state.card.iteration
-        batches = read_ahead(_batches(questions, right, settings, first), device)
+    settings = run.settings
+    questions = only(run.data.questions(LABELED), run.method)
+    if run.earlier is not None:
+        labels = run.earlier.labels
+    labels = len(questions) if labels is None else labels
+    check_labels(questions, labels, 1)
+    check_reducible(questions.path, questions.height, questions.width, settings.size)
+    told = requests([questions])
+    right = training_answers(questions, labels)
 
-        def losses(_number: int) -> Iterator[Loss]:
-            batch = next(batches)
-            loss = kind.loss(state.network(batch.images), batch.right)
-            yield Loss(loss, {"loss": loss})
+    def loss_of(state: State[Card, nn.Module], batch: Batch, _number: int) -> Loss:
+        value = loss(state.network(batch.images), batch.right)
+        return Loss(value, {"loss": value})
 
-        fit(folder, method, state, losses, _rate, machine, progress=progress)
+    def validated(network: nn.Module, card: Card) -> Card:
         beside = questions.path.with_name(VALIDATION)
-        share = accuracy(state.network, beside, settings.size, card.answers)
+        share = accuracy(network, beside, settings.size, card.answers)
         if share is not None:
-            last = state.card.iteration
-            progress(last, last, {f"accuracy on {VALIDATION}": share})
-        state.card = replace(state.card, validation=share)
-        save_weights(folder / WEIGHTS, method, state.network, state.card)
-    return folder / WEIGHTS
+            run.progress(card.iteration, card.iteration, {f"accuracy on {VALIDATION}": share})
+        return replace(card, validation=share)
+
+    return Lesson(
+        Card(run.method, settings, labels=labels, answers=questions.answers, **told),
+        partial(_batches, questions, right, settings),
+        loss_of,
+        _rate,
+        finish=validated,
+    )
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,16 +5,9 @@
     estimator.py    gradients of an expected loss by sampling it
     network.py      settings, card, encoder and decoder, and the head that labels train
     images.py       what it learns from: the images of question files
-    primitives.py   single basic shapes, rendered by scenegen, on which it works or fails
     training.py     training on images, and of the head on labels; start reading here
-    reconstruct.py  meshes and pictures of trained weights
-    answers.py      answers to questions
+    answers.py      meshes of images, and answers to questions
 
 docs/baselines.md says what the paper leaves open and where this method fails: objects must be
 alone, centred and without background.
 """
-
-from scenegen.common.lazy_names import lazy_names
-
-HOMES = {"network": "Settings", "training": "train", "answers": "write_submission"}
-__getattr__ = lazy_names(__name__, HOMES)

@@ -21,15 +21,12 @@ class Pictures:
         radius: of the sphere that the mesh starts from, in the unit of `views`.
         views: camera and shading of the images, with their N rows of lights.
         fingerprint: of the data, so that a run goes on with the data that it began with.
-        depth: true planar depth, (N, S, S), infinite where there is no object; only to measure
-            with. None where it is not known.
     """
 
     image: Array
     radius: float
     views: Views
     fingerprint: str
-    depth: Array | None = None
 
     def __len__(self) -> int:
         return len(self.image)

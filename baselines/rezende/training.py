@@ -14,8 +14,9 @@ The gradient of the first term with respect to decoder(z) is sampled by
 reparametrised.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -24,15 +25,16 @@ from torch import Tensor
 from torch.nn import functional
 from torch.optim import AdamW
 
+from baselines.rezende.answers import answers_of
 from baselines.rezende.estimator import sampled_gradient, with_gradient
 from baselines.rezende.images import Pictures, read_question_pictures
 from baselines.rezende.network import METHOD, Card, Head, Model, Settings, codes_of, divergence
 from baselines.rezende.rasteriser import project, rasterise
-from baselines.training.checkpoint import WEIGHTS, State, load_weights, save_weights
-from baselines.training.data import TrainingFiles, only
-from baselines.training.fit import Loss, Progress, falling_late, fit
+from baselines.training.baseline import Baseline, Lesson, Run
+from baselines.training.checkpoint import State, load_weights
+from baselines.training.data import only
+from baselines.training.fit import Loss
 from baselines.training.images import Array, check_reducible
-from baselines.training.machine import Machine
 from baselines.training.questions import (
     LABELED,
     UNLABELED,
@@ -40,7 +42,7 @@ from baselines.training.questions import (
     each_question,
     training_answers,
 )
-from baselines.training.run_folder import alone_in, begun, check_new, earlier_state
+from iqtt import QuestionsFile
 from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import check
 
@@ -50,56 +52,48 @@ LARGEST_SLOPE = 1000.0  # norm of all gradients
 STEPS, LEARNING_RATE, WEIGHT_DECAY = 300, 0.002, 0.3
 
 
-def train(
-    data: TrainingFiles,
-    run_folder: str | Path,
-    settings: Settings = Settings(),  # noqa: B008 (it is frozen)
-    machine: Machine | None = None,
-    *,
-    labels: int = 0,
-    start: str | None = None,
-    resume: bool = False,
-    progress: Progress = lambda done, total, numbers: None,
-) -> Path:
-    """Train on the images of a question file, as `baselines.training` says, then the head.
+def lesson(run: Run, *, labels: int = 0, start: str | None = None) -> Lesson:
+    """Return what a run learns: the images of the unlabelled questions of a file, then the head.
 
-    The unlabelled questions give the images. The renderer is in numpy, so training is on the CPU.
+    The renderer is in numpy, so training is on the CPU.
 
     Args:
         labels: how many of the labelled questions' answers the head is trained on, the first ones.
         start: weights of an earlier run, whose encoder and decoder are kept as they are; only the
             head is trained. So runs with different labels can share them.
     """
-    folder, machine = Path(run_folder), machine or Machine()
-    check(machine.device != "cuda", "device", "cuda", "cpu, where the renderer of rezende computes")
-    check(start is None or not resume, "start", start, "none, as --resume goes on with a run")
-    with alone_in(folder):
-        labelled = only(data.questions(LABELED), "rezende")
-        if start is not None:
-            check_new(folder)
-            model, card = load_weights(start, METHOD)
-            card = replace(card, labels=labels)
-        else:
-            earlier = earlier_state(folder, METHOD, resume)
-            if earlier is not None:
-                settings, labels = earlier.card.settings, earlier.card.labels
-            card = Card("rezende", settings, labels=labels)
-        check_labels(labelled, labels)  # before hours of training
-        check_reducible(data.where, labelled.height, labelled.width, card.settings.size)
-        if start is None:
-            unlabelled = only(data.questions(UNLABELED), "rezende")
-            pictures = read_question_pictures(unlabelled, settings.size)
-            card = replace(card, fingerprint=pictures.fingerprint)
-            state = begun(METHOD, card, earlier, data.where)
-            train_pictures(pictures, folder, state, machine, progress)
-            model, card = state.network, state.card
-        if labels:
-            codes = each_question(
-                labelled, card.settings.size, lambda images: codes_of(model, images), 1, labels
-            )
-            train_head(model, codes, training_answers(labelled, labels), card.settings.seed)
-        save_weights(folder / WEIGHTS, METHOD, model, card)
-    return folder / WEIGHTS
+    new = run.earlier is None
+    check(start is None or new, "start", start, "none, as --resume goes on with a run")
+    labelled = only(run.data.questions(LABELED), run.method)
+    model, card = None, Card(run.method, run.settings, labels=labels if new else run.earlier.labels)
+    if start is not None:
+        model, card = load_weights(start, METHOD)
+        card = replace(card, labels=labels)
+    check_labels(labelled, card.labels)  # before hours of training
+    check_reducible(run.data.where, labelled.height, labelled.width, card.settings.size)
+    pictures = None
+    if model is None:
+        unlabelled = only(run.data.questions(UNLABELED), run.method)
+        pictures = read_question_pictures(unlabelled, card.settings.size)
+        card = replace(card, fingerprint=pictures.fingerprint)
+    finish = partial(_with_head, labelled)
+    return Lesson(
+        card, lambda _: repeat(pictures), loss_of, clip=LARGEST_SLOPE, network=model, finish=finish
+    )
+
+
+def loss_of(state: State[Card, Model], pictures: Pictures, number: int) -> Loss:
+    """Return what an iteration minimises, of pictures in memory."""
+    return bound(state.network, pictures, state.card.settings, number)
+
+
+def _with_head(labelled: QuestionsFile, model: Model, card: Card) -> Card:
+    """Train the head of a model on the first answers; return the card as it is."""
+    size, labels = card.settings.size, card.labels
+    if labels:
+        codes = each_question(labelled, size, lambda images: codes_of(model, images), 1, labels)
+        train_head(model, codes, training_answers(labelled, labels), card.settings.seed)
+    return card
 
 
 def train_head(model: Model, codes: Tensor, right: Tensor, seed: int) -> list[float]:
@@ -124,24 +118,6 @@ def train_head(model: Model, codes: Tensor, right: Tensor, seed: int) -> list[fl
         optimiser.step()
         losses.append(float(loss.detach()))
     return losses
-
-
-def train_pictures(
-    pictures: Pictures,
-    folder: Path,
-    state: State[Card, Model],
-    machine: Machine,
-    progress: Progress = lambda done, total, numbers: None,
-) -> None:
-    """Train encoder and decoder of a state on pictures. Raises as `fit`."""
-    settings, model = state.card.settings, state.network
-
-    def losses(number: int) -> Iterator[Loss]:
-        yield bound(model, pictures, settings, number)
-
-    fit(
-        folder, METHOD, state, losses, falling_late, machine, clip=LARGEST_SLOPE, progress=progress
-    )  # fmt: skip
 
 
 def bound(model: Model, pictures: Pictures, settings: Settings, number: int) -> Loss:
@@ -215,3 +191,14 @@ def near_vertices(squared: Array, around: tuple[Array, ...]) -> Array:
     total: Array = sums[:, items, bottom, right] - sums[:, items, top, right]
     total += sums[:, items, top, left] - sums[:, items, bottom, left]
     return total.astype(np.float32)
+
+
+BASELINE = Baseline(
+    METHOD,
+    Settings,
+    Path(__file__).with_name("files"),
+    lesson,
+    options=("labels", "start"),
+    answers=answers_of,
+    cpu_only=True,
+)

@@ -8,7 +8,7 @@ import errno
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Any, ClassVar, Generic, TypeVar
 
 import torch
 from safetensors import SafetensorError, safe_open
@@ -25,7 +25,32 @@ CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
 CONTENTS = ("weights 1", "checkpoint 1")  # by version; one note, as their order is not kept
 NETWORK = "network."
 MOMENTS = ("exp_avg", "exp_avg_sq", "step")  # of Adam
+Ranges = Mapping[str, tuple[float, float]]  # of numbers, by name
 OTHER_CARD = "these are weights of another configuration than the card's"
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Settings that networks and training of every baseline have; each adds its own.
+
+    Attributes:
+        seed: of the first weights and of every random choice of training.
+        size: side of the images that the networks take, pixels.
+        iterations, batch: length of training, and images or questions in each batch.
+        learning_rate: of Adam, the largest.
+    """
+
+    RANGES: ClassVar[Ranges] = {}  # of further numbers, or narrower ones
+    seed: int = 0
+    size: int = 64
+    iterations: int = 1000
+    batch: int = 16
+    learning_rate: float = 0.001
+
+    def __post_init__(self) -> None:
+        ranges = {"seed": (0, 2**63), "learning_rate": (1e-12, 1), "size": (8, 1024)}
+        counts = {"iterations": (1, LARGEST), "batch": (1, LARGEST)}
+        check_numbers(self, {**ranges, **counts, **self.RANGES})
 
 
 @dataclass(frozen=True)
@@ -34,8 +59,8 @@ class Card:
 
     Attributes:
         method: name of the method, as in `bench train NAME`.
-        settings: of networks and training, a frozen dataclass of the method with at least `seed`,
-            `iterations` and `learning_rate`; each method's card declares its type.
+        settings: of networks and training, `Settings` or another frozen dataclass with at least
+            `seed`, `iterations` and `learning_rate`; each method's card declares its type.
         labels: how many answers of questions training was given.
         data, fingerprint: request and fingerprint of the training file.
         iteration, seconds: how many iterations are done, and how long they took.
@@ -56,7 +81,7 @@ class Card:
         check_numbers(self, {"labels": (0, LARGEST), "iteration": (0, last), "seconds": (0, 1e9)})
 
 
-def check_numbers(record: Any, ranges: Mapping[str, tuple[float, float]]) -> None:
+def check_numbers(record: Any, ranges: Ranges) -> None:
     """Give a record's fields Python's own types, and raise SpecError for a number out of range."""
     normalise(record)
     for name, (low, high) in ranges.items():

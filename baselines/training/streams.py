@@ -12,7 +12,8 @@ from typing import Any
 import iqtt
 from baselines.training.test_sets import refuse_request
 from iqtt import QuestionStream, SplitSpec
-from iqtt.questions.specs import DISTRACTORS, MAX_QUESTIONS
+from iqtt.questions.kinds import DISTRACTORS
+from iqtt.questions.specs import MAX_QUESTIONS
 from scenegen import RoomStream, preset_spec
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice

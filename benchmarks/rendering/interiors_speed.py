@@ -33,30 +33,38 @@ def seconds(action: Callable[[], Any]) -> float:
 def plain(batch: SceneBatch) -> None:
     """Trace all images of a batch by Mitsuba's own path tracer."""
     import mitsuba as mi
+    import numpy as np
 
+    from benchmarks.rendering.plain_mitsuba import loaded
     from scenegen.common.records import from_json
     from scenegen.description.interiors import Interior
-    from scenegen.rendering.meshes.unit_scene import triangle_mesh
-    from scenegen.rendering.path_tracing.path_tracer import camera_rays
     from scenegen.rendering.pictures.matter import gather_matter
-    from scenegen.rendering.pictures.paths import MAX_DEPTH, ROULETTE_DEPTH
     from scenegen.rendering.pictures.sky import outside
-    from scenegen.rendering.pictures.tracer import device_camera
 
+    spec = batch.spec
     grey = mi.load_dict({"type": "twosided", "bsdf": {"type": "diffuse"}})
-    paths = mi.load_dict({"type": "path", "max_depth": MAX_DEPTH, "rr_depth": ROULETTE_DEPTH})
+    paths = mi.load_dict({"type": "path", "max_depth": 12, "rr_depth": 3})  # as ours
+    film = {
+        "type": "hdrfilm",
+        "width": spec.width,
+        "height": spec.height,
+        "rfilter": {"type": "box"},
+    }
     for b in range(len(batch)):
         assert batch.interior is not None
         interior = from_json(Interior, batch.interior[b], "interior")
         soup = gather_matter(batch, b, lit=False).soup
-        sky = mi.Bitmap(outside(interior).radiance)
+        points, normals = soup.corners.reshape(-1, 3), soup.normals.reshape(-1, 3)
+        # Mitsuba's cameras look along +z, with x to the left.
+        view = mi.ScalarTransform4f(batch.world_from_camera[b] * np.array([-1.0, 1.0, -1.0, 1.0]))
+        lens = {"fov": float(batch.fov_y_degrees[b]), "fov_axis": "y", "to_world": view}
         scene = mi.load_dict({
-            "type": "scene", "sky": {"type": "envmap", "bitmap": sky},
-            "room": triangle_mesh("room", soup.corners, soup.normals, grey),
+            "type": "scene",
+            "sky": {"type": "envmap", "bitmap": mi.Bitmap(outside(interior).radiance)},
+            "sensor": {"type": "perspective", **lens, "film": film},
+            "room": loaded((points, normals, np.arange(len(points))), grey),
         })  # fmt: skip
-        camera = device_camera(batch, b)
-        for ray, sampler, _ in camera_rays(batch, b, camera[:5]):
-            mi.Float(paths.sample(scene, sampler, ray)[0].x).numpy()
+        np.array(mi.render(scene, integrator=paths, spp=spec.spp))
 
 
 def row(size: int, count: int) -> list[str]:
@@ -72,7 +80,7 @@ def row(size: int, count: int) -> list[str]:
         batches.append(pack_arrays(spec, drawn, (0,), objects))
 
     drawing = seconds(draw)
-    first, batch = batches[0].rows(0, 1), batches[0]
+    first, batch = batches[0].rows(slice(0, 1)), batches[0]
     names = truth_fields(spec)
     found = [str(size), f"{drawing / count:.2f}"]
     for action in (

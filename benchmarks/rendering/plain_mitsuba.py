@@ -111,10 +111,10 @@ def _describer(
     known: dict[str, Any] = {}
     if way == "instances":
         known = {
-            name: mi.load_dict({"type": "shapegroup", "mesh": _loaded(mesh, material)})
+            name: mi.load_dict({"type": "shapegroup", "mesh": loaded(mesh, material)})
             for name, mesh in meshes.items()
         }
-        known["room"] = _loaded(room, material)
+        known["room"] = loaded(room, material)
 
     def describe(scene: SceneSpec) -> dict[str, Any]:
         contents = {"sensor": _sensor(spec, scene.cameras[0])}
@@ -129,7 +129,7 @@ def _describer(
             group = contents[f"group-{item.shape.replace('/', '-')}"] = known[item.shape]
             to_world = mi.ScalarTransform4f(matrix.astype(np.float32))
             contents[f"object{k}"] = {"type": "instance", "group": group, "to_world": to_world}
-        contents["room"] = _loaded(_joined(merged), material) if way == "merged" else known["room"]
+        contents["room"] = loaded(_joined(merged), material) if way == "merged" else known["room"]
         return contents
 
     return describe
@@ -142,7 +142,7 @@ def _cubes(spec: SplitSpec, question: Question, i: int) -> dict[str, Any]:
     centres = cube_centres([cubes], len(cubes))[0]
     points = (centres[:, None] + corners).reshape(-1, 3) @ question.world_from_shape[i].T
     faces = np.concatenate([np.asarray(box.faces) + k * len(corners) for k in range(len(cubes))])
-    contents = {"mesh": _loaded((points, np.zeros_like(points), faces), _diffuse(spec.reflectance))}
+    contents = {"mesh": loaded((points, np.zeros_like(points), faces), _diffuse(spec.reflectance))}
     contents["sensor"] = _sensor(spec, spec.camera(question.camera_distance))
     for j in range(int(question.light_count[i])):
         position, color = question.light_position[i, j], question.light_color[i, j]
@@ -201,7 +201,7 @@ def _joined(meshes: list[Mesh]) -> Mesh:
     return np.concatenate(points), np.concatenate(normals), np.concatenate(moved)
 
 
-def _loaded(mesh: Mesh, material: Any) -> Any:
+def loaded(mesh: Mesh, material: Any) -> Any:
     """Return a mesh as Mitsuba's."""
     points, normals, faces = mesh
     properties = mi.Properties()

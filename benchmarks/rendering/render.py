@@ -157,6 +157,9 @@ def basic_shapes(folder: str, quick: bool) -> Iterator[Row]:
     yield name, "rendering.render:end_to_end", how
     how = {**whole, "count": largest, "repeats": 1}
     yield f"(b) end to end, N = {largest:,}", "rendering.render:end_to_end", how
+    traced = {"shading": "path", "height": 32, "width": 32, "spp": 16, "workers": 2}
+    how = {"rooms": rooms, "count": first // 2, "repeats": repeats, **traced}
+    yield "--shading path, 32 pixels, 16 samples", "rendering.render:end_to_end", how
 
 
 def built_in_objects(folder: str, quick: bool) -> Iterator[Row]:

@@ -10,6 +10,7 @@ from typing import Any
 
 import click
 
+from iqtt.questions.kinds import DISTRACTORS, QUESTION_KINDS
 from scenegen.command_line import groups, options, output
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import Color, Range
@@ -79,11 +80,11 @@ option = partial(click.option, show_default=True)
 )
 @option(
     "--distractors",
-    type=click.Choice(["other", "near", "mirror", "matched", "mirror-pair", "mixed"]),
+    type=click.Choice(DISTRACTORS),
     default="mixed",
-    help="Wrong answers. other: different shapes; near: one cube moved; mirror: a mirror image and"
-    " a near shape; matched: different shapes with like outlines; mirror-pair: two views of the"
-    " mirror image; mixed: each question one of these.",
+    help="Wrong options. "
+    + "".join(f"{name}: {kind.meaning}; " for name, kind in QUESTION_KINDS.items())
+    + "mixed: each question one of these.",
 )
 @option("--answers", type=int, default=3, help="Number of answers, 3 or 2; one of them is right.")
 @option(

@@ -9,57 +9,53 @@ from iqtt.commands.models import model_options
 from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import ENCODING, OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
-from scenegen.command_line.paths import InputPath, OutputFolder, refuse_command_inputs
-from scenegen.commands.sharing import SHARE, publication_of, publication_options
+from scenegen.command_line.paths import InputPath, OutputFolder
+from scenegen.commands.sharing import SHARE, publication_options
+from scenegen.rooms.export.formats import DATA_FORMATS
 
 
-# fmt: off
-@click.command(
-    epilog=f"{EXAMPLE}iqtt card iqtt-split --creator 'A. Person' --date 2026-01-31 --out card"
-)
+@click.command(epilog=f"{EXAMPLE}iqtt card iqtt-split --creator 'A. Person'")
 @click.argument("folder", type=InputPath(within=(".h5",)))
-@click.option("--out", type=OutputFolder(), help="Folder to make [iqtt-split-card of iqtt-split].")
-@click.option("--with-answers", is_flag=True,
-              help="Hand out the answers of the test questions too, and the seed if their file"
-              " tells it.")
+@click.option(
+    "--with-answers",
+    is_flag=True,
+    help="Hand out the answers of the test questions too, and the seed if their file tells it.",
+)
 @publication_options(title="that of the folder", license_="CC-BY-4.0")
 @OVERWRITE
 def card(
     folder: str,
-    out: str | None,
     with_answers: bool,
+    creators: tuple[str, ...],
+    title: str | None,
+    licence: str | None,
+    out: str,
     overwrite: bool,
-    **options: Any,
 ) -> None:
-    """Write a data card of the split in FOLDER: a page, Croissant metadata and an index.
+    """Write a data card of the split in FOLDER: a page with the header that Hugging Face reads.
 
-    README.md is for people, croissant.json for programs, index.parquet has a line for each
-    question. Hand them on with the files that the card lists: those of the test answers are not
-    among them, and nothing in the card tells an answer of a test question. All values are read and
-    must be those that were written.
+    Hand it on with the files that it lists: those of the test answers are not among them, and a
+    file that tells an answer of a test question is refused.
     """
     needs("iqtt card", SHARE, "share")
     from iqtt.sharing.published import open_split
-    from iqtt.sharing.questions import make_questions_card
-    from scenegen.sharing.card import NAMES
+    from iqtt.sharing.questions import write_questions_card
+    from scenegen.sharing.card import Publication
 
-    name = Path(folder).resolve().name
-    publication = publication_of(options, name, lambda: "CC-BY-4.0")
-    out = out or f"{name}-card"
-    refuse_command_inputs(Path(out) / file for file in NAMES)
+    named = title or Path(folder).resolve().name
     with open_split(folder, with_answers) as tables:
-        count = sum(map(len, tables))
-        with progress_bar(count, "question") as bar:
-            make_questions_card(tables, out, publication, overwrite=overwrite, progress=bar.update)
-    print_line(f"{out}: {', '.join(NAMES)} of {count} questions")
+        publication = Publication(named, creators, licence or "CC-BY-4.0")
+        write_questions_card(out, tables, publication, overwrite)
+    print_line(f"{out}: {sum(map(len, tables))} questions")
 
 
+# fmt: off
 @click.command(
     epilog=f"{EXAMPLE}iqtt export iqtt-split/iqtt-val.h5 --format parquet\n"
     "  iqtt export iqtt-split/iqtt-val.h5 --format vlm --rotations 3 --out val-vlm"
 )
 @click.argument("file", type=InputPath())
-@click.option("--format", "form", type=click.Choice(["parquet", "webdataset", "vlm"]),
+@click.option("--format", "form", type=click.Choice([*DATA_FORMATS, "vlm"]),
               required=True,
               help="parquet and webdataset are for data loaders. vlm is for models that read"
               " pictures and text: Parquet, VLMEvalKit and lmms-eval.")

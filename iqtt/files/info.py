@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.files.reader import QuestionsFile, answers_beside, open_tables
-from iqtt.questions.specs import DISTRACTOR_KINDS
+from iqtt.questions.kinds import DISTRACTOR_KINDS
 from scenegen.common.text_table import printable
 from scenegen.files.content import CONTENT_DIGEST
 from scenegen.files.info import column_lines, fact_lines, setting_lines, size_text

@@ -4,13 +4,16 @@ A training file has two tables of questions, in the groups `labeled` and `unlabe
 files have one, at the root. `truth` tells what is known of the questions of each table.
 """
 
+import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
+import h5py
 from numpy.typing import NDArray
 
-from iqtt.questions.specs import DISTRACTOR_KINDS, SPLITS, SplitSpec
+from iqtt.questions.kinds import DISTRACTOR_KINDS
+from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.shapes.polycube import MAX_CUBES
 from scenegen.common.records import LARGEST
 from scenegen.files.content import CONTENT_DIGEST
@@ -81,12 +84,13 @@ def named(attribute: str, part: str) -> str:
     return f"{attribute}_{part}".rstrip("_")
 
 
-def truth_columns(spec: SplitSpec, version: str = FORMAT_VERSION) -> list[Column]:
+def truth_columns(spec: SplitSpec, kinds: Sequence[str] = DISTRACTOR_KINDS) -> list[Column]:
     """Return the columns of `truth`: shapes, views, lights and difficulty of each question.
 
-    `version` is that of the format; 1.0 did not name `near-mirror`, and called it `mirror`.
+    Args:
+        kinds: the distractor types that there were when the file was made (`known_kinds`). Files
+            of 1.0 did not name `near-mirror`, and called it `mirror`.
     """
-    kinds = DISTRACTOR_KINDS[: 4 if version == "1.0" else None]
     most, lights, images = spec.cubes[1], spec.lights[1], 1 + spec.answers
     coordinates = f"integer coordinates of the cubes of each shape; {NO_CUBE} in unused rows"
     shape_id = "canonical shape under the 24 rotations: its sorted cubes, two bytes each"
@@ -124,6 +128,18 @@ def truth_columns(spec: SplitSpec, version: str = FORMAT_VERSION) -> list[Column
         )
     # fmt: on
     return columns
+
+
+def known_kinds(group: Any) -> Sequence[str]:
+    """Return the distractor types that the truth of a file names, if DISTRACTOR_KINDS begins so.
+
+    Otherwise return DISTRACTOR_KINDS, which the file is then found not to name.
+    """
+    stored = group.get("distractor_kind") if isinstance(group, h5py.Group) else None
+    names: Any = getattr(stored, "attrs", {})
+    count = names.get_id("names").shape if "names" in names else (0,)
+    earlier = DISTRACTOR_KINDS[: math.prod(count)]
+    return earlier if earlier and list(names["names"]) == list(earlier) else DISTRACTOR_KINDS
 
 
 def root_attributes(spec: SplitSpec, renderer: Mapping[str, str], command: str) -> dict[str, Any]:

@@ -18,6 +18,7 @@ from iqtt.files.layout import (
     FORMAT,
     SCORED,
     answer_column,
+    known_kinds,
     named,
     question_columns,
     truth_columns,
@@ -192,7 +193,7 @@ class QuestionsFile(RowFile):
         if self.spec is not None:
             home = f"truth/{self.part}".rstrip("/")
             if home in file:
-                self._take(home, truth_columns(self.spec, self.attributes["format_version"]))
+                self._take(home, truth_columns(self.spec, known_kinds(file[home])))
             mark, digest = (named(name, self.part) for name in ("fingerprint", TRUTH_DIGEST))
             self.fingerprint = read_text(file, mark, self.path, needed=True)
             self.stored_truth_digest = read_digest(file, digest, self.path, self.has_answers)

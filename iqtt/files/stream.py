@@ -9,7 +9,8 @@ from typing import Any
 from iqtt.files.layout import answer_column, question_columns, truth_columns
 from iqtt.files.work import question_rows
 from iqtt.questions.distractors import Pools, make_pools
-from iqtt.questions.specs import DISTRACTORS, SPLITS, SplitSpec
+from iqtt.questions.kinds import DISTRACTORS
+from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.render import DEFAULT_BATCH, groups, render_questions
 from scenegen.common.names import check_choice
 from scenegen.files.stream import (

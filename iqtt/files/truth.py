@@ -6,7 +6,8 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
+from iqtt.questions.kinds import DISTRACTOR_KINDS
+from iqtt.questions.specs import SplitSpec
 from scenegen.camera import Camera
 
 Array = NDArray[Any]

@@ -24,7 +24,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.questions.specs import DISTRACTOR_KINDS, SPLITS, SplitSpec
+from iqtt.questions.kinds import DISTRACTOR_KINDS
+from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.shapes.matched import matched_rows
 from iqtt.shapes.near import move_cubes
 from iqtt.shapes.polycube import canonical_class, is_chiral, mirror, set_ids

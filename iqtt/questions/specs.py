@@ -2,11 +2,11 @@
 
 import hashlib
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, get_args
 
+from iqtt.questions.kinds import DISTRACTORS, QUESTION_KINDS
 from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import MAX_CUBES
 from scenegen.camera import Camera, half_angle
@@ -15,11 +15,7 @@ from scenegen.common.records import Vector3, check, check_range, from_json, norm
 from scenegen.description.specs import IMAGE_DTYPES, MAX_LIGHTS, DatasetSpec
 
 SPLITS = ("train", "val", "test")
-# Of wrong answers, seen from the reference; append only. "near-mirror" mirrors a "near" shape.
-DISTRACTOR_KINDS = ("other", "near", "mirror", "matched", "near-mirror")
-QUESTION_KINDS = ("other", "near", "mirror", "matched", "mirror-pair")
 LETTERS = "ABC"  # of answers, wherever people look; files count them from 0
-DISTRACTORS = (*QUESTION_KINDS, "mixed")
 SMALLEST_SECRET, LARGEST_SECRET = 16, 1_000_000  # bytes of a file whose content is a seed
 MAX_QUESTIONS = 10**8  # of each of train, val and test
 PRESETS: dict[str, dict[str, Any]] = {
@@ -113,8 +109,10 @@ class SplitSpec:
         ):
             check_choice(name, value, choices)
         _check_within("answers", self.answers, 2, 3)
-        if self.distractors == "mirror":
-            check(self.answers == 3, "answers", self.answers, "3, or the distractors mirror-pair")
+        if self.distractors != "mixed":
+            options = QUESTION_KINDS[self.distractors].options
+            expected = f"{options[0]} with the distractors {self.distractors}"
+            check(self.answers in options, "answers", self.answers, expected)
         sides = f"{self.height}x{self.width}"
         small, large = min(self.height, self.width), max(self.height, self.width)
         check(small >= 16 and large <= 4096, "size", sides, "from 16 to 4096 pixels a side")
@@ -132,13 +130,11 @@ class SplitSpec:
 
     @property
     def kinds(self) -> tuple[str, ...]:
-        """The kinds of questions there are, of QUESTION_KINDS.
-
-        With two answers a `mirror` question would be a `mirror-pair` question, so it is left out.
-        """
+        """The kinds of questions there are, of QUESTION_KINDS."""
         if self.distractors != "mixed":
             return (self.distractors,)
-        return tuple(k for k in QUESTION_KINDS if k != "mirror" or self.answers == 3)
+        kinds = QUESTION_KINDS.items()
+        return tuple(name for name, it in kinds if it.mixed and self.answers in it.options)
 
     @property
     def camera_distance(self) -> float:
@@ -232,24 +228,6 @@ def preset_spec(preset: str, **settings: Any) -> SplitSpec:
         edge = side / 128 * SplitSpec.max_radius / radius
         chosen["min_cube_pixels"] = max(1, round(SplitSpec.min_cube_pixels * edge**2))
     return SplitSpec(**chosen)
-
-
-def question_kind(kinds: Sequence[int]) -> str:
-    """Return the kind of a question by the kinds of its answers, such as "mirror-pair" or "near-2".
-
-    Args:
-        kinds: of each answer, -1 for the right one, else an index into DISTRACTOR_KINDS, as the
-            dataset `distractor_kind` has them.
-
-    Raises IndexError for an unknown kind, ValueError where no answer is wrong.
-    """
-    wrong = sorted({DISTRACTOR_KINDS[kind] for kind in kinds if kind >= 0})
-    if not wrong:
-        raise ValueError("a question has a wrong answer")
-    kind = "mirror" if {"mirror", "near-mirror"} & set(wrong) else wrong[0]
-    if wrong == ["mirror"]:
-        kind = "mirror-pair"
-    return kind if len(kinds) == 3 else f"{kind}-{len(kinds)}"
 
 
 def _check_within(name: str, value: float, low: float, high: float, unit: str = "") -> None:

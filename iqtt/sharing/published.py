@@ -116,7 +116,7 @@ def handed_out(tables: Sequence[QuestionsFile]) -> list[tuple[Path, str]]:
     holds |= dict.fromkeys(answers, "answers to the test questions")
     files: list[tuple[Path, str]] = []
     for opened, meaning in holds.items():
-        files += with_shards(opened, meaning, f"{meaning}; shows its shards as one file")
+        files += with_shards(opened, meaning)
     manifest = tables[0].path.with_name(MANIFEST)
     if answers and manifest.is_file():
         files.append((manifest, "manifest"))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from iqtt.files.reader import QuestionsFile, answers_beside
 from iqtt.files.truth import QuestionTruth
 from iqtt.floors import floors_of
-from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec, question_kind
+from iqtt.questions.kinds import DISTRACTOR_KINDS, question_kind
+from iqtt.questions.specs import SplitSpec
 from iqtt.vlm.pictures import composed, draw_pictures, png, stored_question
 from iqtt.vlm.prompt import SIZE, question_text
 from iqtt.vlm.reading import LETTERS

@@ -1,34 +1,18 @@
 """The command that shows rooms in 3D, and what it shares with `bench view`."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import OVERWRITE, Command, Items, together
+from scenegen.command_line.options import OVERWRITE, Items
 from scenegen.command_line.output import print_line
 from scenegen.command_line.paths import InputPath, OutputPath, refuse_command_inputs
 
 if TYPE_CHECKING:
     from scenegen.viewing import RecordedScene
-
-
-def host_options(port: int) -> Callable[[Command], Command]:
-    """Return what adds the options that say where pages are served; `port` is the default."""
-    return together(
-        click.option("--host", metavar="ADDRESS",
-                     help="Address to listen at [default: 127.0.0.1, which only this machine"
-                     " reaches; with --public all addresses of this machine]."),
-        click.option("--port", type=click.IntRange(0, 65535), default=port, show_default=True,
-                     help="Port to listen at; 0 takes any that is free."),
-        click.option("--public", is_flag=True,
-                     help="Let other machines in: everyone who reaches the address sees the pages."
-                     " There is no password, and the connection is not encrypted."),
-        click.option("--name", "names", multiple=True, metavar="HOST",
-                     help="Another name under which browsers reach the pages; may be repeated."),
-    )  # fmt: skip
 
 
 RECORDING = click.option(

@@ -1,9 +1,8 @@
 """The basic shapes as unit shapes: box, sphere, cone, torus, cylinder, teapot and polyhedra.
 
 All but the teapot are rendered as exact surfaces (`exact_surfaces`). Their triangle meshes are for
-export and for `--shading path`; those of curved shapes lie within 4.5e-5 of the exact surface and
-have its normals at their corners. The teapot's mesh is its ground truth, within 6.5e-4 of Newell's
-patches.
+export; those of curved shapes lie within 4.5e-5 of the exact surface and have its normals at their
+corners. The teapot's mesh is its ground truth, within 6.5e-4 of Newell's patches.
 """
 
 import math
@@ -57,7 +56,7 @@ def _box() -> UnitShape:
 
 def _sphere() -> UnitShape:
     half, anywhere = [arc((0, 0), 1, -90, 90, 256)], np.empty((0, 3))
-    return revolution("sphere", half, [(0, 0)], 1.0, anywhere, True, Turned(1, 0, -1, -FAR, FAR))
+    return revolution("sphere", half, [(0, 0)], 1.0, anywhere, Turned(1, 0, -1, -FAR, FAR))
 
 
 def _cone() -> UnitShape:

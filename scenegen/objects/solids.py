@@ -48,7 +48,6 @@ class UnitShape:
             the distance `rounding` in all directions.
         resting_directions: unit directions, (S, 3), of the shape's frame that may point down when
             it lies at rest; empty if all may.
-        is_sphere: whether it is the unit sphere, which path tracers know.
         surface: what is rendered instead of the triangles; None if those are rendered.
         coarse: as from `coarse_hulls.coarse_hull`, if it was kept.
         make_colors: returns `colors`; None for a shape without colours of its own.
@@ -61,7 +60,6 @@ class UnitShape:
     hull_discs: Array
     rounding: float
     resting_directions: Array
-    is_sphere: bool = False
     surface: Surface | None = None
     coarse: tuple[Array, float] | None = None
     make_colors: Callable[[], Array] | None = None
@@ -138,7 +136,6 @@ def revolution(
     hull_rings: list[tuple[float, float]],
     rounding: float = 0.0,
     resting: Array | None = None,
-    is_sphere: bool = False,
     exact: Surface | None = None,
 ) -> UnitShape:
     """Turn profile pieces about the y axis and scale the result to bounding radius 1.
@@ -176,7 +173,7 @@ def revolution(
         resting = kept(f"{name}-resting", lambda: resting_directions(rims))
     discs, heights = (rings * scale).T
     hull = np.stack([0 * heights, heights, 0 * heights], axis=1)
-    return UnitShape(name, mesh, hull, discs, rounding * scale, resting, is_sphere, exact)
+    return UnitShape(name, mesh, hull, discs, rounding * scale, resting, exact)
 
 
 def face_outwards(triangles: Array, normals: Array) -> tuple[Array, Array]:

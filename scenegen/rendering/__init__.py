@@ -5,8 +5,8 @@
 - `drjit_renderer` is the fast path: one kernel computes all pixels of a batch. `rays` finds what
   one ray hits and its colour; `cubes` does so faster for polycubes. `meshes` rasterises triangles,
   and holds them in Mitsuba; `surfaces` has the shapes that need none.
-- `shading` is the shading equation, with the fall-off of light, in numpy; `path_tracing`
-  is the path-traced variant of the colour.
+- `shading` is the shading equation, with the fall-off of light, in numpy; `pictures` traces paths
+  for the colour instead, in the paper's rooms and in closed ones.
 - `numpy_renderer` renders the same images slowly, as fallback and as reference for tests.
 - `backend` chooses the Mitsuba variant; `pixel_samples` places the samples of `--spp`.
 

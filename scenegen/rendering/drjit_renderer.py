@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scenegen.camera import pixel_size
 from scenegen.common.rotations import product
 from scenegen.description.specs import Request
+from scenegen.objects.cast_meshes import normal_table
 from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.exact_surfaces import Surface
 from scenegen.objects.solids import Mesh
@@ -29,7 +30,7 @@ from scenegen.rendering.meshes.rasteriser import (
     rasterise,
     upload_triangles,
 )
-from scenegen.rendering.meshes.unit_scene import UnitScene, unit_scene
+from scenegen.rendering.meshes.unit_scene import UnitScene, stacked, unit_scene
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pixel_samples import SAMPLE_STEPS
 from scenegen.rendering.rays import (
@@ -38,7 +39,7 @@ from scenegen.rendering.rays import (
     Scenes,
     closest_hit,
     nearer_than_room,
-    normal_at,
+    normals_at,
     radiance_at,
     reflectance_at,
     visible_normal,
@@ -97,10 +98,13 @@ def launch_pixels(
     return fetch
 
 
-def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tuple[Scenes, Any]:
+def upload_scenes(
+    batch: SceneBatch, variant: str, models: Sequence[Mesh], bounced: bool = False
+) -> tuple[Scenes, Any]:
     """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel size.
 
-    `models` are those of the batch's names, unless these are basic shapes.
+    `models` are those of the batch's names, unless these are basic shapes. If rays are `bounced`
+    off models, `rays.closest_hit` meets these, too.
     """
     spec, count = batch.spec, len(batch)
     surfaces: list[Surface | None] = [None]
@@ -108,10 +112,13 @@ def upload_scenes(batch: SceneBatch, variant: str, models: Sequence[Mesh]) -> tu
         shapes = [batch.shape_of(name) for name in batch.names]
         unit, surfaces = unit_scene(variant, tuple(shapes)), [shape.surface for shape in shapes]
     else:
-        tree, offset = None, np.zeros((max(1, len(models)), 3))
-        if spec.shadows:
+        tree, offset, normals = None, np.zeros((max(1, len(models)), 3)), None
+        first = np.zeros(len(offset), np.uint32)
+        if spec.shadows or bounced:
             tree, offset = model_scene(variant, batch.shape_of, batch.names, models)
-        unit = UnitScene(tree, offset, np.zeros(len(offset), np.uint32), GRID, None, None)
+        if bounced:
+            first, normals = stacked([normal_table(batch.shape_of(x)) for x in batch.names])
+        unit = UnitScene(tree, offset, first, GRID, normals, None)
     mi.set_variant(variant)
     exact = upload_surfaces(surfaces)
     shape = np.maximum(batch.shape, 0)
@@ -207,10 +214,10 @@ def _trace(
         else:
             t, object_id, face, uv = closest_hit(scenes, item, origin, d)
         p = origin + dr.select(object_id >= 0, t, 0) * d
-        if meshes:
+        if not (meshes or cubes):
+            flat, smooth = normals_at(scenes, item, p, d, object_id, face, uv)
+        if not cubes:
             n = visible_normal(scenes, item, p, d, object_id, (flat, smooth))
-        elif not cubes:
-            n = normal_at(scenes, item, p, d, object_id, face, uv)
         tint = None if colors is None else own
         radiance = radiance_at(scenes, item, p, d, n, object_id, spec.shadows, tint)
         return t, object_id, n, radiance, own

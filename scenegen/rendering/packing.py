@@ -79,13 +79,15 @@ class SceneBatch:
     def __len__(self) -> int:
         return len(self.fov_y_degrees)
 
-    def rows(self, start: int, end: int) -> "SceneBatch":
-        """Return the images start .. end - 1, with only the names that they need."""
+    def rows(self, which: Any) -> "SceneBatch":
+        """Return some images, by a slice or their numbers, with only the models that they need."""
         arrays: dict[str, Any] = {
-            field.name: value[start:end]
+            field.name: value[which]
             for field in fields(self)
             if isinstance(value := getattr(self, field.name), np.ndarray)
         }
+        if self.spec.source == "shapes":  # listed, used or not: so their scene is built only once
+            return replace(self, **arrays)
         used, shape = np.unique(arrays["shape"], return_inverse=True)
         names = tuple(self.names[i] for i in used.tolist() if i >= 0)
         arrays["shape"] = (shape.reshape(arrays["shape"].shape) - int(used[0] < 0)).astype(np.int32)
@@ -167,8 +169,7 @@ def pack_arrays(
         background=each(scenes.background),
         interior=each(scenes.interior) if spec.interior else None,
     )
-    # All basic shapes are listed, used or not, so that their Mitsuba scene is built only once.
-    return batch if spec.source == "shapes" else batch.rows(0, len(batch))
+    return batch.rows(slice(None))
 
 
 def _arrays(spec: Request, scenes: Sequence[SceneSpec], views: Sequence[int]) -> SceneArrays:

@@ -189,8 +189,10 @@ def _exact_hit(scenes: Scenes, first: Any, face: Any, o: Any, u: Any) -> Any:
 
 
 @dr.syntax
-def normal_at(scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, face: Any, uv: Any) -> Any:
-    """Return the unit world normal of a hit, facing the viewer; zero if nothing is hit."""
+def normals_at(
+    scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, face: Any, uv: Any
+) -> tuple[Any, Any]:
+    """Return what `visible_normal` takes, for an object's hit."""
     flat = mi.Vector3f(0)
     smooth = mi.Vector3f(0)
     if dr.hint(object_id > 0, exclude=[scenes]):
@@ -209,16 +211,17 @@ def normal_at(scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, face: A
                     + uv.x * mi.Vector3f(*table[6:9])
                     + uv.y * mi.Vector3f(*table[9:])
                 )
-    return visible_normal(scenes, item, p, d, object_id, (flat, smooth))
+    return flat, smooth
 
 
 @dr.syntax
 def visible_normal(
     scenes: Scenes, item: Any, p: Any, d: Any, object_id: Any, normals: tuple[Any, Any]
 ) -> Any:
-    """Return what `normal_at` does, from the normals in the frame of the unit shape.
+    """Return the unit world normal of a hit, facing the viewer; zero if nothing is hit.
 
-    They are the normal of the face and that of the smooth surface, not normalised.
+    `normals` are that of the face and that of the smooth surface, in the frame of the unit shape,
+    not normalised.
     """
     flat, smooth = normals
     least = dr.minimum(dr.abs(p.x), dr.minimum(dr.abs(p.y), dr.abs(p.z)))

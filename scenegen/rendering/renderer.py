@@ -26,6 +26,7 @@ MOST_ON_GPU = 4  # the same on a GPU, of whose memory each takes a share, too
 WORTHWHILE = 2000  # images for each worker; below, starting it takes longer than it saves
 MOST_FACES = 2_000_000  # of the models of one launch; the rasteriser takes 96 bytes a face
 MOST_DRAWN = 8_000_000  # faces that the images of one launch show; it takes some 16 bytes for each
+MOST_PATHS = 2**23  # traced in one launch, of several images; they take seconds
 MOST_MODELS = 2000  # in one Mitsuba scene; must not exceed `model_scene.MOST_MODELS`
 
 
@@ -135,15 +136,24 @@ def trace(batch: SceneBatch, names: Sequence[str], device: str = "auto") -> dict
     variant = select_variant(device)
     if variant == "scalar_rgb":
         raise BackendError("shading path", "no LLVM", hint=HOW_TO_GET_LLVM)
+    from scenegen.rendering.pictures import tracer  # imports drjit, as above
+
     if batch.spec.interior:
-        from scenegen.rendering.pictures.tracer import trace_pictures
+        return tracer.trace_pictures(batch, names, variant)
+    many = traced_at_once(batch.spec)
+    images = [
+        tracer.trace_images(part.rows(slice(start, start + many)), variant)
+        for part in parts(batch)
+        for start in range(0, len(part), many)
+    ]
+    return {"image": np.concatenate(images)}
 
-        return trace_pictures(batch, names, variant)
-    from scenegen.rendering.meshes.model_scene import MODELS  # imports drjit, as above
-    from scenegen.rendering.path_tracing.path_tracer import trace_images
 
-    MODELS.clear()  # otherwise Dr.Jit compiles every one of them into the path kernel
-    return {"image": trace_images(batch, variant)}
+def traced_at_once(spec: Request) -> int:
+    """Return how many images should be traced in one go."""
+    views = len(spec.views)
+    at_once = 1 if spec.interior else MOST_PATHS // (spec.height * spec.width * spec.spp * views)
+    return max(1, at_once) * views
 
 
 def parts(batch: SceneBatch) -> list[SceneBatch]:
@@ -164,7 +174,7 @@ def parts(batch: SceneBatch) -> list[SceneBatch]:
             starts.append(row)
             seen, drawn = set(shown), int(faces[shown].sum())
     ends = [*starts[1:], len(batch)]
-    return [batch.rows(start, end) for start, end in zip(starts, ends, strict=True)]
+    return [batch.rows(slice(start, end)) for start, end in zip(starts, ends, strict=True)]
 
 
 @lru_cache(maxsize=64)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.description.scene_arrays import SceneArrays
@@ -30,6 +31,7 @@ from scenegen.rendering.renderer import (
     picture_fields,
     share_processors,
     trace,
+    traced_at_once,
     truth_fields,
 )
 from scenegen.rooms.pack import RenderedScene, pack_rooms
@@ -169,7 +171,7 @@ def render_items(
                 continue
             proposals.accept(item)
             finished[item] = shown
-            if traced and (ready := complete()):  # at once, as the next picture takes long
+            if traced and (ready := complete()):  # at once, as the next pictures take long
                 yield ready
         if ready := complete():
             yield ready
@@ -189,17 +191,31 @@ def _shown(
     """
     spec = batch.spec
     visible = visible_pixels(truth["object_id"], spec.object_slots)
-    enough = spec.seen_enough(visible, batch.object_count)
+    seen = spec.seen_enough(visible, batch.object_count)
+    enough = np.asarray(seen.reshape(len(scenes), -1).all(axis=1))
+    traced = _traced(batch, np.flatnonzero(enough), pictures, device)
     for row, first in enumerate(range(0, len(batch), len(spec.views))):
         images = slice(first, first + len(spec.views))
-        if not enough[images].all():
+        if not enough[row]:
             yield None
             continue
         pixels = {name: values[images] for name, values in truth.items()}
         if spec.shading == "path" and pictures:
-            shown = batch.rows(images.start, images.stop)
-            pixels |= trace(shown, pictures, device)
+            pixels |= next(traced)
         whole = None if masks is None else masks[images]
         if spec.truth:
             pixels |= further_truth(batch, first, pixels, whole)
         yield RenderedScene(scenes, row, batch, first, pixels, visible[images])
+
+
+def _traced(
+    batch: SceneBatch, scenes: Array, pictures: Sequence[str], device: str
+) -> Iterator[dict[str, Array]]:
+    """Yield the path-traced pictures of some scenes, of which several are traced at once."""
+    views = len(batch.spec.views)
+    many = traced_at_once(batch.spec) // views
+    for start in range(0, len(scenes), many):
+        images = scenes[start : start + many, None] * views + np.arange(views)
+        pixels = trace(batch.rows(images.ravel()), pictures, device)
+        for first in range(0, images.size, views):
+            yield {name: values[first : first + views] for name, values in pixels.items()}

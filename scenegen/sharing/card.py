@@ -1,203 +1,169 @@
-"""Write a data card: a page in Markdown for people, Croissant for programs, and the index.
+"""Write a data card: the page of a data set, with the header that Hugging Face reads.
 
 Texts from files and from the command line stay what they are on the page: in tables every sign that
 means something to Markdown or HTML is escaped, and what is to be copied is a block of lines with
 four spaces before them, in which nothing means anything.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scenegen.common.records import check
 from scenegen.common.text_table import markdown, piped, printable
-from scenegen.files.new_file import folder_written_beside
+from scenegen.files.new_file import write_text
 from scenegen.files.rows import RowFile
-from scenegen.files.schema import Column
+from scenegen.files.sets.manifest import file_sha256
 from scenegen.files.sets.shards import OpenFile
-from scenegen.rendering.backend import VERSION_ATTRIBUTES
-from scenegen.sharing.index import INDEX, counts_table, index_columns, write_index
-from scenegen.sharing.publication import Publication, shared_file
-from scenegen.sharing.task import ALL_DATA, Tally, Task
+from scenegen.sharing.export import export_stem
 
-CARD, CROISSANT = "README.md", "croissant.json"
-NAMES = (CARD, CROISSANT, INDEX)
-PAPER = """@article{rajeswar2020pix2shape,
-  title = {Pix2Shape: Towards Unsupervised Learning of 3D Scenes from Images Using a View-Based Representation},
-  author = {Rajeswar, Sai and Mannan, Fahim and Golemo, Florian and Parent-L{\\'e}vesque, J{\\'e}r{\\^o}me and Vazquez, David and Nowrouzezahrai, Derek and Courville, Aaron},
-  journal = {International Journal of Computer Vision},
-  year = {2020},
-  doi = {10.1007/s11263-020-01322-1}
-}"""  # noqa: E501
+TEMPLATES = Path(__file__).parent / "templates"
+ADDRESS = r"https?://[^\s<>\"'`]+"
+SPDX = r"[A-Za-z0-9.+-]{1,60}"
 HUGGING_FACE_LICENSES = (
     "apache-2.0", "cc-by-4.0", "cc-by-nc-4.0", "cc-by-nc-nd-4.0", "cc-by-nc-sa-4.0", "cc-by-nd-4.0",
     "cc-by-sa-4.0", "cc0-1.0", "mit", "odbl", "odc-by", "pddl",
 )  # fmt: skip
-SIZES = ((1e3, "n<1K"), (1e4, "1K<n<10K"), (1e5, "10K<n<100K"), (1e6, "100K<n<1M"))
-RESPONSIBLE = {  # titles of sections, by the fields of mlcroissant's RAI vocabulary
-    "data_use_cases": "Intended use",
-    "data_limitations": "Limits",
-    "data_biases": "Known biases",
-    "data_collection": "How the data came about",
-    "data_collection_missing_data": "Missing values",
-    "data_annotation_protocol": "Labels",
-    "personal_sensitive_information": "Personal data",
-    "data_social_impact": "Impact on society",
-    "data_release_maintenance_plan": "Maintenance",
-}
+
+
+@dataclass(frozen=True)
+class Publication:
+    """What only the person who publishes the data knows.
+
+    Attributes:
+        title: a name for people.
+        creators: names of those who made the data.
+        license: an SPDX identifier such as CC-BY-4.0, or an address that begins with https://.
+    """
+
+    title: str
+    creators: Sequence[str]
+    license: str
+
+    def __post_init__(self) -> None:
+        check(self.title.strip() != "", "title", "an empty text", "a name")
+        names = [name.strip() for name in self.creators]
+        check(len(names) > 0 and all(names), "creator", names or "none", "a name")
+        expected = "an SPDX identifier such as CC-BY-4.0, or an address"
+        good = re.fullmatch(f"{SPDX}|{ADDRESS}", self.license) is not None
+        check(good, "license", repr(self.license), expected)
+
+    @property
+    def license_address(self) -> str:
+        """Where the licence can be read."""
+        if self.license.startswith("http"):
+            return self.license
+        return f"https://spdx.org/licenses/{self.license}.html"
 
 
 def write_card(
-    folder: str | Path,
+    path: str | Path,
     publication: Publication,
-    task: Task,
-    tables: Sequence[RowFile],
+    template: Path,
+    shown: Sequence[RowFile],
     files: Sequence[tuple[Path, str]],
-    notes: Callable[[Sequence[Tally]], Mapping[str, str]],
+    overwrite: bool = False,
     *,
     answers: Sequence[RowFile] = (),
-    overwrite: bool = False,
-    progress: Callable[[int], Any] = lambda done: None,
-) -> list[Path]:
-    """Write the data card of open tables to a folder that appears complete; return its files.
-
-    The same files and the same publication give the same bytes with the same versions of pyarrow,
-    `datasets` and mlcroissant. All values are read once, for the digests in the index, and all
-    bytes of the files, for their SHA-256.
+    keywords: Sequence[str],
+    facts: Sequence[Mapping[str, str]],
+    columns: str,
+    **told: Any,
+) -> None:
+    """Write the card of open files as a Markdown file; the same files give the same bytes.
 
     Args:
-        folder: to make; with `overwrite`, an older card is replaced.
-        publication: what only the person who publishes the data knows.
-        files: those that are handed on, and what each holds in words of ours.
-        notes: returns sections of the page, by their titles, from what the tables hold.
-        answers: files of which requests and commands are told too.
-        progress: is told the number of rows that were read since the last call.
+        template: of the sections that only this kind of data has; it takes what `told` holds.
+        shown: tables that may be exported to Parquet, which the header names.
+        answers: further files whose requests and commands are told.
+        files: those that are handed on, all in one folder, and what each holds in words of ours.
+            Their bytes are read once, for the SHA-256.
+        keywords: words to find the data by.
+        facts: what is told of each table that is shown, by title.
+        columns: the columns of the HDF5 files, as a table in Markdown.
 
-    Raises OSError as `folder_written_beside`, and FileFormatError where a file is damaged.
+    Raises OSError as `write_text`, and SpecError where two files have one name.
     """
-    from scenegen.sharing.croissant import croissant_json
+    from huggingface_hub import DatasetCard, DatasetCardData
 
-    with folder_written_beside(folder, NAMES, overwrite) as made:
-        tallies = write_index(made / INDEX, task, tables, progress)
-        shared = [shared_file(path, meaning) for path, meaning in files]
-        shared.append(shared_file(made / INDEX, "a line for each row, without pixels"))
-        facts = [task.facts(file, tally) for file, tally in zip(tables, tallies, strict=True)]
-        names = [f"{file.path.name} {file.part}".rstrip() for file in tables]
-        told = {file.path.name: file.attributes for file in (*tables, *answers)}
-        commands = {n: t["creation_command"] for n, t in told.items() if "creation_command" in t}
-        checksums = [("file", "bytes", "SHA-256", "holds")]
-        checksums += [(file.name, str(file.bytes), file.sha256, file.meaning) for file in shared]
-        sections = {
-            "Files": _table([tuple(facts[0]), *(tuple(row.values()) for row in facts)]),
-            "What they hold": _table(counts_table(task, names, tallies)),
-            "Commands": _blocks(commands),
-            "Requests": _blocks({name: texts["spec"] for name, texts in told.items()}),
-            "Data sets of the files": (task.layout(tables),),
-            "Columns of the index": _index_lines(index_columns(task)),
-            "Reading": (task.reading,),
-            **{title: (text,) for title, text in notes(tallies).items()},
-            **_responsible(task),
-            **_terms(publication),
-            "Checksums": _table(checksums),
-        }
-        page = card_page(publication, task, sum(tally.rows for tally in tallies), sections)
-        (made / CARD).write_text(page, encoding="utf-8")
-        tools = sorted({_tool(file.attributes) for file in tables})
-        metadata = croissant_json(publication, task, shared, tools)
-        (made / CROISSANT).write_text(metadata, encoding="utf-8")
-    return [Path(folder) / name for name in NAMES]
+    names = [file.name for file, _ in files]
+    for name in names:
+        expected = "different names, as all lie beside the card"
+        check(names.count(name) == 1, "files", f"{name} twice", expected)
+    license_, address = publication.license, publication.license_address
+    listed = license_.lower() in HUGGING_FACE_LICENSES
+    header = DatasetCardData(
+        pretty_name=printable(publication.title),
+        license=license_.lower() if listed else "other",
+        tags=list(keywords),
+        configs=_configs([export_stem(file) for file in shown]),
+        **({} if listed else {"license_name": license_, "license_link": address}),
+    )
+    texts = {_cell(file.path.name): file.attributes for file in (*shown, *answers)}
+    card = DatasetCard.from_template(
+        header,
+        template_path=str(TEMPLATES / "card.md"),
+        title=_cell(publication.title),
+        about=_rendered(template, told),
+        facts="\n".join(piped([list(facts[0]), *([_cell(v) for v in f.values()] for f in facts)])),
+        files=[_described(*file) for file in files],
+        commands=_blocks(texts, "creation_command"),
+        requests=_blocks(texts, "spec"),
+        columns=columns,
+        license=markdown(license_),
+        license_address=address,
+        identifier=re.sub(r"[^a-z0-9]+", "-", publication.title.lower()).strip("-") or "data",
+        plain_title=_plain(publication.title),
+        authors=" and ".join(f"{{{_plain(name)}}}" for name in publication.creators),
+    )
+    write_text(path, str(card).rstrip() + "\n", overwrite)
 
 
-def with_shards(opened: OpenFile, meaning: str, of_set: str) -> list[tuple[Path, str]]:
+def with_shards(opened: OpenFile, meaning: str) -> list[tuple[Path, str]]:
     """Return a file and, if it shows shards as one, these, and what each of them holds."""
     path = opened.path
     if not opened.shards:
         return [(path, meaning)]
     shards = [(opened.folder / shard.file, f"shard of {path.name}") for shard in opened.shards]
-    return [(path, of_set), *shards]
+    return [(path, f"{meaning}; shows its shards as one file"), *shards]
 
 
-def _tool(texts: Mapping[str, str]) -> str:
-    """Return which program rendered a file, with the versions that its root names."""
-    versions = ", ".join(
-        f"{name.removesuffix('_version')} {texts[name]}" for name in VERSION_ATTRIBUTES
-    )
-    return printable(f"{texts['writer']}, {versions}, {texts['variant']}")
+def _configs(stems: Sequence[str]) -> list[dict[str, str]]:
+    """Return where `datasets` finds the Parquet files of tables; it would take HDF5 files else.
+
+    Each table has a name of its own, as tables of questions differ in columns.
+    """
+    names = stems if len(stems) > 1 else ["default"]
+    return [
+        {"config_name": name, "data_files": f"{stem}-?????-of-?????.parquet"}
+        for name, stem in zip(names, stems, strict=True)
+    ]
 
 
-def card_page(
-    publication: Publication, task: Task, rows: int, sections: Mapping[str, Sequence[str]]
-) -> str:
-    """Return the page of a data set: a header that Hugging Face reads, and sections by title."""
-    lines = [_header(publication, task, rows), f"# {markdown(printable(publication.title))}", ""]
-    lines += [task.summary, ""]
-    for title, text in sections.items():
-        if text:
-            lines += [f"## {title}", "", *text, ""]
-    return "\n".join(lines).rstrip() + "\n"
+def _rendered(template: Path, told: Mapping[str, Any]) -> str:
+    from jinja2 import StrictUndefined, Template
+
+    text = template.read_text(encoding="utf-8")
+    return str(Template(text, undefined=StrictUndefined).render(told)).strip()
 
 
-def _responsible(task: Task) -> dict[str, Sequence[str]]:
-    """Return the sections on use and limits."""
-    texts = {**task.responsible, **ALL_DATA}
-    return {
-        RESPONSIBLE[name]: [text] if isinstance(text, str) else [f"- {part}" for part in text]
-        for name, text in texts.items()
-        if name in RESPONSIBLE
-    }
+def _described(path: Path, meaning: str) -> dict[str, Any]:
+    """Return what a card tells of a file, whose bytes are read once. Raises OSError."""
+    size, sha256 = path.stat().st_size, file_sha256(path)
+    return {"name": _cell(path.name), "bytes": size, "sha256": sha256, "meaning": _cell(meaning)}
 
 
-def _terms(publication: Publication) -> dict[str, Sequence[str]]:
-    """Return the sections on licence and citation."""
-    license_line = (
-        f"The data: {markdown(publication.license)}, <{publication.license_address}>. The program"
-        " that made it: Apache-2.0, which says nothing about the data."
-    )
-    citation = "The data, and the paper whose setting it follows:"
-    return {
-        "Licence": [license_line],
-        "Citation": [citation, *_block(publication.citation), *_block(PAPER)],
-    }
+def _blocks(texts: Mapping[str, Mapping[str, str]], name: str) -> dict[str, str]:
+    """Return an attribute of each file that has it as one line that means nothing to Markdown."""
+    return {file: printable(told[name]) for file, told in texts.items() if name in told}
 
 
-def _header(publication: Publication, task: Task, rows: int) -> str:
-    """Return the YAML that Hugging Face reads."""
-    from huggingface_hub import DatasetCardData
-
-    short = publication.license.lower()
-    listed = short in HUGGING_FACE_LICENSES
-    header = DatasetCardData(
-        pretty_name=printable(publication.title),
-        license=short if listed else "other",
-        license_name=None if listed else publication.license,
-        license_link=None if listed else publication.license_address,
-        size_categories=[next((name for n, name in SIZES if rows < n), "n>1M")],
-        tags=list(task.keywords),
-        configs=[{"config_name": "index", "data_files": INDEX}],
-    )
-    return f"---\n{header.to_yaml()}\n---\n"
+def _cell(text: str) -> str:
+    return markdown(printable(text))
 
 
-def _table(rows: Sequence[tuple[str, ...]]) -> list[str]:
-    return piped([[markdown(printable(cell)) for cell in row] for row in rows])
-
-
-def _block(text: str) -> list[str]:
-    """Return text as a block that is shown as it is; control characters become escapes."""
-    return ["", *(f"    {printable(line)}" for line in text.split("\n")), ""]
-
-
-def _blocks(texts: Mapping[str, str]) -> list[str]:
-    """Return a block of one line for each file, under the file's name."""
-    lines: list[str] = []
-    for name, text in texts.items():
-        lines += [f"{markdown(printable(name))}:", *_block(text.replace("\n", "\\n"))]
-    return lines
-
-
-def _index_lines(columns: Sequence[Column]) -> list[str]:
-    rows = [("column", "type", "shape", "meaning")]
-    for column in columns:
-        shape = "(" + ", ".join("n" if n < 0 else str(n) for n in column.shape) + ")"
-        rows.append((column.name, column.dtype, shape if column.shape else "", column.meaning))
-    text = f"`{INDEX}` has a line for each row of the files, and no pixels."
-    return [text, "", *_table(rows)]
+def _plain(text: str) -> str:
+    """Return a text without characters that mean something to TeX."""
+    return "".join(c for c in printable(text) if c not in "{}\\%#$&~^")

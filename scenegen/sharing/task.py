@@ -1,8 +1,7 @@
-"""What exports and cards tell of a kind of rows. There are two: rooms, and `iqtt`'s questions."""
+"""What is exported of a kind of rows. There are two: rooms, and `iqtt`'s questions."""
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,71 +12,21 @@ from scenegen.files.schema import Column
 from scenegen.files.sets.shards import cut
 
 BLOCK_BYTES = 2**25  # of rows that are in memory at once
-Line = dict[str, Any]  # of an index, by column
-# Paragraphs on all data that this program makes, by the same names.
-ALL_DATA: dict[str, str | list[str]] = {
-    "data_collection_type": ["Software Collection"],
-    "data_social_impact": "None is expected: the images show no people, and nothing that exists.",
-    "data_release_maintenance_plan": "A file is not changed after it is published; a correction"
-    " gets a new version and new SHA-256s.",
-}
-
-
-@dataclass
-class Tally:
-    """What the rows of one table hold: their number, what was counted, and how many differ.
-
-    Attributes:
-        digests: of what the rows show, as hex.
-    """
-
-    rows: int = 0
-    counters: dict[str, Counter[Any]] = field(default_factory=dict)
-    digests: set[str] = field(default_factory=set)
 
 
 @dataclass(frozen=True)
 class Task:
-    """What is told of rows of one kind. All texts are ours; `Any` is an open file of such rows.
+    """What is exported of rows of one kind; `Any` is an open file of such rows.
 
     Attributes:
-        unit: what the rows are, in one word.
-        what: a file of them.
-        verify: command that tells which rows of a file were changed.
-        summary: what the data is, in one paragraph.
-        keywords: words to find it by.
-        responsible: paragraphs by mlcroissant's names of the fields of RAI, besides ALL_DATA.
-        reading: how the files are read, for people.
+        what: a file of them, in words of ours.
         exported: returns the columns of an export.
         values: returns their values from those that are stored, of one row.
-        columns: of a line of the index, besides places and digests; -1 in a shape stands for any
-            length.
-        key: names of columns of the index that together name a row.
-        line: returns the values of `columns` from a file and the stored values of a row.
-        digested: columns of the files whose rows' SHA-256 is in a line.
-        same: that of them which rows share that show the same.
-        counts: by title, what to count of a line; a line may count several times, or not at all.
-        facts: returns what a card tells of a file and its tally, by title.
-        layout: returns a Markdown table of the data sets of some files, with units and frames.
     """
 
-    unit: str
     what: str
-    verify: str
-    summary: str
-    keywords: Sequence[str]
-    responsible: Mapping[str, str | list[str]]
-    reading: str
     exported: Callable[[Any], Sequence[Column]]
     values: Callable[[Mapping[str, Any]], Mapping[str, Any]]
-    columns: Sequence[Column]
-    key: Sequence[str]
-    line: Callable[[Any, Mapping[str, Any]], Line]
-    digested: Sequence[str]
-    same: str
-    counts: Mapping[str, Callable[[Line], Iterable[Any]]]
-    facts: Callable[[Any, Tally], Mapping[str, str]]
-    layout: Callable[[Sequence[Any]], str]
 
 
 def is_picture(column: Column) -> bool:

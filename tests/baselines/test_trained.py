@@ -19,6 +19,8 @@ from refusals import refused
 
 from baselines.commands import HOMES
 from baselines.relief import depth_supervised
+from baselines.training.baseline import Baseline
+from baselines.training.baseline import train as fit
 from baselines.training.checkpoint import CHECKPOINT, WEIGHTS, load_tensors
 from baselines.training.data import TrainingFiles
 from baselines.training.machine import Machine
@@ -47,6 +49,11 @@ each = pytest.mark.parametrize(
 Train = Callable[..., Path]
 
 
+def baseline_of(name: str) -> Baseline:
+    baseline: Baseline = import_module(f"baselines.{HOMES[name][0]}").BASELINE
+    return baseline
+
+
 @pytest.fixture(scope="session")
 def data(turned_path: Path, truths: Any) -> dict[str, Path]:
     """Return rooms of 3 views, and 3 labelled questions and 3 others, all of 32x32 pixels."""
@@ -55,9 +62,9 @@ def data(turned_path: Path, truths: Any) -> dict[str, Path]:
 
 @pytest.fixture(scope="session")
 def unet(data: dict[str, Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    settings = depth_supervised.Settings(**RELIEF, iterations=1)
+    settings = depth_supervised.BASELINE.settings(**RELIEF, iterations=1)
     folder = tmp_path_factory.mktemp("unet")
-    return depth_supervised.train(TrainingFiles(data["rooms"]), folder, settings)
+    return fit(depth_supervised.BASELINE, TrainingFiles(data["rooms"]), folder, settings)
 
 
 @pytest.fixture
@@ -66,18 +73,17 @@ def train(case: str, data: dict[str, Path], unet: Path, tmp_path: Path) -> Train
     name, kind, settings, how = CASES[case]
     if case == "completed":
         how = {"start": str(unet)}
-    module = import_module(f"baselines.{HOMES[name][0]}")
+    baseline = baseline_of(name)
 
     def run(folder: str, path: Path | None = None, **more: Any) -> Path:
-        changed = {
-            k: more.pop(k) for k in more.keys() & module.Settings.__dataclass_fields__.keys()
-        }
+        names = baseline.settings.__dataclass_fields__
+        changed = {key: more.pop(key) for key in more.keys() & names.keys()}
         goes_on = more.get("resume", False)
-        made = module.Settings(**{"iterations": 5, **settings, **changed})
+        made = baseline.settings(**{"iterations": 5, **settings, **changed})
         given = {} if goes_on else {"settings": made, **how}
         with TrainingFiles(path or data[kind]) as files:
             machine = Machine("cpu", every=2)
-            return module.train(files, tmp_path / folder, machine=machine, **{**given, **more})
+            return fit(baseline, files, tmp_path / folder, machine=machine, **{**given, **more})
 
     return run
 
@@ -177,9 +183,9 @@ def test_labels_alone_are_learned_from_weights_of_another_run(
     name, settings, keyword, data, tmp_path
 ):
     """The networks stay as they are stored, and the card says what is new."""
-    module, path = import_module(f"baselines.{HOMES[name][0]}"), TrainingFiles(data["questions"])
-    plain = module.train(path, tmp_path / "plain", module.Settings(**settings, iterations=2))
-    later = module.train(path, tmp_path / "later", labels=3, **{keyword: str(plain)})
+    baseline, path = baseline_of(name), TrainingFiles(data["questions"])
+    plain = fit(baseline, path, tmp_path / "plain", baseline.settings(**settings, iterations=2))
+    later = fit(baseline, path, tmp_path / "later", labels=3, **{keyword: str(plain)})
     (_, before), (tensors, card) = content(plain), content(later)
     heads = {key for key in tensors if key.startswith("head.")}
     assert set(differing(plain, later)) == heads
@@ -187,10 +193,13 @@ def test_labels_alone_are_learned_from_weights_of_another_run(
     new = {key for key in card if card[key] != before[key]}
     assert new == ({"labels", "head"} if name == "ptn" else {"labels"})
     with pytest.raises(FileExistsError):
-        module.train(path, tmp_path / "later", **{keyword: str(plain)})
-    wrong = {"resume": True} if name == "rezende" else {"settings": module.Settings(width=2)}
+        fit(baseline, path, tmp_path / "later", **{keyword: str(plain)})
+    if name == "rezende":
+        where, wrong = "plain", {"resume": True}
+    else:
+        where, wrong = "wrong", {"settings": baseline.settings(width=2)}
     with refused(SpecError, keyword):
-        module.train(path, tmp_path / "wrong", **wrong, **{keyword: str(plain)})
+        fit(baseline, path, tmp_path / where, **wrong, **{keyword: str(plain)})
 
 
 IMPOSSIBLE = {
@@ -214,7 +223,6 @@ IMPOSSIBLE = {
 
 @pytest.mark.parametrize("name", IMPOSSIBLE)
 def test_impossible_settings_are_refused(name):
-    module = import_module(f"baselines.{HOMES[name][0]}")
     for setting, value in IMPOSSIBLE[name].items():
         with refused(SpecError, setting.replace("_", " ")):
-            module.Settings(**{setting: value})
+            baseline_of(name).settings(**{setting: value})

@@ -52,6 +52,16 @@ def test_a_recording_holds_the_truth_of_each_view(path, tmp_path):
         assert labels == ["the room", *(item.shape for item in room.scene.objects), "nothing"]
 
 
+def test_views_that_a_scene_lacks_are_cleared(make_rooms, tmp_path):
+    with open_rooms(make_rooms(tmp_path / "x.h5", 2, views=(0, 40))) as rooms:
+        write(tmp_path / "x.rrd", "x", room_scenes(rooms, [[0, 1], [2]]))
+    there = recorded(tmp_path / "x.rrd", "scene")
+    for name in ("/world/cameras/view_1", "/world/truth/view_1", "/pixels/view_1"):
+        assert there[name][1] == {"Clear:is_recursive": [True]}
+    assert not {name for name, steps in there.items() for values in steps.values()
+                if "view_0" in name and "Clear:is_recursive" in values}  # fmt: skip
+
+
 def test_cameras_see_the_points_where_their_pixels_are(make_rooms, tmp_path):
     with open_rooms(make_rooms(tmp_path / "x.h5", 1, width=24)) as rooms:
         write(tmp_path / "x.rrd", "x", room_scenes(rooms, [[0]]))

@@ -78,6 +78,7 @@ def all_digests(folder: Path) -> dict[str, dict[str, str]]:
     kinds["samples"] = preset_spec("specular", **TINY, shadows=True, spp=3, fov_degrees=40.0)
     for name in ("shapes", "shapenet", "specular"):
         kinds[f"{name}, shadows"] = preset_spec(name, **TINY, shadows=True)
+    kinds["paths"] = preset_spec("specular", **TINY, shading="path", spp=4)
     kinds["teapots"] = replace(kinds["shapes, shadows"], shapes=("teapot",), seed=3)
     found = {}
     for name, spec in kinds.items():

@@ -1,9 +1,6 @@
 """Files that are shared, as the programs of others read them: none may reach for the network."""
 
 import os
-import subprocess
-import sys
-import warnings
 
 import numpy as np
 
@@ -36,22 +33,3 @@ def check_srgb(codes, radiance):
     half = np.stack([codes - 0.5, codes + 0.5]).clip(0, 255) / 255
     low, high = np.where(half <= 0.04045, half / 12.92, ((half + 0.055) / 1.055) ** 2.4)
     assert ((low - 1e-7 <= radiance) & (radiance <= high + 1e-7)).all()
-
-
-def faultless_croissant(path):
-    """Return a Croissant file as mlcroissant knows it; it may not find fault with it."""
-    import mlcroissant
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of the libraries that it uses
-        found = mlcroissant.Dataset(jsonld=path)
-    issues = found.metadata.ctx.issues
-    assert (issues.errors, issues.warnings) == (set(), set())
-    return found
-
-
-def validate(path):
-    """Run `mlcroissant validate`."""
-    program = "import sys; from mlcroissant.scripts.cli import main; sys.exit(main())"
-    line = [sys.executable, "-c", program, "validate", "--jsonld", str(path)]
-    return subprocess.run(line, capture_output=True, text=True, check=False)

@@ -10,21 +10,24 @@ from pix2shape_models import card_of as reference_card
 from pix2shape_models import of_questions, tiny, written
 from ptn_models import card_of
 
-from baselines import depth_match, ptn, rezende
-from baselines.depth_match.network import METHOD as DEPTH
 from baselines.depth_match.network import Card as DepthCard
+from baselines.depth_match.network import Settings as DepthSettings
+from baselines.depth_match.training import BASELINE as DEPTH
 from baselines.pix2shape.predict import predict_file
 from baselines.pix2shape.weights import METHOD as REFERENCE
-from baselines.ptn.network import METHOD as PTN
+from baselines.ptn.training import BASELINE as PTN
 from baselines.relief import depth_completed, depth_supervised
 from baselines.relief.network import Card as ReliefCard
 from baselines.relief.network import Settings as ReliefSettings
 from baselines.resnets import cnn, siamese
 from baselines.resnets.card import Card as ResnetCard
-from baselines.rezende.network import METHOD as REZENDE
+from baselines.resnets.card import Settings as ResnetSettings
 from baselines.rezende.network import Card as RezendeCard
 from baselines.rezende.network import Settings as RezendeSettings
+from baselines.rezende.training import BASELINE as REZENDE
+from baselines.training.baseline import Baseline
 from baselines.training.checkpoint import new_state, save_weights
+from baselines.training.submission import write_submission
 
 Write = Callable[..., None]  # (data, out, **how)
 
@@ -54,8 +57,11 @@ def of_reference(weights: Path) -> Write:
     return partial(predict_file, weights, device="cpu")
 
 
-def of_module(module: Any, weights: Path) -> Write:
-    return partial(module.write_submission, weights=weights)
+def of_baseline(baseline: Baseline, *made: Any) -> Write:
+    """Return how untrained weights of a baseline are submitted; `made` as for `stored`."""
+    folder, card, *change = made
+    weights = stored(folder, baseline.method, card, *change)
+    return partial(write_submission, baseline, weights=weights)
 
 
 def room_writers(folder: Path) -> dict[str, Write]:
@@ -65,28 +71,28 @@ def room_writers(folder: Path) -> dict[str, Write]:
         "pix2shape-rays": of_reference(
             stored(folder, REFERENCE, reference_card(tiny(rays=True)), stand_out)
         ),
-        "ptn": of_module(ptn, stored(folder, PTN, card_of(), stand_out)),
+        "ptn": of_baseline(PTN, folder, card_of(), stand_out),
     }
     for module in (depth_supervised, depth_completed):
-        method = module.METHOD
-        card = ReliefCard(method.name, ReliefSettings(32, 0.1))
-        writers[method.name] = of_module(module, stored(folder, method, card, stand_out))
+        name = module.BASELINE.method.name
+        card = ReliefCard(name, ReliefSettings(size=32, width=0.1))
+        writers[name] = of_baseline(module.BASELINE, folder, card, stand_out)
     return writers
 
 
 def answer_writers(folder: Path, train: Path) -> dict[str, Write]:
     """Return writers of answers to questions of 32x32 pixels or a multiple, by method."""
     writers = {"pix2shape": of_reference(written(folder / "p.safetensors", of_questions(train)))}
-    for module, method in ((cnn, cnn.KIND.method), (siamese, siamese.KIND.method)):
-        card = ResnetCard(method.name, module.Settings(width=4, size=16), labels=1)
-        writers[method.name] = of_module(module, stored(folder, method, card))
-    writers["ptn"] = of_module(ptn, stored(folder, PTN, card_of("questions")))
-    small = DepthCard("depth-match", depth_match.Settings(size=32, width=0.1))
-    writers["depth-match"] = of_module(depth_match, stored(folder, DEPTH, small, stand_out))
+    for module in (cnn, siamese):
+        name = module.BASELINE.method.name
+        card = ResnetCard(name, ResnetSettings(width=4, size=16), labels=1)
+        writers[name] = of_baseline(module.BASELINE, folder, card)
+    writers["ptn"] = of_baseline(PTN, folder, card_of("questions"))
+    small = DepthCard("depth-match", DepthSettings(size=32, width=0.1))
+    writers["depth-match"] = of_baseline(DEPTH, folder, small, stand_out)
     for labels in (0, 5):
         place = folder / str(labels)
         place.mkdir()
         card = RezendeCard("rezende", RezendeSettings(size=16, code=4), labels=labels)
-        weights = stored(place, REZENDE, card)
-        writers[f"rezende, {labels} labels"] = of_module(rezende, weights)
+        writers[f"rezende, {labels} labels"] = of_baseline(REZENDE, place, card)
     return writers

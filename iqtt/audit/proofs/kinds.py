@@ -16,7 +16,7 @@ from iqtt.audit.proofs.shapes import Shapes
 from iqtt.audit.proofs.verdict import Proof, judge
 from iqtt.audit.proofs.views import views_apart
 from iqtt.audit.table import AuditTable
-from iqtt.questions.specs import DISTRACTOR_KINDS
+from iqtt.questions.kinds import DISTRACTOR_KINDS
 
 Array = NDArray[Any]
 # Largest distance of the moments of two answers, cube edges: twice that of two matched shapes, as

@@ -82,19 +82,11 @@ def mitsuba_shape(shape: UnitShape, place: Array) -> Any:
     return triangle_mesh(shape.name, overlapping(shape.triangles) + place)
 
 
-def triangle_mesh(
-    name: str, triangles: Array, normals: Array | None = None, bsdf: Any = None
-) -> Any:
-    """Return triangles, (F, 3, 3), as a Mitsuba mesh, with corner normals or flat."""
-    count = 3 * len(triangles)
-    properties = mi.Properties()
-    if bsdf is not None:
-        properties["bsdf"] = bsdf
-    mesh = mi.Mesh(name, count, len(triangles), properties, has_vertex_normals=normals is not None)
+def triangle_mesh(name: str, triangles: Array) -> Any:
+    """Return triangles, (F, 3, 3), as a Mitsuba mesh."""
+    mesh = mi.Mesh(name, 3 * len(triangles), len(triangles))
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = padded(triangles)
-    parameters["faces"] = padded(np.arange(count), np.uint32)
-    if normals is not None:
-        parameters["vertex_normals"] = padded(normals)
+    parameters["faces"] = padded(np.arange(3 * len(triangles)), np.uint32)
     parameters.update()
     return mesh

@@ -4,28 +4,91 @@ Every lane traces several samples of a pixel one after the other: where a path e
 its next one at once. So lanes of a processor's vector do not wait for the longest of their paths.
 Light is sampled at each surface, and combined with the directions that the surface samples by the
 power heuristic (E. Veach, "Robust Monte Carlo methods for light transport simulation", 1997).
+
+What paths meet is a `Room`: `closed_rooms` has those with furniture, `paper_rooms` the paper's.
 """
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import drjit
 import mitsuba
 
-from scenegen.rendering.pictures.lights import (
-    Lights,
-    lamp_density,
-    outside_density,
-    outside_radiance,
-    sample_light,
-)
-from scenegen.rendering.pictures.surfaces import Surfaces, lobes_at, meet, reflected, sampled
 from scenegen.rendering.tables import unit
 
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
-MAX_DEPTH = 12  # segments of a path; in closed rooms light bounces often
-ROULETTE_DEPTH = 3  # segments after which a path may end at random
-OFF = 1e-4  # metres from a surface at which rays start
+# Of a sequence whose points fill four dimensions evenly (M. Roberts' R4).
+STEPS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)
+OFF = 1e-4  # of a surface's distance, in units of length, at which rays start
+
+
+class Lobes(Protocol):
+    """What surfaces do with light that rays meet there."""
+
+    def reflected(self, wo: Any) -> tuple[Any, Any]:
+        """Return f cos(theta) for light from `wo`, world, and the density of `sampled`."""
+
+    def sampled(self, one: Any, two: Any) -> tuple[Any, Any, Any]:
+        """Draw directions from one of the lobes, weighted by the density of all.
+
+        Returns directions, world, f cos(theta) over density, and the density, which may be 0.
+        """
+
+
+class Meeting(NamedTuple):
+    """Where rays meet a surface.
+
+    Attributes:
+        p: position.
+        flat: normal of the surface without bumps, on the side of the ray.
+        color, normal: base colour and normal that a denoiser is told.
+        shines: whether it gives light, and reflects none.
+        radiance: of its light along the ray.
+        density: by solid angle, with which `Room.sample_light` takes this point.
+    """
+
+    p: Any
+    flat: Any
+    lobes: Lobes
+    color: Any
+    normal: Any
+    shines: Any
+    radiance: Any
+    density: Any
+
+
+class Room(Protocol):
+    """What paths meet; a room for each lane, or one for all."""
+
+    @property
+    def max_depth(self) -> int:
+        """Most segments of a path."""
+
+    @property
+    def roulette_depth(self) -> int:
+        """Segments after which a path may end at random."""
+
+    def meet(self, o: Any, d: Any, active: Any) -> tuple[Any, Meeting]:
+        """Return whether rays along unit vectors meet a surface, and where."""
+
+    def beyond(self, o: Any, d: Any, direct: Any) -> tuple[Any, Any]:
+        """Return radiance of rays that meet nothing, and the density of `sample_light` for them.
+
+        `direct` says which of them come from the camera.
+        """
+
+    def sample_light(self, lobes: Lobes, p: Any, which: Any, place: Any) -> tuple[Any, ...]:
+        """Draw directions to lights from points `p`.
+
+        Args:
+            which, place: random numbers, one and two.
+
+        Returns directions, distances, radiance over density, and density, which is infinite where
+        no surface samples the light.
+        """
+
+    def blocked(self, p: Any, d: Any, distance: Any, active: Any) -> Any:
+        """Return whether a surface is nearer than `distance`."""
 
 
 class Camera(NamedTuple):
@@ -56,19 +119,21 @@ class Samples(NamedTuple):
 
 @dr.syntax
 def trace_paths(
-    surfaces: Surfaces, lights: Lights, camera: Camera, x: Any, y: Any, places: Any, first: Any,
-    last: Any, seed: Any, ceiling: Any,
+    room: Room, camera: Camera, x: Any, y: Any, places: Any, first: Any, last: Any, rng: Any,
+    ceiling: Any, even: Any = None,
 ) -> Samples:  # fmt: skip
     """Trace the samples from `first` to before `last` of each lane.
 
     Args:
         x, y: left and upper edge of each lane's pixel.
         places: of samples within a pixel, two after each other.
-        seed: of the random numbers.
+        rng: random numbers of the lanes.
         ceiling: greatest radiance of indirect light that a sample may find at once; few brighter
             ones would make specks.
+        even: four random numbers of each pixel, the same for all its lanes, from which those of its
+            samples' first surfaces are spread evenly; None for numbers that know nothing of each
+            other.
     """
-    rng = mi.PCG32(1, seed, dr.arange(mi.UInt64, dr.width(x)))
     k = mi.UInt32(first)
     place = dr.gather(mi.Point2f, places, k, k < last)
     d = camera.ray(x + place.x, y + place.y)
@@ -77,44 +142,37 @@ def trace_paths(
     radiance, albedo = mi.Color3f(0), mi.Color3f(0)
     normal, hits = mi.Vector3f(0), mi.Float(0)
     active = k < last
-    while active:
-        found, hit = meet(surfaces, o, d, active)
-        lobes = lobes_at(surfaces, hit, d)
+    while dr.hint(active, exclude=[room, camera]):
+        found, hit = room.meet(o, d, active)
         direct = depth == 0
-        radiance_met = dr.select(hit.front, mi.Color3f(*hit.row[12:15]), 0)
-        shines, cosine = found & (hit.row[12] > 0), dr.abs(dr.dot(hit.flat, d))
-        other = dr.select(
-            found,
-            lamp_density(lights, hit.by_area, dr.norm(hit.p - o), cosine),
-            outside_density(lights, o, d),
-        )
-        met = dr.select(found, radiance_met, outside_radiance(lights, d))
+        outside, other = room.beyond(o, d, direct)
+        met = dr.select(found, hit.radiance, outside)
+        other = dr.select(found, hit.density, other)
         met *= beta * dr.select(direct, 1, _weight(density, other))
         radiance += dr.select(direct, met, dr.minimum(met, ceiling))
         shown = direct & found
-        albedo += dr.select(direct, dr.select(found, lobes.color, 1), 0)
-        normal += dr.select(shown, mi.Vector3f(lobes.frame.n), 0)
+        albedo += dr.select(direct, dr.select(found, hit.color, 1), 0)
+        normal += dr.select(shown, hit.normal, 0)
         hits += dr.select(shown, 1, 0)
 
-        goes_on = found & ~shines & (depth + 1 < MAX_DEPTH)
+        goes_on = found & ~hit.shines & (depth + 1 < room.max_depth)
         start = mi.Point3f(hit.p + OFF * hit.flat)
-        which, a, b = rng.next_float32(), rng.next_float32(), rng.next_float32()
-        wo, distance, light, other = sample_light(lights, start, which, mi.Point2f(a, b))
-        value, own = reflected(lobes, wo)
+        numbers = _numbers(rng, even, k, direct)
+        wo, distance, light, other = room.sample_light(
+            hit.lobes, start, numbers[0], mi.Point2f(*numbers[1:3])
+        )
+        value, own = hit.lobes.reflected(wo)
         light *= beta * value * dr.select(dr.isfinite(other), _weight(other, own), 1)
         asked = goes_on & (dr.max(light) > 0)
-        blocked = surfaces.scene.ray_test(
-            mi.Ray3f(start, wo, distance * (1 - 1e-3), 0, []), False, asked
-        )
+        blocked = room.blocked(start, wo, distance * (1 - 1e-3), asked)
         light = dr.select(direct, light, dr.minimum(light, ceiling))
         radiance += dr.select(asked & ~blocked, light, 0)
 
-        which, a, b = rng.next_float32(), rng.next_float32(), rng.next_float32()
-        wo, value, density = sampled(lobes, which, mi.Point2f(a, b))
+        wo, value, density = hit.lobes.sampled(numbers[3], mi.Point2f(*numbers[4:]))
         beta *= value
         depth += 1
         survives = dr.minimum(dr.max(beta), 0.95)
-        late = depth >= ROULETTE_DEPTH
+        late = depth >= room.roulette_depth
         goes_on &= (dr.max(beta) > 0) & (~late | (rng.next_float32() < survives))
         beta *= dr.select(late, dr.rcp(dr.maximum(survives, 1e-6)), 1)
 
@@ -126,6 +184,16 @@ def trace_paths(
         beta = dr.select(goes_on, beta, 1)
         depth = dr.select(goes_on, depth, 0)
     return Samples(radiance, albedo, normal, hits)
+
+
+def _numbers(rng: Any, even: Any, k: Any, direct: Any) -> list[Any]:
+    """Return random numbers of surfaces: of a light, two of a place on it, of a lobe, two of it."""
+    numbers = [rng.next_float32() for _ in range(6)]
+    if even is not None:
+        spread = even + mi.Float(k) * mi.Vector4f(*STEPS)
+        for i, value in zip((0, 3, 4, 5), spread - dr.floor(spread), strict=True):
+            numbers[i] = dr.select(direct, value, numbers[i])
+    return numbers
 
 
 def _weight(own: Any, other: Any) -> Any:

@@ -13,8 +13,9 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.rendering.meshes.unit_scene import triangle_mesh
 from scenegen.rendering.pictures.matter import Matter
-from scenegen.rendering.tables import gather_row, padded, unit, upload, upload_table
+from scenegen.rendering.tables import gather_row, unit, upload, upload_table
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -74,12 +75,7 @@ def surfaces_of(matter: Matter, by_area: Array) -> Surfaces:
         first, second = faces[:, 20 + axis, None], faces[:, 22 + axis, None]
         faces[:, 24 + 3 * axis : 27 + 3 * axis] = first * duals[0] + second * duals[1]
     faces[:, 30], faces[:, 31] = tables.of_face, by_area
-    mesh = mi.Mesh("room", 3 * len(corners), len(corners))
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = padded(corners)
-    parameters["faces"] = padded(np.arange(3 * len(corners)), np.uint32)
-    parameters.update()
-    scene = mi.load_dict({"type": "scene", "room": mesh})
+    scene = mi.load_dict({"type": "scene", "room": triangle_mesh("room", corners)})
     texels, slopes = (upload(x, np.uint32) for x in (tables.texels, tables.slopes))
     return Surfaces(scene, upload_table(faces), upload_table(tables.rows), texels, slopes)
 
@@ -130,7 +126,7 @@ def _texel(values: Any, uv: Any, first: Any, width: Any, height: Any, metres: An
 
 
 class Lobes(NamedTuple):
-    """What a surface does with light: its frame, and the parameters of its lobes."""
+    """What a surface does with light (`paths.Lobes`): its frame, and parameters of its lobes."""
 
     frame: Any
     flat: Any
@@ -140,6 +136,23 @@ class Lobes(NamedTuple):
     mirrored: Any
     diffuse: Any
     share: Any
+
+    def reflected(self, wo: Any) -> tuple[Any, Any]:
+        """Return f cos(theta) for light from `wo`, world, and the density of `sampled`."""
+        value, density = _value(self, self.frame.to_local(wo))
+        shown = dr.dot(self.flat, wo) > 0
+        return dr.select(shown, value, 0), dr.select(shown, density, 0)
+
+    def sampled(self, one: Any, two: Any) -> tuple[Any, Any, Any]:
+        """Draw directions from one of the lobes, weighted by the density of both."""
+        facet, _ = self.facets.sample(self.wi, two)
+        mirrored = 2 * dr.dot(self.wi, facet) * mi.Vector3f(facet) - self.wi
+        matte = mi.warp.square_to_cosine_hemisphere(two)
+        out = dr.select(one < self.share, mirrored, matte)
+        value, density = _value(self, out)
+        wo = unit(self.frame.to_world(out))
+        shown = (density > 0) & (dr.dot(self.flat, wo) > 0)
+        return wo, dr.select(shown, value / density, 0), dr.select(shown, density, 0)
 
 
 def lobes_at(surfaces: Surfaces, hit: Hit, d: Any) -> Lobes:
@@ -166,29 +179,6 @@ def lobes_at(surfaces: Surfaces, hit: Hit, d: Any) -> Lobes:
         dr.lerp(mi.Color3f(0.08 * specular), color, metallic), color * (1 - metallic),
         dr.lerp(dr.select(specular > 0, 0.2, 0.0), 0.95, metallic),
     )  # fmt: skip
-
-
-def reflected(lobes: Lobes, wo: Any) -> tuple[Any, Any]:
-    """Return f cos(theta) for light from `wo`, world, and the density of `sampled`."""
-    out = lobes.frame.to_local(wo)
-    value, density = _value(lobes, out)
-    shown = dr.dot(lobes.flat, wo) > 0
-    return dr.select(shown, value, 0), dr.select(shown, density, 0)
-
-
-def sampled(lobes: Lobes, one: Any, two: Any) -> tuple[Any, Any, Any]:
-    """Draw directions from one of the lobes, weighted by the density of both.
-
-    Returns directions, world, f cos(theta) over density, and the density, which may be 0.
-    """
-    facet, _ = lobes.facets.sample(lobes.wi, two)
-    mirrored = 2 * dr.dot(lobes.wi, facet) * mi.Vector3f(facet) - lobes.wi
-    matte = mi.warp.square_to_cosine_hemisphere(two)
-    out = dr.select(one < lobes.share, mirrored, matte)
-    value, density = _value(lobes, out)
-    wo = unit(lobes.frame.to_world(out))
-    shown = (density > 0) & (dr.dot(lobes.flat, wo) > 0)
-    return wo, dr.select(shown, value / density, 0), dr.select(shown, density, 0)
 
 
 def _value(lobes: Lobes, wo: Any) -> tuple[Any, Any]:

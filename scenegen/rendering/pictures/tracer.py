@@ -1,7 +1,7 @@
-"""Path-traced pictures of closed rooms.
+"""Path-traced pictures: of closed rooms one at a time, of the paper's rooms many at once.
 
-Images are traced one at a time, with samples at `pixel_samples.sample_positions`, and a pixel's
-samples are added in a fixed order, so that the same command gives the same bytes.
+Samples are at `pixel_samples.sample_positions`, and a pixel's samples are added in a fixed order,
+so that the same command gives the same bytes.
 """
 
 from collections.abc import Sequence
@@ -16,19 +16,24 @@ from scenegen.camera import pixel_size
 from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import from_json
 from scenegen.description.interiors import Interior
-from scenegen.description.specs import InteriorSpec
+from scenegen.description.specs import InteriorSpec, Request
+from scenegen.objects.catalogue import mesh_to_cast
 from scenegen.objects.furniture.room_shell import REVEAL
+from scenegen.rendering.drjit_renderer import padded_rays, upload_scenes
+from scenegen.rendering.ground_truth import encode_image
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pictures.assets import environment_of, materials_of
+from scenegen.rendering.pictures.closed_rooms import ClosedRoom
 from scenegen.rendering.pictures.denoiser import denoised
 from scenegen.rendering.pictures.development import develop
-from scenegen.rendering.pictures.lights import Lights, Window, lights_of
+from scenegen.rendering.pictures.lights import Window, lights_of
 from scenegen.rendering.pictures.matter import gather_matter
-from scenegen.rendering.pictures.paths import Camera, trace_paths
+from scenegen.rendering.pictures.paper_rooms import PaperRooms, with_intensities
+from scenegen.rendering.pictures.paths import Camera, Room, Samples, trace_paths
 from scenegen.rendering.pictures.sky import SUNLESS, Outside, outside, sun_height
 from scenegen.rendering.pictures.surfaces import Surfaces, lobes_at, meet, surfaces_of
 from scenegen.rendering.pixel_samples import sample_positions
-from scenegen.rendering.tables import upload
+from scenegen.rendering.tables import gather_row, upload
 
 Array = NDArray[Any]
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -38,19 +43,47 @@ BRIGHTEST = 60.0  # radiance that indirect light may add at once, in units of th
 LANES = 2  # of a pixel, at most
 
 
+def trace_images(batch: SceneBatch, variant: str) -> Array:
+    """Return images of the paper's rooms, (B, H, W, 3), in the spec's image type, at once."""
+    mi.set_variant(variant)
+    spec, count = batch.spec, len(batch)
+    models = [mesh_to_cast(batch.shape_of, x) for x in batch.names if spec.source != "shapes"]
+    scenes, cameras = upload_scenes(with_intensities(batch), variant, models, bounced=True)
+    pixels, lanes = padded_rays(spec), lanes_of(spec)
+    index = dr.arange(mi.UInt32, count * pixels * lanes)
+    item, pixel = index // (pixels * lanes), index // lanes % pixels
+    row = gather_row(cameras, item, 13)
+    right, up, back, origin = (mi.Vector3f(*row[i:12:4]) for i in range(4))
+    width, height = (dr.opaque(mi.Float, n) for n in (spec.width, spec.height))
+    camera = Camera(right, up, back, origin, row[12], width, height)
+    seeds = np.array([path_seed(batch, b) for b in range(count)], np.uint64)
+    halves = upload(seeds.astype("<u8").view("<u4"), np.uint32)
+    low, high = (mi.UInt64(dr.gather(mi.UInt32, halves, 2 * item + i)) for i in range(2))
+    seed = low | high << 32
+    ahead = mi.PCG32(1, seed, mi.UInt64(pixel + pixels * lanes))  # a stream that no lane has
+    even = mi.Vector4f(*(ahead.next_float32() for _ in range(4)))
+    rng = mi.PCG32(1, seed, mi.UInt64(index % (pixels * lanes)))
+    sums = _sums(spec, PaperRooms(scenes, item), camera, pixel, index % lanes, rng, np.inf, even)
+    dr.eval(sums.radiance)
+    values = np.stack([np.asarray(plane) for plane in sums.radiance], -1)
+    values = values.reshape(count, pixels, lanes, 3)[:, : spec.height * spec.width]
+    images = values.sum(axis=2, dtype=np.float64) / spec.spp
+    return encode_image(images.reshape(count, spec.height, spec.width, 3), spec.image_dtype)
+
+
 def trace_pictures(batch: SceneBatch, names: Sequence[str], variant: str) -> dict[str, Array]:
     """Return pictures, (B, H, W, 3), in the spec's image type, and what else `names` ask for."""
     mi.set_variant(variant)
     found: list[dict[str, Array]] = []
     for b in range(len(batch)):
         if b == 0 or batch.index[b] != batch.index[b - 1]:  # views of a room share it
-            room = _lit_room(batch, b)
-        found.append(_trace_one(batch, b, room, names))
+            room, mean = _lit_room(batch, b)
+        found.append(_trace_one(batch, b, room, mean, names))
     return {name: np.stack([one[name] for one in found]) for name in names}
 
 
-def _lit_room(batch: SceneBatch, b: int) -> tuple[Surfaces, Lights, float]:
-    """Return what an image's room holds, its lights, and the mean radiance of its walls."""
+def _lit_room(batch: SceneBatch, b: int) -> tuple[ClosedRoom, float]:
+    """Return what an image's room holds, with its lights, and the mean radiance of its walls."""
     spec = batch.spec
     assert isinstance(spec, InteriorSpec)
     assert batch.interior is not None
@@ -62,31 +95,21 @@ def _lit_room(batch: SceneBatch, b: int) -> tuple[Surfaces, Lights, float]:
     share = NIGHT_SHARE if night else DAY_SHARE
     radiance = matter.tables.rows[matter.tables.of_face, 12:15]
     lights = lights_of(beyond, windows_of(interior), matter.soup.corners, radiance, share)
-    surfaces = surfaces_of(matter, lights.by_area)
     x, y, z = interior.size
     # Of walls that reflect half of the light, the mean radiance in all directions.
-    return surfaces, lights, lights.flux / (2 * np.pi * (x * y + y * z + z * x))
+    mean = lights.flux / (2 * np.pi * (x * y + y * z + z * x))
+    return ClosedRoom(surfaces_of(matter, lights.by_area), lights), mean
 
 
 def _trace_one(
-    batch: SceneBatch, b: int, room: tuple[Surfaces, Lights, float], names: Sequence[str]
+    batch: SceneBatch, b: int, room: ClosedRoom, mean: float, names: Sequence[str]
 ) -> dict[str, Array]:
-    spec, (surfaces, lights, mean) = batch.spec, room
+    spec, lanes = batch.spec, lanes_of(batch.spec)
     assert isinstance(spec, InteriorSpec)
     camera = device_camera(batch, b)
-    seed = item_seed(spec.seed, int(batch.index[b]), Purpose.PATHS, int(batch.view[b]))
-    places = sample_positions(spec.spp)
-    lanes = max(n for n in range(1, LANES + 1) if spec.spp % n == 0)
     index = dr.arange(mi.UInt32, spec.height * spec.width * lanes)
-    lane, pixel = index % lanes, index // lanes
-    x, y = mi.Float(pixel % spec.width), mi.Float(pixel // spec.width)
-    at_once = spec.spp // lanes
-    first, last = lane * at_once, (lane + 1) * at_once
-    dr.eval(x, y, first, last)  # so that all pictures share a kernel
-    sums = trace_paths(
-        surfaces, lights, camera, x, y, upload(places), first, last,
-        dr.opaque(mi.UInt64, seed), dr.opaque(mi.Float, BRIGHTEST * mean),
-    )  # fmt: skip
+    rng = mi.PCG32(1, dr.opaque(mi.UInt64, path_seed(batch, b)), mi.UInt64(index))
+    sums = _sums(spec, room, camera, index // lanes, index % lanes, rng, BRIGHTEST * mean)
     planes = [*sums.radiance, *sums.albedo, *sums.normal, sums.hit]
     dr.eval(planes)  # at once: each would trace the paths again
     values = np.stack([np.asarray(plane) for plane in planes], -1)
@@ -102,8 +125,31 @@ def _trace_one(
     image, exposure = develop(radiance, albedo, hit[..., 0] > 0.5, spec.image_dtype, noise)
     found = {"image": image, "exposure": exposure}
     if "albedo" in names:
-        found["albedo"] = _albedo(spec, surfaces, camera)
+        found["albedo"] = _albedo(spec, room.surfaces, camera)
     return found
+
+
+def path_seed(batch: SceneBatch, b: int) -> int:
+    """Return the seed of an image's random numbers."""
+    return item_seed(batch.spec.seed, int(batch.index[b]), Purpose.PATHS, int(batch.view[b]))
+
+
+def lanes_of(spec: Request) -> int:
+    """Return how many lanes share the samples of a pixel."""
+    return max(n for n in range(1, LANES + 1) if spec.spp % n == 0)
+
+
+def _sums(
+    spec: Request, room: Room, camera: Camera, pixel: Any, lane: Any, rng: Any, ceiling: float,
+    even: Any = None,
+) -> Samples:  # fmt: skip
+    """Trace the samples of pixels, of which each lane takes its share."""
+    x, y = mi.Float(pixel % spec.width), mi.Float(pixel // spec.width)
+    at_once = spec.spp // lanes_of(spec)
+    first, last = lane * at_once, (lane + 1) * at_once
+    dr.eval(x, y, first, last)  # so that all pictures share a kernel
+    places, most = upload(sample_positions(spec.spp)), dr.opaque(mi.Float, ceiling)
+    return trace_paths(room, camera, x, y, places, first, last, rng, most, even)
 
 
 def device_camera(batch: SceneBatch, b: int) -> Camera:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.depth_match.answers import FILES, denials, least_denials, surface_points
+from baselines.depth_match.answers import denials, least_denials, surface_points
 from baselines.depth_match.network import METHOD, seen_depth, symmetric
-from baselines.depth_match.training import read_pictures
+from baselines.depth_match.training import BASELINE, read_pictures
 from baselines.training.checkpoint import load_weights
 from baselines.training.questions import question_images
 from iqtt import QuestionsFile, SplitSpec, make_split, open_questions
@@ -41,9 +41,10 @@ def test_true_depth_answers_hard_questions(questions):
     assert right(true_depth(questions), questions) >= 7
 
 
+@pytest.mark.slow
 def test_the_bundled_network_answers_half_of_them(questions):
     """docs/results.md has 0.67 and 0.60 of 500; chance is 1/3."""
-    network, _ = load_weights(FILES / "depth-match.safetensors", METHOD)
+    network, _ = load_weights(BASELINE.files / "depth-match.safetensors", METHOD)
     with torch.inference_mode():
         images = (torch.from_numpy(question_images(questions, row, SIZE)) for row in range(8))
         depth = torch.stack([seen_depth(network, image) for image in images])

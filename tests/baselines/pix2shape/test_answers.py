@@ -1,5 +1,6 @@
 """Answers to questions: the nearest scene's, from images alone, and of no training questions."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +11,9 @@ import torch
 from pix2shape_models import made, of_questions, released
 
 from baselines.pix2shape import predict as module
-from baselines.pix2shape.predict import answer_file
+from baselines.pix2shape.predict import answers_of
 from baselines.training.images import channels_first
+from baselines.training.submission import answer_questions
 from iqtt.files.reader import open_questions
 from metrics.scoring.evaluate import score
 from metrics.submissions.reader import open_predictions
@@ -32,7 +34,9 @@ def few_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def answered(answerer: Any, path: Path, out: Path, **how: Any) -> tuple[list[int], np.ndarray]:
     """Return answers and scores; where only one of them is written, from `metrics`."""
-    answer_file(answerer, path, out, overwrite=True, **how)
+    answers = partial(answers_of, answerer, 0, "")
+    size = answerer.config.networks.size
+    answer_questions(path, out, "pix2shape", size, answers, overwrite=True, **how)
     with open_predictions(out) as found, h5py.File(out) as file:
         assert found.rows.tolist() == list(range(len(found)))
         return found.answers.tolist(), file["scores"][()]

@@ -18,7 +18,6 @@ from pix2shape_models import edited
 import cli
 from baselines.pix2shape.commands import PACKAGES
 
-COMMANDS = ("train", "predict", "sample", "interpolate", "rotate")
 ROOMS, LARGE = "--data rooms.h5", "--data large.h5 --out run --workers 0"
 WITH = "--weights rooms.safetensors"
 
@@ -145,14 +144,11 @@ def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
 
 
 MISTAKES = [
-    ("predict", ("--data",)),
     (f"predict {WITH} --data nothing.h5", ("nothing.h5",)),
-    (f"predict {WITH} --data .", (".: is a folder",)),
     (f"predict {ROOMS} --weights rooms.h5", ("'rooms.h5'", ".safetensors")),
     (f"predict {ROOMS} --weights text.safetensors", ("text.safetensors",)),
     (f"predict {WITH} {ROOMS} --out rooms.h5 --overwrite", ("rooms.h5", "not an input")),
     (f"predict {WITH} --data damaged.h5", ("damaged.h5", "image, row 5")),
-    (f"train {ROOMS} --out run --devices {2**200}", ("--devices", "1<=x<=1024")),
     (f"train {LARGE} --device cpu --devices 3", ("--devices", "32 images")),
     (f"sample {WITH} --class mug", ("class", "'mug'")),
     ("sample --weights classes.safetensors --class sofa", ("'sofa'", "mug, bowl")),
@@ -180,7 +176,6 @@ MISTAKES = [
     (f"train {LARGE} --set networks.camera=false", ("camera",)),
     (f"train {LARGE} --resume", ("run: ", "checkpoint")),
     (f"train {LARGE} --resume --seed 3", ("--resume",)),
-    (f"train {LARGE} --out iqtt-val.h5", ("iqtt-val.h5: File exists",)),
 ]
 BASELINE_MISTAKES = [
     (f"oracle {ROOMS} {WITH}", ("--weights", "oracle")),
@@ -219,11 +214,12 @@ def test_no_gpu_is_one_line(line, folder, check_refusal):
 
 
 LINES = [
-    ("pix2shape", f"{name} --data x.h5 --out y".split()) for name in COMMANDS if name != "sample"
+    ("pix2shape", ["train", "--data", "x.h5", "--out", "y"]),
+    ("pix2shape", ["sample"]),
+    ("bench", ["baseline", "pix2shape", "--data", "x.h5"]),
+    ("bench", ["train", "cnn", "--data", "x.h5", "--out", "y"]),
+    ("bench", ["baseline", "siamese", "--data", "x.h5"]),
 ]
-LINES += [("pix2shape", ["sample"]), ("bench", ["baseline", "pix2shape", "--data", "x.h5"])]
-LINES += [("bench", ["train", "cnn", "--data", "x.h5", "--out", "y"])]
-LINES += [("bench", ["baseline", "siamese", "--data", "x.h5"])]
 
 
 @pytest.mark.parametrize("gone", [PACKAGES, ("safetensors",)], ids=len)

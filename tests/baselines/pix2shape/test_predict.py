@@ -1,5 +1,6 @@
 """Submissions of a model: from input images alone, nothing of the truth, and no half a file."""
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ from torch.utils.data import default_collate
 
 from baselines.pix2shape import predict
 from baselines.pix2shape.network.empty_rooms import empty_rooms
-from baselines.pix2shape.predict import enlarged, predict_file, predict_rooms
+from baselines.pix2shape.predict import enlarged, predict_file, views_of
+from baselines.training.submission import predict_rooms
 from metrics.submissions.reader import open_predictions
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import SpecError
@@ -39,11 +41,15 @@ def decoded(model: Any, path: Path, source: int, row: int) -> tuple[np.ndarray, 
     return depth[0].numpy(), normal[0].permute(1, 2, 0).numpy()
 
 
+def written_by(model: Any, path: Path, out: Path) -> None:
+    predict_rooms(path, out, partial(views_of, model, False, ""), overwrite=True)
+
+
 def test_a_model_of_rays_is_another_method_and_says_what_it_is_told(several_path, tmp_path):
     model = made(tiny(64, rays=True))
     with torch.no_grad():
         model.decoder.last.bias.fill_(0.1)  # something stands out
-    predict_rooms(model, several_path, tmp_path / "p.h5")
+    written_by(model, several_path, tmp_path / "p.h5")
     with open_predictions(tmp_path / "p.h5") as predictions:
         assert predictions.method == "pix2shape-rays"
     with h5py.File(tmp_path / "p.h5") as file, RoomsFile(several_path) as rooms:
@@ -56,7 +62,7 @@ def test_a_model_of_rays_is_another_method_and_says_what_it_is_told(several_path
 
 
 def test_a_model_of_depth_maps_is_another_method_and_says_so(rooms_path, tmp_path):
-    predict_rooms(made(tiny(depth=1.0)), rooms_path, tmp_path / "p.h5")
+    written_by(made(tiny(depth=1.0)), rooms_path, tmp_path / "p.h5")
     written(tmp_path / "w.safetensors", tiny(), earlier_depth=True)
     predict_file(tmp_path / "w.safetensors", rooms_path, tmp_path / "earlier.h5", device="cpu")
     for name in ("p.h5", "earlier.h5"):
@@ -66,7 +72,7 @@ def test_a_model_of_depth_maps_is_another_method_and_says_so(rooms_path, tmp_pat
 
 
 def predicted(model: Any, path: Path, out: Path) -> Fields:
-    predict_rooms(model, path, out, overwrite=True)
+    written_by(model, path, out)
     with h5py.File(out) as file:
         return {name: file[name][()] for name in ("row", "depth", "normal")}
 
@@ -138,7 +144,7 @@ def test_answers_say_what_training_was_told(truths, tmp_path):
 def test_a_path_that_cannot_be_written_is_refused_at_once(rooms_path, tmp_path, monkeypatch):
     weights, out = written(tmp_path / "w.safetensors", tiny()), tmp_path / "p"
     out.write_text("mine")
-    monkeypatch.setattr(predict, "predict_rooms", lambda *_, **__: pytest.fail("found too late"))
+    monkeypatch.setattr(predict, "views_of", lambda *_, **__: pytest.fail("found too late"))
     for path, kind in ((out, FileExistsError), (tmp_path / "none" / "p.h5", FileNotFoundError)):
         with pytest.raises(kind):
             predict_file(weights, rooms_path, path)

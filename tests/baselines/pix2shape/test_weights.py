@@ -9,7 +9,7 @@ import torch
 from refusals import refused
 
 from baselines.pix2shape.network.empty_rooms import Cameras
-from baselines.pix2shape.predict import answer_file, predict_rooms
+from baselines.pix2shape.predict import predict_file
 from baselines.pix2shape.weights import FOLDER, names, open_weights, suited
 from baselines.training.checkpoint import load_tensors, save_tensors
 from iqtt.files.make import make_split
@@ -61,7 +61,7 @@ def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
     make_dataset(data, preset_spec(preset, seed=77, views=(0.0, 55.0)), 4)
     assert suited(data, model.config.method) == name
     assert suited(data) == f"{preset}-rays"
-    predict_rooms(model, data, out)
+    predict_file(name, data, out, device="cpu")
     with RoomsFile(data) as rooms, open_predictions(out) as predictions:
         truth = rooms.read("depth", slice(None))
         depth = np.stack([predictions.depth(row) for row in range(len(rooms))])
@@ -94,7 +94,7 @@ def test_samples_of_a_class_have_its_proportions(tmp_path: Path) -> None:
     assert width_to_height["bowl"] > 1.3 * width_to_height["bottle"]
     make_dataset(tmp_path / "rooms.h5", preset_spec("shapenet-single", seed=77), 1)
     with pytest.raises(SpecError):
-        predict_rooms(model, tmp_path / "rooms.h5", tmp_path / "predictions.h5")
+        predict_file(CLASSES, tmp_path / "rooms.h5", tmp_path / "predictions.h5")
 
 
 def test_they_answer_questions(tmp_path: Path) -> None:
@@ -107,7 +107,7 @@ def test_they_answer_questions(tmp_path: Path) -> None:
         suited(data, "pix2shape-rays")
     with refused(SpecError, hint="pix2shape-views are bundled"):
         suited(data, "pix2shape-compact")
-    answer_file(open_weights("iqtt")[0], data, out)
+    predict_file("iqtt", data, out, device="cpu")
     with h5py.File(tmp_path / "split" / "iqtt-test-answers.h5") as truth, h5py.File(out) as file:
         right = file["scores"][:].argmax(axis=1) == truth["answers"][:]
     assert right.mean() > 1 / 3 + 3 * np.sqrt(2 / 9 / 96), right.mean()

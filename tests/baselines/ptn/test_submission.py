@@ -7,9 +7,11 @@ from ptn_models import TINY, tiny, volume_of, voxel_centres
 
 from baselines.ptn.network import Settings
 from baselines.ptn.rooms import RoomImages
-from baselines.ptn.submission import FILES, seen, write_submission
-from baselines.ptn.training import train
+from baselines.ptn.submission import seen
+from baselines.ptn.training import BASELINE
+from baselines.training.baseline import train
 from baselines.training.data import TrainingFiles
+from baselines.training.submission import write_submission
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.measures.relief import empty_room
@@ -54,12 +56,16 @@ def questions(tmp_path_factory):
 
 def test_answers_follow_labels_and_names(questions, tmp_path):
     train_file, test_file = (questions / f"iqtt-{name}.h5" for name in ("train", "test"))
-    weights = train(TrainingFiles(train_file), tmp_path / "none", Settings(**TINY, iterations=2))
-    told = train(TrainingFiles(train_file), tmp_path / "told", networks=str(weights), labels=4)
-    untold = train(TrainingFiles(train_file), tmp_path / "untold", networks=str(told))
+    weights = train(
+        BASELINE, TrainingFiles(train_file), tmp_path / "none", Settings(**TINY, iterations=2)
+    )
+    told = train(
+        BASELINE, TrainingFiles(train_file), tmp_path / "told", networks=str(weights), labels=4
+    )
+    untold = train(BASELINE, TrainingFiles(train_file), tmp_path / "untold", networks=str(told))
     scores = {}
     for name, path in (("volumes", weights), ("told", told), ("untold", untold)):
-        write_submission(test_file, tmp_path / f"{name}.h5", path)
+        write_submission(BASELINE, test_file, tmp_path / f"{name}.h5", path)
         with h5py.File(tmp_path / f"{name}.h5") as file:
             scores[name] = file["scores"][:]
     assert not np.allclose(scores["volumes"], scores["told"])
@@ -69,7 +75,7 @@ def test_answers_follow_labels_and_names(questions, tmp_path):
 def test_bundled_weights_see_objects_in_rooms_they_were_not_trained_on(make_rooms, tmp_path):
     size = {"height": 64, "width": 64, "min_visible_pixels": 12, "object_radius": (0.08, 0.165)}
     path = make_rooms(tmp_path / "rooms.h5", 8, **size, views=(0.0, 35.0, 80.0), seed=12345)
-    write_submission(path, tmp_path / "out.h5")
+    write_submission(BASELINE, path, tmp_path / "out.h5")
     found = score([tmp_path / "out.h5"]).metrics
     assert found["relief_iou"].value > 0.3  # the empty room has 0, a ramp of the mean objects 0.12
-    assert (FILES / "ptn-rooms.safetensors").stat().st_size < 15e6
+    assert (BASELINE.files / "ptn-rooms.safetensors").stat().st_size < 15e6

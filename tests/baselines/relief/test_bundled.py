@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from baselines.relief import depth_completed, depth_supervised, view_pairs
+from baselines.training.submission import write_submission
 from metrics.measures.relief import empty_room
 from metrics.scoring.evaluate import score
 from scenegen.rooms.reader import RoomsFile
@@ -36,22 +37,22 @@ def relief_iou(rooms_path: Path, submission: Path) -> np.ndarray:
 
 
 def test_objects_are_seen_from_one_image(unseen_path, tmp_path):
-    view_pairs.write_submission(unseen_path, tmp_path / "pairs.h5")
+    write_submission(view_pairs.BASELINE, unseen_path, tmp_path / "pairs.h5")
     assert relief_iou(unseen_path, tmp_path / "pairs.h5").mean() > 0.6
-    depth_supervised.write_submission(unseen_path, tmp_path / "true.h5")
+    write_submission(depth_supervised.BASELINE, unseen_path, tmp_path / "true.h5")
     assert relief_iou(unseen_path, tmp_path / "true.h5").mean() > 0.8
 
 
 def test_shape_is_known_better_than_by_flat_cut_outs(unseen_path, tmp_path):
     """docs/results.md has 0.64 and 0.48 of 300 scenes; cut-outs have 0."""
     for module, least in ((depth_supervised, 0.5), (depth_completed, 0.3)):
-        out = tmp_path / f"{module.METHOD.name}.h5"
-        module.write_submission(unseen_path, out)
+        out = tmp_path / f"{module.BASELINE.method.name}.h5"
+        write_submission(module.BASELINE, unseen_path, out)
         assert score([out]).skills["shape_error"].value > least
 
 
 def test_what_the_first_view_shows_is_completed_from_80_degrees_away(unseen_path, tmp_path):
-    depth_completed.write_submission(unseen_path, tmp_path / "completed.h5")
+    write_submission(depth_completed.BASELINE, unseen_path, tmp_path / "completed.h5")
     found = relief_iou(unseen_path, tmp_path / "completed.h5").reshape(-1, 2)  # scenes, views
     assert found[:, 1].mean() > 0.6
     assert score([tmp_path / "completed.h5"]).skills["behind_depth_error"].value > 0.25

@@ -14,13 +14,15 @@ from baselines.relief import depth_supervised, view_pairs
 from baselines.relief.depth_completed import Completion
 from baselines.relief.network import Card, Settings, predicted_depth, relief_network
 from baselines.relief.training import cameras_of
+from baselines.training.baseline import train
 from baselines.training.data import TrainingFiles
 from baselines.training.rooms import camera_poses
+from baselines.training.submission import write_submission
 from metrics.measures.relief import empty_room
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
 
-SMALL = Settings(32, 0.1, iterations=2, batch=2)
+SMALL = Settings(size=32, width=0.1, iterations=2, batch=2)
 
 
 @pytest.fixture(scope="module")
@@ -71,16 +73,18 @@ def test_one_network_learns_both_kinds_of_rooms_and_predicts_both(
     interior_path, turned_path, tmp_path
 ):
     with TrainingFiles(interior_path, turned_path) as data:
-        weights = depth_supervised.train(data, tmp_path, SMALL)
+        weights = train(depth_supervised.BASELINE, data, tmp_path, SMALL)
     for path in (interior_path, turned_path):
-        depth_supervised.write_submission(path, tmp_path / "x.h5", weights, overwrite=True)
+        write_submission(
+            depth_supervised.BASELINE, path, tmp_path / "x.h5", weights, overwrite=True
+        )
         with h5py.File(tmp_path / "x.h5") as file:
             assert np.isfinite(file["depth"][()]).all()
 
 
 def test_methods_of_the_papers_room_refuse_closed_ones(cameras, interior_path, tmp_path):
     with TrainingFiles(interior_path) as data, refused(SpecError, "rooms", "metres"):
-        view_pairs.train(data, tmp_path, SMALL)
+        train(view_pairs.BASELINE, data, tmp_path, SMALL)
     with refused(SpecError, "rooms", "metres"):
         Completion(Card("x", SMALL))(torch.rand(1, 3, 32, 32), cameras, cameras)
     with RoomsFile(interior_path) as rooms, refused(SpecError, "x.h5", "metres"):

@@ -17,7 +17,7 @@ def cameras(*positions: tuple[float, float, float]) -> Cameras:
 
 
 def small(size: int) -> Settings:
-    return Settings(size, 0.1)
+    return Settings(size=size, width=0.1)
 
 
 OWN, OTHER = cameras((0.5, 0.5, 2.0), (0.4, 0.6, 2.2)), cameras((0.6, 0.5, 2.1), (0.3, 0.5, 2.0))

@@ -17,6 +17,7 @@ from baselines.relief import depth_supervised, training, view_pairs
 from baselines.relief.depth_completed import views_of_scenes
 from baselines.relief.network import Settings, predicted_depth
 from baselines.relief.training import SLOPE, learning_rate, shape_loss, windows
+from baselines.training.baseline import train
 from baselines.training.checkpoint import load_weights
 from baselines.training.data import TrainingFiles
 from scenegen.common.errors import FileFormatError, SpecError
@@ -34,11 +35,12 @@ def same(one, other):
     return all(torch.equal(found[name], expected[name]) for name in expected)
 
 
+@pytest.mark.slow
 def test_a_unet_learns_nine_images_by_heart(turned_path, tmp_path, monkeypatch):
     monkeypatch.setattr(training, "WARM_UP", 10)
     monkeypatch.setattr(training, "WHOLE", 0.5)
     settings = replace(SMALL, iterations=320, batch=9, learning_rate=0.01)
-    path = depth_supervised.train(TrainingFiles(turned_path), tmp_path, settings)
+    path = train(depth_supervised.BASELINE, TrainingFiles(turned_path), tmp_path, settings)
     network, card = load_weights(path, depth_supervised.METHOD)
     rooms = in_memory(turned_path, 32, depth=True)
     cameras = Cameras(rooms.world_from_camera, rooms.fov_y_degrees)
@@ -57,30 +59,32 @@ def test_pixels_without_a_surface_teach_nothing(turned_path, tmp_path):
         depth[:, :16] = np.nan
         file["depth"][...] = depth
 
-    def train(path, folder, settings):
+    def trained(path, folder, settings):
         with TrainingFiles(path) as data:
-            return depth_supervised.train(data, folder, settings)
+            return train(depth_supervised.BASELINE, data, folder, settings)
 
     holes = edited(turned_path, tmp_path / "holes.h5", blank)
-    found = train(holes, tmp_path / "holes", SMALL)
+    found = trained(holes, tmp_path / "holes", SMALL)
     assert all(torch.isfinite(value).all() for value in load_file(found).values())
-    assert not same(found, train(turned_path, tmp_path / "whole", SMALL))
+    assert not same(found, trained(turned_path, tmp_path / "whole", SMALL))
     empty = edited(turned_path, tmp_path / "empty.h5", values("depth", lambda d: d + np.nan))
     with refused(FileFormatError, "depth, row 0", "no surface"):
-        train(empty, tmp_path / "empty", SMALL)
+        trained(empty, tmp_path / "empty", SMALL)
     with refused(SpecError, "turned.h5", "images of 32x32"):
-        train(turned_path, tmp_path / "large", replace(SMALL, size=64))
+        trained(turned_path, tmp_path / "large", replace(SMALL, size=64))
 
 
 def test_view_pairs_reads_nothing_but_images_and_cameras(near_path, tmp_path):
     edits = [values(name, np.zeros_like) for name in UNSEEN]
     edits.append(values("scene", lambda old: np.full_like(old, b"{}")))
     blank = edited(near_path, tmp_path / "blank.h5", *edits)
-    expected = view_pairs.train(TrainingFiles(near_path), tmp_path / "one", SMALL)
+    expected = train(view_pairs.BASELINE, TrainingFiles(near_path), tmp_path / "one", SMALL)
     assert len(list((tmp_path / "one" / FOLDER).iterdir())) == 1
-    assert same(view_pairs.train(TrainingFiles(blank), tmp_path / "two", SMALL), expected)
+    assert same(train(view_pairs.BASELINE, TrainingFiles(blank), tmp_path / "two", SMALL), expected)
     other = edited(near_path, tmp_path / "other.h5", put("image", 1, np.float16(0.5)))
-    assert not same(view_pairs.train(TrainingFiles(other), tmp_path / "three", SMALL), expected)
+    assert not same(
+        train(view_pairs.BASELINE, TrainingFiles(other), tmp_path / "three", SMALL), expected
+    )
 
 
 def test_each_row_is_seen_from_the_cameras_of_its_own_scene(turned_path):

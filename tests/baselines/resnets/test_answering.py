@@ -10,28 +10,31 @@ import torch
 from pix2shape_models import edited
 
 from baselines.resnets import cnn, siamese
-from baselines.resnets.answering import FILES, accuracy
+from baselines.resnets.answering import accuracy
+from baselines.resnets.card import Settings
+from baselines.training.baseline import train
 from baselines.training.checkpoint import WEIGHTS, load_weights
 from baselines.training.data import TrainingFiles
 from baselines.training.questions import question_images
+from baselines.training.submission import write_submission
 from iqtt import open_questions
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.scoring.evaluate import score
 
-MODULES = {"cnn": cnn, "siamese": siamese}
+BASELINES = {"cnn": cnn.BASELINE, "siamese": siamese.BASELINE}
 SMALL = {"width": 4, "size": 16, "batch": 2}
-each = pytest.mark.parametrize("name", MODULES)
+each = pytest.mark.parametrize("name", BASELINES)
 
 
 @pytest.fixture(scope="module")
 def run_folders(train_questions: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Return the folder of a short run of each method, which no test changes."""
     folder = tmp_path_factory.mktemp("runs")
-    for name, module in MODULES.items():
-        settings = module.Settings(seed=1, iterations=3, **SMALL)
-        module.train(TrainingFiles(train_questions), folder / name, settings)
-    return {name: folder / name for name in MODULES}
+    settings = Settings(seed=1, iterations=3, **SMALL)
+    for name, baseline in BASELINES.items():
+        train(baseline, TrainingFiles(train_questions), folder / name, settings)
+    return {name: folder / name for name in BASELINES}
 
 
 def scores_of(network: Any, path: Path, row: int) -> Any:
@@ -44,10 +47,10 @@ def scores_of(network: Any, path: Path, row: int) -> Any:
 def test_a_submission_is_valid_and_holds_the_networks_scores(name, run_folders, truths, tmp_path):
     weights, out = run_folders[name] / WEIGHTS, tmp_path / "answers.h5"
     told = []
-    module = MODULES[name]
-    module.write_submission(truths.iqtt, out, weights, progress=lambda *done: told.append(done))
+    baseline = BASELINES[name]
+    write_submission(baseline, truths.iqtt, out, weights, progress=lambda *now: told.append(now))
     assert told == [(6, 6)]
-    network, card = load_weights(weights, module.KIND.method)
+    network, card = load_weights(weights, baseline.method)
     with h5py.File(out) as file:
         assert file.attrs["run"] == "3 labels, seed 1"
         for row, scores in enumerate(file["scores"][:]):
@@ -59,7 +62,7 @@ def test_a_submission_is_valid_and_holds_the_networks_scores(name, run_folders, 
 
 
 def test_no_answers_no_accuracy(run_folders, truths, tmp_path):
-    network, _ = load_weights(run_folders["cnn"] / WEIGHTS, cnn.KIND.method)
+    network, _ = load_weights(run_folders["cnn"] / WEIGHTS, cnn.BASELINE.method)
     val = Path(truths.iqtt).with_name("iqtt-val.h5")
     assert accuracy(network, truths.iqtt, 16, 3) is None
     assert accuracy(network, val, 16, 2) is None
@@ -73,13 +76,13 @@ def test_no_answers_no_accuracy(run_folders, truths, tmp_path):
 
 
 def test_bundled_weights_are_small_and_tell_answers_apart(tmp_path):
-    path = FILES / "siamese.safetensors"
+    path = siamese.BASELINE.files / "siamese.safetensors"
     assert path.stat().st_size < 2_000_000
-    card = load_weights(path, siamese.KIND.method)[1]
+    card = load_weights(path, siamese.BASELINE.method)[1]
     assert (card.labels, card.answers, card.settings.seed) == (1000, 3, 0)
     assert card.iteration == card.settings.iterations
     spec = SplitSpec(train=0, labeled=0, val=0, test=2, height=64, width=64, min_cube_pixels=0)
     make_split(tmp_path / "split", spec)
-    siamese.write_submission(tmp_path / "split/iqtt-test.h5", tmp_path / "a.h5")
+    write_submission(siamese.BASELINE, tmp_path / "split/iqtt-test.h5", tmp_path / "a.h5")
     with h5py.File(tmp_path / "a.h5") as file:
         assert len(np.unique(file["scores"][:])) == 6

@@ -5,7 +5,9 @@ import pytest
 import torch
 
 from baselines.resnets import cnn, siamese
+from baselines.resnets.card import Settings
 from baselines.resnets.training import permuted
+from baselines.training.baseline import train
 from baselines.training.checkpoint import load_weights
 from baselines.training.data import TrainingFiles
 from baselines.training.machine import Machine
@@ -30,14 +32,14 @@ def test_permuted_answers_stay_with_their_questions():
 @pytest.mark.parametrize("module", [cnn, siamese], ids=["cnn", "siamese"])
 def test_it_learns_the_questions_that_it_sees(module, train_questions, tmp_path):
     told = []
-    settings = module.Settings(size=16, width=8, batch=3, learning_rate=0.003, iterations=60)
+    settings = Settings(size=16, width=8, batch=3, learning_rate=0.003, iterations=60)
     how = {"progress": lambda *now: told.append(now)}
     with TrainingFiles(train_questions) as data:
-        path = module.train(data, tmp_path, settings, Machine("cpu"), **how)
+        path = train(module.BASELINE, data, tmp_path, settings, Machine("cpu"), **how)
     losses = [numbers["loss"] for *_, numbers in told[:-1]]
     assert np.mean(losses[-5:]) < 0.3 * np.mean(losses[:5])
     assert [done for done, *_ in told] == [*range(1, 61), 60]
     accuracy = told[-1][2]["accuracy on iqtt-val.h5"]
     assert 0 <= accuracy <= 1
-    card = load_weights(path, module.KIND.method)[1]
+    card = load_weights(path, module.BASELINE.method)[1]
     assert (card.validation, card.answers, card.labels) == (accuracy, 3, 3)

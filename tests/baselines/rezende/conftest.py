@@ -23,12 +23,19 @@ def split(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def one_box():
-    """Return eight equal pictures of one box, which scenegen rendered."""
+    """Return eight equal pictures of one box of the rasteriser, and its silhouette, (16, 16)."""
     from baselines.rezende.images import Pictures
-    from baselines.rezende.primitives import SIMPLE, render_primitives
+    from baselines.rezende.rasteriser import Views, rasterise
+    from baselines.rezende.sphere import icosphere
+    from baselines.training.rotations import rotation_grid
 
-    some = render_primitives("centred", 12, 16, seed=2)
-    full = np.isfinite(some.depth).sum(axis=(1, 2))
-    row = np.repeat(int(np.abs(full - np.median(full)).argmin()), 8)
-    assert SIMPLE[0] == "box"
-    return Pictures(some.image[row], some.radius, some.views_of(row), "box", some.depth[row])
+    lights = np.tile([[[1.0, 2.0, 3.0]]], (8, 1, 1)), np.full((8, 1, 3), 2.5)
+    views = Views(
+        16, 28.0, 4.2, np.full(3, 0.75), np.full(3, 0.25), np.zeros(3), (0.0, 1.0), *lights
+    )
+    corners, faces = icosphere()
+    box = 0.55 * corners / np.abs(corners).max(axis=1, keepdims=True)
+    turned = np.tile(box @ rotation_grid(512)[100].T, (8, 1, 1))
+    image, depth = rasterise(turned, faces, views)
+    pictures = Pictures(np.moveaxis(image, 3, 1).copy(), 0.5, views, "box")
+    return pictures, np.isfinite(depth[0])

@@ -8,6 +8,7 @@ from refusals import refused
 from baselines.pix2shape.network.empty_rooms import empty_rooms
 from baselines.relief import depth_supervised
 from baselines.relief.network import Settings
+from baselines.training.baseline import train
 from baselines.training.checkpoint import load_weights
 from baselines.training.data import TrainingFiles, only, requests
 from baselines.training.machine import Machine
@@ -59,8 +60,12 @@ def test_rows_of_files_that_differ_have_their_own_field_of_view(turned_path, mak
         files = data.rooms()
         together = read_rooms(files, 32)
         one, other = (read_rooms([file], 32) for file in files)
-        card = depth_supervised.train(
-            data, tmp_path / "run", Settings(32, 0.1, iterations=2, batch=13), Machine("cpu")
+        card = train(
+            depth_supervised.BASELINE,
+            data,
+            tmp_path / "run",
+            Settings(size=32, width=0.1, iterations=2, batch=13),
+            Machine("cpu"),
         )
     assert (one.fov_y_degrees, other.fov_y_degrees) == (28.0, 40.0)
     rows = torch.tensor([10, 2])

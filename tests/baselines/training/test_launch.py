@@ -90,12 +90,13 @@ def test_an_environment_that_torchrun_does_not_make_is_refused(here, world, monk
     assert error.value.where in ("LOCAL_WORLD_SIZE", "WORLD_SIZE")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "name"),
     [
+        *((kind, "2") for kind in CONFIGS),
         ("rooms", "2 then 1"),
-        *(pytest.param(kind, "2", marks=pytest.mark.slow) for kind in CONFIGS),
-        pytest.param("rooms", "1 then 2", marks=pytest.mark.slow),
+        ("rooms", "1 then 2"),
     ],
 )
 def test_several_processes_learn_what_one_learns(kind, name, folder):

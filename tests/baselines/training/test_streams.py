@@ -11,11 +11,12 @@ from refusals import refused
 from safetensors.torch import load_file
 
 import cli
-from baselines import depth_match
+from baselines.depth_match import training as depth_match
 from baselines.pix2shape.training.run import train_run
 from baselines.pix2shape.weights import METHOD
 from baselines.relief import depth_supervised, view_pairs
 from baselines.relief.network import Settings
+from baselines.training.baseline import train
 from baselines.training.checkpoint import load_weights
 from baselines.training.machine import Machine
 from baselines.training.streams import TrainingStreams
@@ -44,7 +45,7 @@ def test_blocks_are_rows_beyond_those_of_any_file():
 def test_networks_learn_from_streams_and_their_cards_tell_it(tmp_path):
     """A run that is resumed is shown what would have come."""
     both = TrainingStreams("shapes,albedo")
-    whole = depth_supervised.train(both, tmp_path / "whole", SMALL, HERE)
+    whole = train(depth_supervised.BASELINE, both, tmp_path / "whole", SMALL, HERE)
     card = load_weights(whole, depth_supervised.METHOD)[1]
     specs = [request_from_json(line) for line in card.data.splitlines()]
     assert [spec.random_reflectance for spec in specs] == [False, True]
@@ -57,19 +58,19 @@ def test_networks_learn_from_streams_and_their_cards_tell_it(tmp_path):
 
     every = replace(HERE, every=1)
     with pytest.raises(KeyboardInterrupt):
-        depth_supervised.train(both, tmp_path / "part", SMALL, every, progress=stop)
-    again = depth_supervised.train(both, tmp_path / "part", SMALL, HERE, resume=True)
+        train(depth_supervised.BASELINE, both, tmp_path / "part", SMALL, every, progress=stop)
+    again = train(depth_supervised.BASELINE, both, tmp_path / "part", SMALL, HERE, resume=True)
     found, expected = load_file(again), load_file(whole)
     assert all(torch.equal(found[name], expected[name]) for name in expected)
     with refused(SpecError, "shapes", "fingerprint"):
-        depth_supervised.train(SHAPES, tmp_path / "part", SMALL, HERE, resume=True)
+        train(depth_supervised.BASELINE, SHAPES, tmp_path / "part", SMALL, HERE, resume=True)
 
 
 @pytest.mark.slow
 def test_view_pairs_are_of_whole_scenes(tmp_path):
     settings = replace(SMALL, iterations=1, batch=10)
-    weights = view_pairs.train(SHAPES, tmp_path / "run", settings, HERE)
-    assert load_weights(weights, view_pairs.METHOD)[1].rows == 18
+    weights = train(view_pairs.BASELINE, SHAPES, tmp_path / "run", settings, HERE)
+    assert load_weights(weights, view_pairs.BASELINE.method)[1].rows == 18
     assert {path.name for path in (tmp_path / "run").iterdir()} == {
         "checkpoint.safetensors", "weights.safetensors"
     }  # fmt: skip
@@ -79,8 +80,8 @@ def test_view_pairs_are_of_whole_scenes(tmp_path):
 def test_depth_match_learns_from_a_stream(tmp_path):
     settings = depth_match.Settings(size=32, width=0.25, iterations=1, batch=6)
     streams = TrainingStreams("near")
-    weights = depth_match.train(streams, tmp_path / "run", settings, HERE)
-    assert load_weights(weights, depth_match.network.METHOD)[1].rows == 2
+    weights = train(depth_match.BASELINE, streams, tmp_path / "run", settings, HERE)
+    assert load_weights(weights, depth_match.METHOD)[1].rows == 2
 
 
 @pytest.mark.parametrize(

@@ -1,13 +1,11 @@
 """`iqtt card` and `iqtt export` as a user types them."""
 
-import json
-
 import pytest
 from click.testing import CliRunner
 
 import cli
 
-WHO = ("--creator", "A. Person", "--date", "2026-01-31")
+WHO = ("--creator", "A. Person")
 
 
 @pytest.fixture
@@ -19,24 +17,21 @@ def run(tmp_path, monkeypatch):
 
 def test_card(run, refuses, split_folder, tmp_path):
     told = run("card", split_folder, *WHO)
-    assert told.stdout == "split-card: README.md, croissant.json, index.parquet of 24 questions\n"
-    croissant = json.loads((tmp_path / "split-card" / "croissant.json").read_text())
-    assert (croissant["name"], croissant["datePublished"]) == ("split", "2026-01-31")
-    assert "iqtt-test-answers.h5" not in [file["name"] for file in croissant["distribution"]]
-    refuses("card", split_folder, *WHO, words=("split-card", "--overwrite"))
+    assert told.stdout == "README.md: 24 questions\n"
+    assert "iqtt-test-answers.h5" not in (tmp_path / "README.md").read_text()
+    refuses("card", split_folder, *WHO, words=("README.md", "--overwrite"))
     again = run("card", split_folder, *WHO, "--with-answers", "--title", "All", "--overwrite")
     assert again.exit_code == 0, again.output
-    croissant = json.loads((tmp_path / "split-card" / "croissant.json").read_text())
-    assert croissant["name"] == "all"
-    assert "iqtt-test-answers.h5" in [file["name"] for file in croissant["distribution"]]
+    page = (tmp_path / "README.md").read_text()
+    assert "# All" in page.splitlines()
+    assert "iqtt-test-answers.h5" in page
 
 
-def test_refused_cards(refuses, monkeypatch, split_folder, tmp_path):
-    monkeypatch.delenv("SOURCE_DATE_EPOCH", raising=False)
-    refuses("card", split_folder, "--creator", "A", words=("--date",))
+def test_refused_cards(refuses, split_folder, tmp_path):
     refuses("card", split_folder, *WHO, "--license", "my own", words=("--license",))
     refuses("card", tmp_path, *WHO, words=("no question files",))
-    refuses("card", split_folder, *WHO, "--out", split_folder, "--overwrite", words=("iqtt-",))
+    beside = split_folder / "iqtt-val.h5"
+    refuses("card", split_folder, *WHO, "--out", beside, "--overwrite", words=("iqtt-val.h5",))
 
 
 @pytest.mark.parametrize("form", ["parquet", "webdataset"])

@@ -15,7 +15,8 @@ from iqtt.files import work
 from iqtt.files.make import make_split, make_suite
 from iqtt.files.reader import QuestionsFile
 from iqtt.files.split import ALL_FILES, MANIFEST
-from iqtt.questions.specs import SUITE, SplitSpec, question_kind
+from iqtt.questions.kinds import question_kind
+from iqtt.questions.specs import SUITE, SplitSpec
 from iqtt.questions.views import Tally
 from iqtt.shapes.splits import TooFewShapesError
 from scenegen.common.errors import PlacementError, SpecError

@@ -15,7 +15,7 @@ from iqtt.files.reader import (
     parts,
 )
 from iqtt.files.verify import verify_split
-from iqtt.questions.specs import DISTRACTOR_KINDS
+from iqtt.questions.kinds import DISTRACTOR_KINDS
 from iqtt.shapes.polycube import canonical, set_ids
 from iqtt.sharing.published import open_split
 from scenegen.common.errors import FileFormatError, SpecError

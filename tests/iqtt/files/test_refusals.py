@@ -19,6 +19,7 @@ from iqtt.files.reader import (
     open_tables,
     parts,
 )
+from iqtt.questions.kinds import DISTRACTOR_KINDS
 from scenegen.common.errors import FileFormatError, SpecError
 
 
@@ -88,7 +89,7 @@ def test_what_is_no_question_file_is_refused_by_all(damaged, kind, check_refusal
 
 
 def test_files_of_format_1_0_are_read(damaged):
-    """They did not name `near-mirror`."""
+    """They did not name `near-mirror`. Whatever names the list began with can be read."""
 
     def older(file):
         file.attrs["format_version"] = "1.0"
@@ -100,8 +101,10 @@ def test_files_of_format_1_0_are_read(damaged):
         assert "near-mirror" not in {
             k for i in range(6) for k in questions[i].truth.distractor_kind
         }
-    newer = damaged(lambda file: (older(file), file.attrs.update(format_version="1.1")))
-    refused(newer, NAMES)
+    for names in ([], ["near", "other"], [*DISTRACTOR_KINDS, "later"], [["other"]]):
+        refused(damaged(named(names)), NAMES)
+    with open_questions(damaged(named(["other"]))) as questions, pytest.raises(FileFormatError):
+        [questions[i].truth for i in range(6)]
 
 
 # A value of row 4, and the range that the error names.

@@ -14,7 +14,8 @@ from iqtt.questions.distractors import (
     make_pools,
     question_key,
 )
-from iqtt.questions.specs import QUESTION_KINDS, SPLITS, SplitSpec
+from iqtt.questions.kinds import QUESTION_KINDS
+from iqtt.questions.specs import SPLITS, SplitSpec
 
 SPEC = SplitSpec(seed=11, cubes=(6, 8), max_radius=2.7)
 

@@ -10,15 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 
+from iqtt.questions.kinds import DISTRACTOR_KINDS, QUESTION_KINDS, question_kind
 from iqtt.questions.lights import LIGHT_DISTANCE
-from iqtt.questions.specs import (
-    DISTRACTOR_KINDS,
-    QUESTION_KINDS,
-    SPLITS,
-    SplitSpec,
-    preset_spec,
-    question_kind,
-)
+from iqtt.questions.specs import SPLITS, SplitSpec, preset_spec
 from scenegen.camera import intrinsics
 from scenegen.common.errors import SpecError
 
@@ -143,7 +137,7 @@ def test_settings_that_are_not_given_follow_others():
 
 def test_kinds_of_questions():
     mixed = SplitSpec()
-    assert mixed.kinds == QUESTION_KINDS
+    assert mixed.kinds == tuple(QUESTION_KINDS)
     assert replace(mixed, answers=2).kinds == ("other", "near", "matched", "mirror-pair")
     assert replace(mixed, distractors="near").kinds == ("near",)
     with refused(SpecError, "answers"):

@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 
 from iqtt.files.make import make_split
-from scenegen.sharing.publication import Publication
 from tests.support.loaders import loader
 from tests.support.made_splits import TINY
 
@@ -23,12 +22,6 @@ def splits(split_folder, tmp_path_factory):
     for name, (spec, size) in SPECS.items():
         make_split(made / name, spec, shard_size=size, command=f"iqtt --seed {spec.seed}")
     return {"whole": split_folder, **{name: made / name for name in SPECS}}
-
-
-@pytest.fixture(scope="session")
-def publication():
-    """Return what a person tells of a split."""
-    return Publication("Some questions", ("A. Person",), "2026-01-31", "CC-BY-4.0")
 
 
 @pytest.fixture

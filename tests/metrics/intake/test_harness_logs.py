@@ -133,8 +133,7 @@ def inspect_run(path: Path, rows: list[Row], split: Path, text: Text) -> tuple[P
 def inspect_log(path: Path, rows: list[Row], split: Path) -> Path:
     log, scores = inspect_run(path, rows, split, text_for)
     assert (scores["accuracy"], scores["circular_accuracy"], scores["unparsed"]) == (0.5, 0.5, 0.5)
-    floor = np.mean([row.facts["floor"] for row in rows])
-    assert scores["skill"] == pytest.approx((0.5 - floor) / (1 - floor))
+    assert np.isnan(scores["skill"])  # no floor is known of these settings
     assert 0 < scores["stderr"] < 0.5
     kinds = {row.facts["kind"] for row in rows}
     assert kinds < set(scores)

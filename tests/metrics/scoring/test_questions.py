@@ -22,7 +22,8 @@ from iqtt.floors import (
     settings_of,
     to_json,
 )
-from iqtt.questions.specs import PRESETS, SUITE, SplitSpec, preset_spec, question_kind
+from iqtt.questions.kinds import question_kind
+from iqtt.questions.specs import PRESETS, SUITE, SplitSpec, preset_spec
 from metrics.measures.statistics import design_effect, wilson_interval
 from metrics.prediction_writer import PredictionError, write_answers
 from metrics.score_file import read_scores, write_scores

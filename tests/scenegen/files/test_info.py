@@ -9,7 +9,8 @@ import pytest
 
 from iqtt.files import info as of_questions
 from iqtt.files.make import make_split
-from iqtt.questions.specs import DISTRACTOR_KINDS, SplitSpec
+from iqtt.questions.kinds import DISTRACTOR_KINDS
+from iqtt.questions.specs import SplitSpec
 from scenegen import open_rooms
 from scenegen.rooms import info as of_rooms
 

@@ -80,15 +80,15 @@ def test_several_views_follow_scene_after_scene():
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_rows_are_a_part_of_every_array(start, count):
     batch = pack(SPEC, [FULL, BARE, LAST], (0, 1))
-    some = batch.rows(start, start + count)
     rows = slice(start, start + count)
+    some = batch.rows(rows)
     assert len(some) == min(count, 6 - start)
     named = [[some.names[i] if i >= 0 else None for i in row] for row in some.shape.tolist()]
     known = [
         [batch.names[i] if i >= 0 else None for i in row] for row in batch.shape[rows].tolist()
     ]
     assert named == known
-    assert set(some.names) == {name for row in named for name in row if name}
+    assert some.names == batch.names, "basic shapes are all listed, used or not"
     assert some.shape.dtype == batch.shape.dtype
     for name in ("spec", "shape_of", "cubes_only"):
         assert getattr(some, name) is getattr(batch, name)

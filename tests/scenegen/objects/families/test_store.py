@@ -27,7 +27,7 @@ def check(members):
     shape = make_member(*MUG)
     outline, face_count = members.outline(*MUG)
     assert (outline.name, face_count) == (shape.name, len(shape.triangles))
-    for name in ("hull_points", "hull_discs", "resting_directions", "rounding", "is_sphere"):
+    for name in ("hull_points", "hull_discs", "resting_directions", "rounding"):
         np.testing.assert_array_equal(getattr(outline, name), getattr(shape, name))
     mesh, expected = members.mesh(*MUG), cast_mesh(shape.mesh)
     np.testing.assert_array_equal(mesh.faces, expected.faces)

@@ -1,6 +1,5 @@
 """Path-traced images: the same ground truth bit for bit, and light with known answers."""
 
-import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -53,17 +52,6 @@ def test_only_the_colour_is_traced(settings, scenes_of):
     assert np.isfinite(traced.image).all()
     assert traced.image.min() >= 0
     assert (traced.image != paper.image).mean() > 0.5
-
-
-def test_models_kept_from_other_batches_are_let_go(scenes_of):
-    """Dr.Jit traces paths through every mesh that is alive: with hundreds, for minutes."""
-    spec = replace(PATH, source="families", shapes=FAMILY_NAMES, spp=1)
-    kept = importlib.import_module("scenegen.rendering.meshes.model_scene").MODELS.kept
-    scenes = scenes_of(spec, 4)
-    render(pack(replace(spec, shading="paper", shadows=True), scenes))
-    assert len(kept) > 3
-    render(pack(spec, scenes[:1]))
-    assert len(kept) == 0
 
 
 def test_fields_may_be_asked_for_one_by_one(scenes_of):
@@ -203,43 +191,62 @@ def test_any_number_of_samples_will_do(spp, capfd, variant):
     assert capfd.readouterr() == ("", ""), "Mitsuba has nothing to warn of"
 
 
-@pytest.mark.parametrize("spp", [19, pytest.param(16, marks=pytest.mark.slow)])
-def test_samples_in_several_goes_make_the_same_picture(spp, monkeypatch, variant):
-    """Samples are split if they do not fit into memory; none is drawn twice."""
-    scene = replace(OPEN, room_reflectance=(0.5,) * 3, ambient=(0.2,) * 3)
-    batch = pack(replace(PATH, spp=spp), [scene])
-    best = render(pack(replace(PATH, spp=512), [scene])).image  # in one go: shares no noise
-    once, two = render(batch).image, render(pack(replace(PATH, spp=2), [scene])).image
-    path_tracer = importlib.import_module("scenegen.rendering.path_tracing.path_tracer")
-    monkeypatch.setattr(path_tracer, "RAYS_AT_ONCE", 2 * 24 * 32)
-    parts = render(batch).image
-    assert parts.tobytes() != once.tobytes()
-    error_once, error_parts, error_two = (
-        float(np.sqrt(np.mean((image - best) ** 2))) for image in (once, parts, two)
-    )
-    assert error_parts < 1.2 * error_two * (2 / spp) ** 0.5, "no noise is drawn twice"
-    assert error_parts < 1.8 * error_once, "but 16 at once are spread more evenly"
-
-
-@pytest.mark.parametrize("passes", [1, 2, 8])
-def test_noise_of_neighbours_is_independent_and_falls_with_the_samples(
-    passes, variant, monkeypatch
-):
-    """However many passes an image takes."""
-    side, spp = 192, 16
-    path_tracer = importlib.import_module("scenegen.rendering.path_tracing.path_tracer")
-    monkeypatch.setattr(path_tracer, "RAYS_AT_ONCE", side * side * spp // passes)
+def test_noise_of_neighbours_is_independent(variant):
+    side = 192
     room = replace(OPEN, objects=(), room_reflectance=(0.7,) * 3, ambient=(0.3,) * 3)
-    spec = replace(PATH, height=side, width=side, objects=(0, 0), lights=(1, 1), spp=spp)
-
-    def noise(**settings):
-        a, b = (render(pack(replace(spec, seed=s, **settings), [room])).image[0] for s in (1, 2))
-        return (a - b).mean(axis=-1) / np.maximum(a + b, 1e-3).mean(axis=-1)
-
-    found = noise()
+    spec = replace(PATH, height=side, width=side, objects=(0, 0), lights=(1, 1), spp=16)
+    a, b = (render(pack(replace(spec, seed=s), [room])).image[0] for s in (1, 2))
+    found = (a - b).mean(axis=-1) / np.maximum(a + b, 1e-3).mean(axis=-1)
     assert found.std() > 1e-3
     for lag in (1, 2, 3, 4):
         for ahead, behind in ((found[:, lag:], found[:, :-lag]), (found[lag:], found[:-lag])):
             assert abs(np.corrcoef(ahead.ravel(), behind.ravel())[0, 1]) < 0.02
-    few = noise(spp=spp // passes) if passes > 1 else found
-    assert few.var() / found.var() == pytest.approx(passes, rel=0.15)
+
+
+def test_it_is_the_picture_of_mitsubas_own_path_tracer(variant):
+    """Of a room with a ball and a box, from Mitsuba's shapes, lights, materials and integrator."""
+    import mitsuba as mi
+
+    camera = Camera((1.3, 1.0, 1.4), TARGET, 40.0)
+    ball = replace(BALL, position=(0.35, 0.2, 0.35))
+    box = PlacedObject("box", (0.6, 0.15, 0.3), UPRIGHT, 0.2, (0.3, 0.7, 0.8))
+    lights = (LAMP, Light((0.4, 1.6, 1.2), (0.5, 1.0, 2.0)))
+    scene = SceneSpec(0, (camera,), (ball, box), lights, (0.3, 0.2, 0.1), (0.6, 0.4), (0.7,) * 3)
+    spec = replace(PATH, height=48, width=64, spp=512)
+    ours = render(pack(spec, [scene]))
+
+    to = mi.ScalarTransform4f
+
+    def thing(kind, place, color):
+        matte = {"type": "diffuse", "reflectance": {"type": "rgb", "value": list(color)}}
+        return {"type": kind, "to_world": place, "bsdf": {"type": "twosided", "bsdf": matte}}
+
+    wall = to().translate([0.5, 0.5, 0]).scale(0.5)
+    contents = {
+        "ambient": {"type": "constant", "radiance": {"type": "rgb", "value": [0.3, 0.2, 0.1]}},
+        "ball": thing("sphere", to().translate(ball.position).scale(0.2), ball.reflectance),
+        "box": thing("cube", to().translate(box.position).scale(0.2 / 3**0.5), box.reflectance),
+        "back": thing("rectangle", wall, (0.7,) * 3),
+        "left": thing("rectangle", to().rotate([0, 1, 0], 90) @ to().rotate([0, 0, 1], 90) @ wall,
+                      (0.7,) * 3),
+        "floor": thing("rectangle", to().rotate([1, 0, 0], 90) @ wall, (0.7,) * 3),
+    }  # fmt: skip
+    for number, light in enumerate(lights):
+        away = float(np.linalg.norm(np.subtract(light.position, TARGET)))
+        power = np.pi * np.array(light.color) * away / (0.6 + 0.4 * away)
+        contents[f"light{number}"] = {
+            "type": "point", "position": list(light.position),
+            "intensity": {"type": "rgb", "value": power.tolist()},
+        }  # fmt: skip
+    film = {"type": "hdrfilm", "width": 64, "height": 48, "rfilter": {"type": "box"}}
+    view = to().look_at(origin=camera.position, target=TARGET, up=[0, 1, 0])
+    sensor = {"type": "perspective", "fov": 40.0, "fov_axis": "y", "to_world": view, "film": film}
+    path = mi.load_dict({"type": "path", "max_depth": 8, "hide_emitters": True})
+    loaded = mi.load_dict({"type": "scene", "sensor": sensor, **contents})
+    theirs = np.array(mi.render(loaded, integrator=path, spp=512))[..., :3]
+    for k in range(3):
+        inside = minimum_filter(ours.object_id[0] == k, 3)
+        assert inside.sum() > 80
+        a, b = ours.image[0][inside], theirs[inside]
+        np.testing.assert_allclose(a.mean(axis=0), b.mean(axis=0), rtol=0.01)
+        assert np.quantile(np.abs(a / b - 1), 0.9) < 0.08

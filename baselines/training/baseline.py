@@ -1,0 +1,182 @@
+"""A trained baseline as data: what it adds to the training and the submissions that all share."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from torch import Tensor
+
+from baselines.training.checkpoint import WEIGHTS, Method, Settings, State, save_weights
+from baselines.training.data import TrainingFiles
+from baselines.training.fit import Loss, Progress, falling_late, fit
+from baselines.training.images import Array, read_ahead
+from baselines.training.machine import Machine, chosen_device
+from baselines.training.run_folder import alone_in, begun, earlier_state
+from baselines.training.streams import TrainingStreams
+from iqtt import QuestionsFile
+from scenegen.common.records import check
+from scenegen.rooms.reader import RoomsFile
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What is asked of a training run.
+
+    Attributes:
+        method: name of the baseline.
+        data: open files or streams to learn from.
+        earlier: the card of the checkpoint that the run goes on from; None for a new run.
+    """
+
+    method: str
+    data: Any
+    folder: Path
+    settings: Any
+    machine: Machine
+    earlier: Any
+    progress: Progress
+
+
+@dataclass(frozen=True, eq=False)
+class Lesson:
+    """What a run learns. Nothing in it has been computed that takes long.
+
+    Attributes:
+        card: of a new run on these data.
+        batches: yields the batches of an iteration and of those after it, without end.
+        loss: of a state, a batch and the number of an iteration.
+        rate: the learning rate of a card's settings in an iteration.
+        clip: largest norm of the gradients of a step; None for any.
+        rows: of a stream that each iteration shows.
+        prepare: is given the network before its first iteration.
+        network: one that is trained already, so that only `finish` is left to do.
+        finish: is given the trained network and its card, and returns the card to keep.
+    """
+
+    card: Any
+    batches: Callable[[int], Iterator[Any]]
+    loss: Callable[[State[Any, Any], Any, int], Loss]
+    rate: Callable[[Any, int], float] = falling_late
+    clip: float | None = None
+    rows: int = 0
+    prepare: Callable[[Any], Any] = lambda network: None
+    network: Any = None
+    finish: Callable[[Any, Any], Any] = lambda network, card: card
+
+
+@dataclass(frozen=True, eq=False)
+class Answers:
+    """How a network answers questions.
+
+    Attributes:
+        scores: of images, (B, 1 + K, 3, S, S), the reference first: (B, K), the most for the
+            answer that is given.
+        batch: questions at a time.
+        notes, run: of the submission.
+    """
+
+    scores: Callable[[Tensor], Tensor]
+    batch: int = 1
+    notes: str = ""
+    run: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Views:
+    """What a network predicts of rooms.
+
+    Attributes:
+        predicted: rows, (B,), with planar depth, (B, H, W), and normals, (B, H, W, 3).
+        shown: which image each view is predicted from, as `RoomPredictionWriter` says.
+        method, notes, run: of the submission.
+    """
+
+    predicted: Iterator[tuple[Array, Array, Array]]
+    shown: Any
+    method: str
+    notes: str = ""
+    run: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Baseline:
+    """A trained baseline.
+
+    Attributes:
+        method: its cards and networks.
+        settings: class of its settings.
+        files: folder of the weights that come with the package.
+        lesson: makes what a run learns; further arguments are those of `options`.
+        options: names of these arguments.
+        answers: how its network answers an open file of questions; None for rooms alone.
+        views: what its network predicts of an open file of rooms; None for questions alone.
+        streamed: settings of the streams that it learns from; None for files alone.
+        cpu_only: whether it trains on the CPU alone.
+    """
+
+    method: Method[Any, Any]
+    settings: type[Settings]
+    files: Path
+    lesson: Callable[..., Lesson]
+    options: tuple[str, ...] = ()
+    answers: Callable[[Any, Any, QuestionsFile], Answers] | None = None
+    views: Callable[[Any, Any, RoomsFile], Views] | None = None
+    streamed: Mapping[str, Any] | None = field(default=None)
+    cpu_only: bool = False
+
+
+def train(
+    baseline: Baseline,
+    data: TrainingFiles | TrainingStreams,
+    run_folder: str | Path,
+    settings: Settings | None = None,
+    machine: Machine | None = None,
+    *,
+    resume: bool = False,
+    progress: Progress = lambda done, total, losses: None,
+    **options: Any,
+) -> Path:
+    """Train a baseline and return the path of its weights.
+
+    The same arguments without a limit of time give the same weights on one machine, however often a
+    run is resumed.
+
+    Args:
+        run_folder: gets checkpoint and weights.
+        settings: by default the baseline's own.
+        machine: where and how long; by default on a GPU if there is one.
+        resume: go on from the checkpoint, with the run's own settings.
+        progress: is called after each iteration with its number, how many there will be, and losses
+            by name.
+        options: those of `baseline.options`.
+
+    Raises:
+        SpecError: settings and data do not fit, or there is no such device.
+        FileExistsError: a new run finds files of another.
+        TrainingError, FileFormatError, OSError.
+    """
+    folder, machine, method = Path(run_folder), machine or Machine(), baseline.method
+    if baseline.cpu_only:
+        check(machine.device != "cuda", "device", "cuda", f"cpu, where {method.name} computes")
+    device = chosen_device("cpu" if baseline.cpu_only else machine.device)
+    with alone_in(folder):
+        earlier = earlier_state(folder, method, resume)
+        before = None if earlier is None else earlier.card
+        chosen = before.settings if before else settings or baseline.settings()
+        run = Run(method.name, data, folder, chosen, machine, before, progress)
+        lesson = baseline.lesson(run, **options)
+        network, card = lesson.network, lesson.card
+        if network is None:
+            state = begun(method, lesson.card, earlier, data.where, device)
+            lesson.prepare(state.network)
+            batches = read_ahead(lesson.batches(state.card.iteration), device)
+
+            def losses(number: int) -> Iterator[Loss]:
+                yield lesson.loss(state, next(batches), number)
+
+            how: dict[str, Any] = {"clip": lesson.clip, "rows": lesson.rows, "progress": progress}
+            fit(folder, method, state, losses, lesson.rate, machine, **how)
+            network, card = state.network, state.card
+        save_weights(folder / WEIGHTS, method, network, lesson.finish(network, card))
+    return folder / WEIGHTS

@@ -1,0 +1,139 @@
+"""A data card as its readers see it: Hugging Face's reader of headers, and Markdown on a page."""
+
+import hashlib
+from contextlib import ExitStack
+from dataclasses import replace
+from types import SimpleNamespace
+
+import pytest
+import yaml
+from huggingface_hub import DatasetCard
+from markdown_it import MarkdownIt
+
+from scenegen import open_rooms
+from scenegen.common.errors import SpecError
+from scenegen.description.presets import preset_spec
+from scenegen.sharing.card import Publication
+from scenegen.sharing.export import write_export
+from scenegen.sharing.rooms import ROOMS, default_license, write_rooms_card
+
+TOLD = Publication("Two rooms", ("A. Person", "B {Person}"), "CC-BY-4.0")
+WICKED = "</code><script>alert(1)</script> `x` | [a](javascript:1)\n# Title\n\n---\n![i](http://x)"
+
+
+def make_card(paths, path, publication=TOLD):
+    with ExitStack() as stack:
+        rooms = [stack.enter_context(open_rooms(path)) for path in paths]
+        write_rooms_card(path, rooms, publication)
+    return path.read_text()
+
+
+@pytest.fixture(scope="module")
+def page(holey_set, float_path, tmp_path_factory):
+    """Return the card of a set and of a file."""
+    return make_card([holey_set, float_path], tmp_path_factory.mktemp("card") / "README.md")
+
+
+def test_what_the_header_tells(page):
+    card = DatasetCard(page)
+    assert (card.data.pretty_name, card.data.license) == ("Two rooms", "cc-by-4.0")
+    assert {"depth-estimation", "pix2shape-bench"} < set(card.data.tags)
+    assert "      author = {{A. Person} and {B Person}}," in page.splitlines()
+
+
+def test_files_and_their_sha256(page, holey_set, float_path):
+    names = ["set.h5", *(f"set-0000{i}-of-00003.h5" for i in range(3)), "set.manifest.json"]
+    files = [*(holey_set.with_name(name) for name in names), float_path]
+    for path in files:
+        data = path.read_bytes()
+        assert f"| {path.name} | {len(data)} | {hashlib.sha256(data).hexdigest()} |" in page
+    assert page.count("| shard of set.h5 |") == 3
+
+
+def test_the_request_and_command_are_there_to_be_copied(page, holey_set):
+    with open_rooms(holey_set) as rooms:
+        spec = rooms.attributes["spec"]
+        assert f"| set.h5 | 14 | 7 | {rooms.spec.height}x" in page
+    assert f"    {spec}" in page.splitlines()
+
+
+def test_a_card_of_interiors_says_what_is_true_of_them(interior_path, rooms_path, tmp_path):
+    page = make_card([interior_path], tmp_path / "README.md")
+    wrong = ("scene units", "corner", "no gamma", "two walls")
+    assert not [words for words in wrong if words in page]
+    assert "| `depth` | (y, x) | float32 | metre |" in page
+    with pytest.raises(SpecError):
+        make_card([interior_path, rooms_path], tmp_path / "both")
+
+
+def test_no_licence_is_guessed_of_what_others_made():
+    spec = preset_spec("interiors")
+    assert default_license([SimpleNamespace(spec=spec)])
+    for name in ("materials", "environment"):
+        with pytest.raises(SpecError):
+            default_license([SimpleNamespace(spec=replace(spec, **{name: "0" * 16}))])
+
+
+def test_texts_from_files_and_people_stay_texts(damaged, tmp_path):
+    changed = damaged(lambda file: file.attrs.update(creation_command=WICKED))
+    path = changed.rename(changed.with_name("a [b].h5"))
+    wicked = Publication(WICKED, (WICKED,), "LicenseRef-mine")
+    _, head, page = make_card([path], tmp_path / "README.md", wicked).split("---\n", 2)
+    header = yaml.safe_load(head)
+    assert (header["license"], header["license_name"]) == ("other", "LicenseRef-mine")
+    html = MarkdownIt("commonmark", {"html": True}).enable("table").render(page)
+    assert not [tag for tag in ("<script", "<img", "href=\"javascript", "<h1>Title", "<hr")
+                if tag in html]  # fmt: skip
+    assert html.count("<h1>") == 1
+    assert f"    {WICKED}".replace("\n", "\\n") in page.splitlines(), "a block, to be copied"
+
+
+def test_scenes_that_are_in_two_files_are_told(rooms_path, page, tmp_path):
+    assert "no scene is in two" in page
+    (tmp_path / "other.h5").write_bytes(rooms_path.read_bytes())
+    page = make_card([rooms_path, tmp_path / "other.h5"], tmp_path / "README.md")
+    assert "**8 scenes are in more than one file**" in page
+
+
+def test_one_name_twice(rooms_path, tmp_path):
+    (tmp_path / "rooms.h5").write_bytes(rooms_path.read_bytes())
+    with pytest.raises(SpecError) as error:
+        make_card([rooms_path, tmp_path / "rooms.h5"], tmp_path / "README.md")
+    assert error.value.where == "files"
+
+
+@pytest.mark.parametrize("several", [False, True])
+def test_parquet_beside_a_card_and_its_files_is_read(
+    several, rooms_path, float_path, load, tmp_path
+):
+    paths, data = [rooms_path, float_path][: 1 + several], tmp_path / "data"
+    data.mkdir()
+    for path in paths:
+        with open_rooms(path) as rooms:
+            for part in write_export(rooms, ROOMS, "parquet", tmp_path / path.stem):
+                part.rename(data / part.name)
+        (data / path.name).write_bytes(path.read_bytes())
+    make_card(paths, data / "README.md")
+    for path, config in zip(paths, ["rooms", "float"] if several else [None], strict=True):
+        with open_rooms(path) as rooms:
+            loaded = load(str(data), config)
+            assert loaded["scene_index"] == [room.scene.index for room in rooms]
+            assert loaded.num_rows == len(rooms)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "where"),
+    [
+        ({"title": " "}, "title"),
+        ({"creators": ()}, "creator"),
+        ({"creators": ("A", "")}, "creator"),
+        ({"license": "do as you like"}, "license"),
+        ({"license": "https://x.org/><script>"}, "license"),
+    ],
+)
+def test_what_cannot_be_published(wrong, where):
+    with pytest.raises(SpecError) as error:
+        replace(TOLD, **wrong)
+    assert error.value.where == where
+    assert TOLD.license_address == "https://spdx.org/licenses/CC-BY-4.0.html"
+    assert replace(TOLD, license="https://x.org/a").license_address == "https://x.org/a"
