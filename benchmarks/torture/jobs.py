@@ -11,8 +11,8 @@ from benchmarks.torture.runs import Results, Torture
 
 SMALL = "--size 32 --min-visible-pixels 3 --workers 1 --out rooms.h5"
 STREAM = "import scenegen\nfor _ in scenegen.RoomStream('shapes', batch=64, stop=50_000): pass"
-# Runs a command; prints its exit code and the peak, MB, of its largest process. This one is small, as
-# a process counts the peak of the one that started it, too.
+# Runs a command; prints its exit code and the peak, MB, of its largest process. This one is small,
+# as a process counts the peak of the one that started it, too.
 WATCHED = """
 import resource, subprocess, sys
 done = subprocess.run([sys.executable, "-c", *sys.argv[1:]], stdout=subprocess.DEVNULL)
