@@ -94,6 +94,10 @@ def test_points_farther_than_the_margin_behind_a_wall_are_hidden():
     assert MARGIN == 0.01
     assert hidden_from(points, toward, wall, np.eye(4), 40.0).tolist() == [False, True]
     assert hidden_from(points, -toward, wall, np.eye(4), 40.0).tolist() == [True, True]
+    aside = toward[:, [2, 0, 1]]  # edge-on from the middle of the picture
+    assert hidden_from(points, aside, wall, np.eye(4), 40.0).tolist() == [True, True]
+    wall[3, 3] = 3.0  # a neighbour through which the second is seen
+    assert hidden_from(points, toward, wall, np.eye(4), 40.0).tolist() == [False, False]
 
 
 def test_an_empty_room_is_the_truth_wherever_no_object_is(rooms_path):
