@@ -51,7 +51,7 @@ JOBS = {
         ],
         700,
     ),
-    "stream": Job([f"python {shlex.quote(STREAM)}"], 700),
+    "stream": Job([f"python {shlex.quote(STREAM)}"], 800),
 }
 
 
