@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import cli
 from iqtt.vlm.rows import Asked, vlm_rows
-from metrics.intake.harness_logs import read_returned
+from metrics.intake.answers.harness_logs import read_returned
 from metrics.scoring.evaluate import score
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import open_predictions
