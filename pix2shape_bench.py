@@ -46,7 +46,7 @@ def questions(
     rotations: int = 1,
     size: int = SIZE,
     control: bool = False,
-    items: Sequence[int] | None = None,
+    items: Sequence[int | str] | int | None = None,
 ) -> Task:
     """Ask the questions of a file, such as iqtt-test.h5; their pictures are drawn now.
 
@@ -54,9 +54,12 @@ def questions(
         path, part, answers, with_answers, layout, rotations, size, items: as in `Asked`.
         control: asks the questions without their references.
     """
+    chosen = None
+    if items is not None:  # `-T items=3` is a number, `-T items=0,3` a list of texts
+        chosen = [int(item) for item in ([items] if isinstance(items, int) else items)]
     asked = Asked(
         path, part, answers, with_answers, layout, rotations, size,
-        with_reference=not control, items=items,
+        with_reference=not control, items=chosen,
     )  # fmt: skip
     return _task(_sample(row_facts(row), row.sent) for row in vlm_rows(asked))
 

@@ -22,7 +22,7 @@ from metrics.scoring.image_scores import NonFinite, reference_of, score_predicti
 from metrics.scoring.metric_names import OTHER_SCENE
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import score_rooms
-from metrics.scoring.runs import Settings
+from metrics.scoring.runs import RoomRuns, Settings
 from metrics.submissions.inspection import Inspection
 from metrics.submissions.layout import KINDS
 from metrics.submissions.reader import PredictedView, RoomPredictions
@@ -139,7 +139,7 @@ def evaluate(
             cluster=None,
             allow_partial=chosen.allow_partial or items is not None,
         )
-        return score_rooms([_InMemory(content)], truth, True, run, lambda done: None)
+        return score_rooms(RoomRuns([_InMemory(content)], truth, True), run, lambda done: None)
 
 
 class _InMemory(RoomPredictions):

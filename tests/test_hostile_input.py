@@ -30,9 +30,9 @@ from pix2shape_models import tiny, written
 import cli
 from baselines.pix2shape.weights import open_weights
 from iqtt import open_questions
-from metrics.intake.answer_files import import_answers
+from metrics.intake.answers.answer_files import import_answers
+from metrics.intake.answers.quiz_answers import read_answers
 from metrics.intake.array_files import read_array
-from metrics.intake.quiz_answers import read_answers
 from metrics.intake.truth_layouts import nyu
 from metrics.measured.describe import describe
 from metrics.measured.reader import MeasuredFile

@@ -11,6 +11,7 @@ from scenegen.command_line.options import ENCODING, OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputFolder
 from scenegen.commands.sharing import SHARE, publication_options
+from scenegen.rooms.export.formats import DATA_FORMATS
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt card iqtt-split --creator 'A. Person'")
@@ -54,7 +55,7 @@ def card(
     "  iqtt export iqtt-split/iqtt-val.h5 --format vlm --rotations 3 --out val-vlm"
 )
 @click.argument("file", type=InputPath())
-@click.option("--format", "form", type=click.Choice(["parquet", "webdataset", "vlm"]),
+@click.option("--format", "form", type=click.Choice([*DATA_FORMATS, "vlm"]),
               required=True,
               help="parquet and webdataset are for data loaders. vlm is for models that read"
               " pictures and text: Parquet, VLMEvalKit and lmms-eval.")

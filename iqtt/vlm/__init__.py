@@ -2,5 +2,5 @@
 
 `pictures` draws a question anew at any size, `prompt` says what is asked, and `rows` joins both for
 each order of the answers. `export` writes the rows for Inspect, lmms-eval, VLMEvalKit and other
-readers of Parquet; `ask` sends them to a server. `reading` finds the answer in a model's text.
+readers of Parquet. `reading` finds the answer in a model's text.
 """

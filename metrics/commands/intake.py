@@ -147,8 +147,8 @@ def import_(
     if sum(source is not None for source in (pattern, answers, people)) != 1:
         raise click.UsageError("give --depth for rooms, or --answers or --quiz for questions")
     if people is not None:
+        from metrics.intake.answers.quiz_answers import import_quiz
         from metrics.intake.folders import files_of
-        from metrics.intake.quiz_answers import import_quiz
 
         made = import_quiz(
             files_of(people, (".json",)), truth, out,
@@ -183,15 +183,15 @@ def _import_answers(
 ) -> None:
     """Make a submission of a list of answers, or of the log of a harness."""
     from iqtt.files.reader import open_questions
-    from metrics.intake.answer_files import import_answers
-    from metrics.intake.harness_logs import is_log, read_returned, write_returned
+    from metrics.intake.answers.answer_files import import_answers
+    from metrics.intake.answers.harness_logs import is_log, read_returned, write_returned
 
     with open_questions(truth) as questions:
         if is_log(answers):
             log = read_returned(answers)
             texts["notes"] = texts["notes"] or log.settings
             count = write_returned(out, truth, log, method=method or "", **texts)
-            for note in filter(None, (log.failure_note, log.unread_note)):
+            for note in log.notes:
                 print_line(f"{answers}: {note}")
         else:
             name = method or Path(answers).stem

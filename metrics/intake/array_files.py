@@ -4,7 +4,6 @@ Sizes are taken from headers before anything is unpacked. Values come as stored:
 """
 
 import re
-import zipfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from scenegen.description.specs import MAX_PIXELS
 
 Array = NDArray[Any]
 MOST_CHANNELS = 4
+MOST_BYTES_A_NUMBER = 8
 DEPTH_CHANNELS = ("Z", "depth", "Depth", "D", "Y", "V")  # of EXR files with several
 ANY_NUMBER = ("Y", "V")  # of them, those that other numbers have, too
 VECTOR_CHANNELS = (("X", "Y", "Z"), ("R", "G", "B"), ("N.X", "N.Y", "N.Z"))
@@ -72,25 +72,18 @@ def _npy(path: Path, _name: str | None, _vectors: bool) -> Array:
 
 
 def _npz(path: Path, name: str | None, vectors: bool) -> Array:
-    with zipfile.ZipFile(path) as archive:
-        names = [member.removesuffix(".npy") for member in archive.namelist()]
+    with np.load(path, allow_pickle=False) as arrays:
+        names = arrays.files
         usual = ("points", "normal") if vectors else ("depth", "disparity", "pred", "arr_0")
-        chosen = name or (
-            names[0] if len(names) == 1 else next(filter(names.__contains__, usual), "")
-        )
+        only = names[0] if len(names) == 1 else next(filter(names.__contains__, usual), "")
+        chosen = name or only
         if chosen not in names:
             found = f"the arrays {', '.join(map(repr, names[:8]))}"
             hint = "" if name else "name one with --array"
             raise ArrayFileError(path, found, repr(name) if name else "one", hint)
-        with archive.open(f"{chosen}.npy") as member:
-            version = np.lib.format.read_magic(member)
-            read = (
-                np.lib.format.read_array_header_1_0
-                if version == (1, 0)
-                else np.lib.format.read_array_header_2_0
-            )
-            _check_size(path, read(member)[0])
-    with np.load(path, allow_pickle=False) as arrays:
+        member = f"{chosen}.npy"
+        if member in arrays.zip.namelist():  # whose size, inflated, is known before it is read
+            _check_size(path, (arrays.zip.getinfo(member).file_size // MOST_BYTES_A_NUMBER,))
         return np.asarray(arrays[chosen])
 
 

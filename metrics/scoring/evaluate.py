@@ -3,15 +3,23 @@
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TypeVar
 
 from metrics.measured.protocols import ProtocolError
-from metrics.measured.reader import Images, MeasuredFile, open_images
+from metrics.measured.reader import MeasuredFile, open_images
 from metrics.scoring.measured import score_measured
 from metrics.scoring.questions import score_questions
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import score_rooms
-from metrics.scoring.runs import Progress, ScoringError, Settings
+from metrics.scoring.runs import (
+    MeasuredRuns,
+    Progress,
+    QuestionRuns,
+    RoomRuns,
+    Runs,
+    ScoringError,
+    Settings,
+)
 from metrics.submissions.reader import (
     Predictions,
     QuestionPredictions,
@@ -19,21 +27,8 @@ from metrics.submissions.reader import (
     open_predictions,
 )
 from metrics.submissions.truths import find_truth
-from scenegen.rooms.reader import RoomsFile
 
-if TYPE_CHECKING:
-    from iqtt.files.reader import AnswersFile
-
-
-class Runs(NamedTuple):
-    """Open submissions, which are runs of one method on one task, and their open truth.
-
-    `truth_given` says whether the person who scores named the truth, and not the submission.
-    """
-
-    files: Sequence[Predictions]
-    truth: "Images | AnswersFile"
-    truth_given: bool
+Result = TypeVar("Result")
 
 
 def score(
@@ -75,56 +70,57 @@ def open_runs(paths: Sequence[str | Path], truth: str | Path | None = None) -> I
             opening.enter_context(files[-1])
         _check_alike(files)
         place = find_truth(files[0], truth)
-        opened = _opened_truth(files[0].task, place.path)
-        opening.callback(opened.close)
-        yield Runs(files, opened, place.source == "given")
+        runs = _runs(files, place.path, place.source == "given")
+        opening.callback(runs.truth.close)
+        yield runs
 
 
-def _opened_truth(task: str, path: Path) -> "Images | AnswersFile":
-    if task != "iqtt":
-        return open_images(path)
-    from iqtt.files.reader import AnswersFile
+def _runs(files: Sequence[Predictions], truth: Path, given: bool) -> Runs:
+    """Return submissions of one task with their truth, which is opened here."""
+    answers = [file for file in files if isinstance(file, QuestionPredictions)]
+    if answers:
+        from iqtt.files.reader import AnswersFile
 
-    return AnswersFile(path)
+        return QuestionRuns(answers, AnswersFile(truth), given)
+    images, opened = (
+        [file for file in files if isinstance(file, RoomPredictions)],
+        open_images(truth),
+    )
+    if isinstance(opened, MeasuredFile):
+        return MeasuredRuns(images, opened, given)
+    return RoomRuns(images, opened, given)
 
 
 def score_runs(runs: Runs, settings: Settings, progress: Progress) -> ScoreFile:
     """Score open submissions. Raises as `score`, and ProtocolError."""
-    if settings.protocol:
-        _require_measured(runs)
-    truth, options = runs.truth, (runs.truth_given, settings, progress)
-    if isinstance(truth, RoomsFile):
-        scores = score_rooms(_images(runs), truth, *options)
-    elif isinstance(truth, MeasuredFile):
-        (scores,) = score_measured(_images(runs), truth, *options)
+    if settings.protocol or isinstance(runs, MeasuredRuns):
+        (scores,) = score_measured(_measured(runs), settings, progress)
+    elif isinstance(runs, RoomRuns):
+        scores = score_rooms(runs, settings, progress)
     else:
-        answers = [file for file in runs.files if isinstance(file, QuestionPredictions)]
-        scores = score_questions(answers, truth, *options)
-    for file in runs.files:
-        file.require_unchanged()
-    return scores
+        assert isinstance(runs, QuestionRuns), "there are no others"
+        scores = score_questions(runs, settings, progress)
+    return _unchanged(runs, scores)
 
 
 def score_protocols(runs: Runs, settings: Settings, progress: Progress) -> list[ScoreFile]:
     """Score open submissions under all protocols that suit them. Raises as `score_runs`."""
-    _require_measured(runs)
-    assert isinstance(runs.truth, MeasuredFile), "others were refused"
-    options = runs.truth_given, settings, progress
-    scores = score_measured(_images(runs), runs.truth, *options, all_protocols=True)
+    return _unchanged(runs, score_measured(_measured(runs), settings, progress, all_protocols=True))
+
+
+def _unchanged(runs: Runs, scores: Result) -> Result:
+    """Return scores of files that are still those that were opened. Raises FileFormatError."""
     for file in runs.files:
         file.require_unchanged()
     return scores
 
 
-def _images(runs: Runs) -> list[RoomPredictions]:
-    return [file for file in runs.files if isinstance(file, RoomPredictions)]
-
-
-def _require_measured(runs: Runs) -> None:
+def _measured(runs: Runs) -> MeasuredRuns:
     """Raise ProtocolError for truth that is exact, and has no pixels or ranges to choose."""
-    if not isinstance(runs.truth, MeasuredFile):
+    if not isinstance(runs, MeasuredRuns):
         expected = "measured truth, as `bench truth` makes it"
         raise ProtocolError("protocol", f"one for {runs.truth.path}", expected)
+    return runs
 
 
 def _check_alike(files: Sequence[Predictions]) -> None:

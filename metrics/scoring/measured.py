@@ -1,27 +1,28 @@
 """Scores of submissions on truth that others measured, one score file for each protocol."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from metrics.measured.protocols import BY_NAME, DECLARED, PROTOCOLS, ProtocolError
-from metrics.measured.reader import MeasuredFile
 from metrics.scoring.geometry import scored_alignment
 from metrics.scoring.measured_rows import PIXELS, require_suited, suits
 from metrics.scoring.metric_names import OF_TRUTH, metric
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import require_one_kind, require_scored
 from metrics.scoring.rows import score_measured_rows
-from metrics.scoring.runs import Progress, Settings, matched_rows, meta_of, refuse_copies
+from metrics.scoring.runs import (
+    MeasuredRuns,
+    Progress,
+    Settings,
+    matched_rows,
+    meta_of,
+    refuse_copies,
+)
 from metrics.scoring.truth_digests import images_digest
-from metrics.submissions.reader import RoomPredictions
 from scenegen.common.names import check_choice
 
 
 def score_measured(
-    files: Sequence[RoomPredictions],
-    truth: MeasuredFile,
-    truth_given: bool,
+    runs: MeasuredRuns,
     settings: Settings,
     progress: Progress,
     all_protocols: bool = False,
@@ -31,7 +32,8 @@ def score_measured(
     Raises as `evaluate.score`, and ProtocolError where the protocol does not suit the truth, or
     what the method predicts.
     """
-    rows = matched_rows(files, truth, settings.allow_partial)
+    files, truth = runs.files, runs.truth
+    rows = matched_rows(runs, settings.allow_partial)
     require_one_kind(files)
     kind, declared = files[0].kind, files[0].alignment
     if all_protocols:
@@ -52,7 +54,7 @@ def score_measured(
     refuse_copies(files, alike)
     digest = images_digest(truth, scored.digests)
     counts = {"rows_in_truth": len(truth), "rows_penalised": len(scored.bad)}
-    meta = meta_of(files, truth, truth_given, truth.fingerprint, digest, settings, counts)
+    meta = meta_of(runs, truth.fingerprint, digest, settings, counts)
     found = []
     for protocol in protocols:
         ours = {

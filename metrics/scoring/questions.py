@@ -2,7 +2,6 @@
 
 import hashlib
 import itertools
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from metrics.scoring.estimates import ACCURACY, Bootstrap, accuracy
 from metrics.scoring.records import AnswerGroup, Meta, ScoreFile
 from metrics.scoring.runs import (
     Progress,
+    QuestionRuns,
     Settings,
     matched_rows,
     meta_of,
@@ -32,9 +32,7 @@ ANGLE_BINS = (0, 30, 60, 90, 120, 150, 180)  # degrees, of IQTT's rotations
 
 
 def score_questions(
-    files: Sequence[QuestionPredictions],
-    truth: "AnswersFile",
-    truth_given: bool,
+    runs: QuestionRuns,
     settings: Settings,
     progress: Progress,
 ) -> ScoreFile:
@@ -42,12 +40,13 @@ def score_questions(
     from iqtt.floors import floors_of
     from iqtt.questions.kinds import question_kind
 
+    files, truth = runs.files, runs.truth
     names = ("answers", *(LABELS if truth.has_truth else ()))
     columns = {name: np.asarray(truth.read(name, slice(None))) for name in names}
     if truth.has_truth:
         _check_kinds(truth, columns["distractor_kind"], columns["answers"])
     digest = answers_digest(truth, columns)
-    rows = matched_rows(files, truth, settings.allow_partial)
+    rows = matched_rows(runs, settings.allow_partial)
     true = columns["answers"].astype(np.int64)
     if not settings.allow_partial:  # such scores are not ranked, and two people may answer alike
         refuse_copies(files, lambda i, j: _same(files[i], files[j]))
@@ -69,9 +68,7 @@ def score_questions(
         kinds = [question_kind(row) for row in columns["distractor_kind"][rows].tolist()]
     known = floors_of(truth.spec, settings.floors)
     floors = [known[kind] for kind in sorted(set(kinds)) if kind in known]
-    meta = meta_of(
-        files, truth, truth_given, fingerprint, digest, settings, counts, question_floors=floors
-    )
+    meta = meta_of(runs, fingerprint, digest, settings, counts, question_floors=floors)
     of_reference = _shapes(truth)
     shapes = rows if of_reference is None else of_reference[rows]
 

@@ -12,6 +12,7 @@ from metrics.scoring.records import OBJECT_COLUMNS, SHAPE_COLUMN, ScoreFile
 from metrics.scoring.rows import score_rows
 from metrics.scoring.runs import (
     Progress,
+    RoomRuns,
     ScoringError,
     Settings,
     matched_rows,
@@ -28,14 +29,13 @@ IDS_SHOWN = 8
 
 
 def score_rooms(
-    files: Sequence[RoomPredictions],
-    truth: RoomsFile,
-    truth_given: bool,
+    runs: RoomRuns,
     settings: Settings,
     progress: Progress,
 ) -> ScoreFile:
     """Score runs of one method on an open rooms file; raises as `evaluate.score`."""
-    rows = matched_rows(files, truth, settings.allow_partial)
+    files, truth = runs.files, runs.truth
+    rows = matched_rows(runs, settings.allow_partial)
     require_one_kind(files)
     scored = score_rows(files, truth, rows, settings, progress)
     scores, bad = scored.scores, scored.bad
@@ -64,7 +64,7 @@ def score_rooms(
         **scored.floors,
     }
     objects = {name: scored.objects[name] for name in (*OBJECT_COLUMNS, *OBJECT_SCORES)}
-    meta = meta_of(files, truth, truth_given, truth.fingerprint, digest, settings, counts)
+    meta = meta_of(runs, truth.fingerprint, digest, settings, counts)
     alignment = scored_alignment(files[0].kind, files[0].alignment)
     objects[SHAPE_COLUMN] = shape
     more: dict[str, Any] = {"shown": files[0].shown}

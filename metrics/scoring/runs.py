@@ -11,16 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.floors import Floor
-from metrics.measured.reader import Images
+from metrics.measured.reader import Images, MeasuredFile
 from metrics.measures.statistics import RESAMPLES
 from metrics.scoring.image_scores import NonFinite
 from metrics.scoring.records import Meta, Submission
 from metrics.submissions.problems import Problem, first_error
-from metrics.submissions.reader import Predictions
+from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
 from metrics.submissions.truths import match_problems
 from scenegen.common.errors import SceneGenError
 from scenegen.files.row_file import writer_name
 from scenegen.files.sets.cluster import Cluster
+from scenegen.rooms.reader import RoomsFile
 
 if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
@@ -60,6 +61,43 @@ class Settings:
     protocol: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class Runs:
+    """Open submissions, which are runs of one method on one task, and their open truth.
+
+    Attributes:
+        truth_given: whether the person who scores named the truth, and not the submission.
+    """
+
+    files: Sequence[Predictions]
+    truth: "Images | AnswersFile"
+    truth_given: bool
+
+
+@dataclass(frozen=True, eq=False)
+class RoomRuns(Runs):
+    """Runs on rooms."""
+
+    files: Sequence[RoomPredictions]
+    truth: RoomsFile
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredRuns(Runs):
+    """Runs on truth that others measured."""
+
+    files: Sequence[RoomPredictions]
+    truth: MeasuredFile
+
+
+@dataclass(frozen=True, eq=False)
+class QuestionRuns(Runs):
+    """Runs on questions."""
+
+    files: Sequence[QuestionPredictions]
+    truth: "AnswersFile"
+
+
 def scorer_versions() -> dict[str, str]:
     """Return what scores depend on beside the files: the versions of this program and LIBRARIES."""
     return {"writer": writer_name(), **_releases()}
@@ -69,22 +107,21 @@ def _releases() -> dict[str, str]:
     return {name: importlib.metadata.version(name) for name in LIBRARIES}
 
 
-def matched_rows(
-    files: Sequence[Predictions], truth: "Images | AnswersFile", partial: bool
-) -> Array:
+def matched_rows(runs: Runs, partial: bool) -> Array:
     """Return the rows of the truth that all files answer, in ascending order.
 
     Raises ScoringError for another truth, unknown rows, and missing ones unless `partial`.
     """
-    rows = np.arange(len(truth))
-    for file in files:
-        problems = match_problems(file, truth)
+    rows = np.arange(len(runs.truth))
+    for file in runs.files:
+        problems = match_problems(file, runs.truth)
         if partial:
             problems = [problem for problem in problems if problem.rule != "complete"]
         raise_first_problem(file.path, problems)
         rows = np.intersect1d(rows, file.rows)
     if not rows.size:
-        raise ScoringError(files[0].path, "no row that all runs answer", f"rows of {truth.path}")
+        expected = f"rows of {runs.truth.path}"
+        raise ScoringError(runs.files[0].path, "no row that all runs answer", expected)
     return rows
 
 
@@ -105,9 +142,7 @@ def refuse_copies(files: Sequence[Predictions], same: Callable[[int, int], Any])
 
 
 def meta_of(
-    files: Sequence[Predictions],
-    truth: "Images | AnswersFile",
-    truth_given: bool,
+    runs: Runs,
     fingerprint: str,
     digest: str,
     settings: Settings,
@@ -115,12 +150,13 @@ def meta_of(
     question_floors: Sequence[Floor] = (),
 ) -> Meta:
     """Return what a score file records beside its items."""
+    files, truth = runs.files, runs.truth
     resampled = files[0].task != "iqtt" or len(files) > 1
     return Meta(
         truth_fingerprint=fingerprint,
         truth_path=str(truth.path),
         truth_digest=digest,
-        truth_given=truth_given,
+        truth_given=runs.truth_given,
         submissions=tuple(Submission(str(file.path), file.sha256, file.run) for file in files),
         writer=writer_name(),
         versions=_releases(),

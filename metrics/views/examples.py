@@ -1,7 +1,7 @@
 """Examples on pages: scenes and questions that were predicted well and badly, with pictures."""
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,16 +12,14 @@ from numpy.typing import NDArray
 from iqtt.questions.specs import LETTERS
 from metrics.measured.reader import Images, MeasuredFile
 from metrics.measures.answers import ABSTAINED
-from metrics.scoring.geometry import depth_as_scored
-from metrics.scoring.measured_rows import depth_as_declared
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
-from metrics.views.pictures import Picture, data_url, depth_pictures, view_pictures
-from scenegen.common.errors import FileFormatError, SceneGenError
+from metrics.views.figures import shown_row
+from metrics.views.pictures import Picture, data_url, depth_pictures, normal_pictures
+from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import number
 from scenegen.rooms.preview import srgb_bytes
-from scenegen.rooms.reader import radiance_of
 
 if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
@@ -58,13 +56,13 @@ def examples_of(scores: ScoreFile, truth: "Images | AnswersFile", submission: Pr
     """
     if isinstance(truth, Images):
         assert isinstance(submission, RoomPredictions)
-        name = shown_score(scores)
+        name = _ordering_score(scores)
         return _scenes(scores, truth, submission, name) if name else []
     assert isinstance(submission, QuestionPredictions)
     return _questions(scores, truth.path, submission)
 
 
-def shown_score(scores: ScoreFile) -> str:
+def _ordering_score(scores: ScoreFile) -> str:
     """Return the score that orders scenes: the first that any image has a number for; else ""."""
     for name in (AS_SEEN, *HEADLINE[scores.task], *scores.metrics):
         if name in scores.items and np.isfinite(np.asarray(scores.items[name], float)).any():
@@ -108,55 +106,35 @@ def chosen_scenes(
 def _scenes(scores: ScoreFile, truth: Images, submission: RoomPredictions, name: str) -> Lists:
     values = np.asarray(scores.items[name], float)
     chosen = chosen_scenes(scores.clusters, values, metric(name).higher_is_better)
-    entries = [entry for entries in chosen.values() for entry in entries]
-    shown = dict(zip(entries, room_examples(scores, truth, submission, entries), strict=True))
     count = len(np.unique(scores.clusters[np.isfinite(values)]))
+    places = {row: place for place, row in enumerate(submission.rows.tolist())}
+
+    def example(entry: int) -> Example:
+        row = int(scores.ids[entry])
+        pictures = _pictures(truth, submission, row, places[row])
+        return Example(_name(scores, entry), _entry_scores(scores, entry), pictures)
+
     lists: Lists = []
     for place, entries in chosen.items():
         of_all = f"{len(entries)} of {count} {scores.unit} by {metric(name).title}"
         title = f"{place.capitalize()} {of_all}" if count > 1 else "The only scene"
-        lists.append((title, [shown[entry] for entry in entries]))
+        lists.append((title, [example(entry) for entry in entries]))
     return lists
 
 
-def room_examples(
-    scores: ScoreFile, rooms: Images, predictions: RoomPredictions, entries: Sequence[int]
-) -> Iterator[Example]:
-    """Yield entries of a score file with the pictures of `pictures.view_pictures`.
-
-    Raises OSError and FileFormatError where a file cannot be read or lacks an entry's row.
-    """
-    place = {row: i for i, row in enumerate(predictions.rows.tolist())}
-    for entry in entries:
-        row = int(scores.items["row"][entry])
-        if row not in place or row >= len(rooms):
-            expected = f"rows of {predictions.path} and {rooms.path}"
-            raise FileFormatError(scores.place, f"items.row: {row}", expected)
-        pictures = room_pictures(rooms, predictions, row, place[row])
-        yield Example(entry_name(scores, entry), _entry_scores(scores, entry), pictures)
-
-
-def room_pictures(
-    rooms: Images, predictions: RoomPredictions, row: int, place: int
-) -> list[Picture]:
+def _pictures(rooms: Images, predictions: RoomPredictions, row: int, place: int) -> list[Picture]:
     """Return the pictures of a row; `place` is that of its prediction."""
+    shown, true, (depth,) = shown_row(rooms, row, [predictions.view(place)])
+    pictures = depth_pictures(shown, true, depth)
     if isinstance(rooms, MeasuredFile):
-        truth = rooms.view(row)
-        predicted = depth_as_declared(predictions.view(place), truth)
-        return depth_pictures(rooms.picture(row), truth.depth, predicted)
-    true_depth = rooms.read("depth", row)
+        return pictures
+    normal = predictions.normal(place) if predictions.has_normals else None
     fov_y_degrees = float(rooms.read("camera/fov_y_degrees", row))
-    return view_pictures(
-        radiance_of(rooms, row),
-        true_depth,
-        depth_as_scored(predictions.view(place), true_depth, fov_y_degrees),
-        rooms.read("normal", row),
-        fov_y_degrees,
-        predictions.normal(place) if predictions.has_normals else None,
-    )
+    true_normal = rooms.read("normal", row)
+    return [*pictures, *normal_pictures(true, depth, true_normal, fov_y_degrees, normal)]
 
 
-def entry_name(scores: ScoreFile, entry: int) -> str:
+def _name(scores: ScoreFile, entry: int) -> str:
     """Return scene, view and row of an entry, in words."""
     if scores.task == "measured":
         return f"row {int(scores.ids[entry])}"

@@ -188,7 +188,7 @@ def draw_grid(
                     raise FigureError(
                         f"{truth}: row {row}", "no such row", f"0 to {len(rooms) - 1}"
                     )
-                lines.append(_line(rooms, row, [_view(file, row) for file in opened]))
+                lines.append(shown_row(rooms, row, [_view(file, row) for file in opened]))
     finally:
         for file in opened:
             file.close()
@@ -205,8 +205,8 @@ def labels_of(files: Sequence[ScoreFile]) -> list[str]:
     ]
 
 
-def _line(rooms: Images, row: int, views: Sequence[PredictedView]) -> Line:
-    """Return picture, true depth, and depths as scored, of a row."""
+def shown_row(rooms: Images, row: int, views: Sequence[PredictedView]) -> Line:
+    """Return image (H, W, 3), sRGB bytes, true depth (H, W), and depths as scored, of a row."""
     if isinstance(rooms, MeasuredFile):
         truth = rooms.view(row)
         depths = [depth_as_declared(view, truth) for view in views]

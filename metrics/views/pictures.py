@@ -12,7 +12,6 @@ from PIL import Image
 from metrics.measures.surfaces.normals import normals_from_depth
 from metrics.views.figures import load_matplotlib
 from scenegen.common.text_table import number
-from scenegen.rooms.preview import srgb_bytes
 
 Array = NDArray[Any]
 LARGEST = 128  # pixels across; larger images are shown by every second, third, ... of their pixels
@@ -44,20 +43,19 @@ class Picture:
     ends: tuple[str, str] = ("", "")
 
 
-def view_pictures(
-    radiance: Array,
+def normal_pictures(
     true: Array,
     predicted: Array,
     true_normal: Array,
     fov_y_degrees: float,
     predicted_normal: Array | None = None,
 ) -> list[Picture]:
-    """Return those of `depth_pictures`, and normals, true and predicted, of one view of a room.
+    """Return normals, true and predicted, of one view of a room.
 
-    Normals are shown as (x, y, z) = (red, green, blue). No value needs to be finite.
+    They are shown as (x, y, z) = (red, green, blue). No value needs to be finite.
 
     Args:
-        radiance: (H, W, 3); true, predicted: planar depth, (H, W), scene units.
+        true, predicted: planar depth, (H, W), scene units.
         true_normal: camera frame, (H, W, 3).
         fov_y_degrees: with which normals of the predicted depth are made where there are no others.
         predicted_normal: camera frame, (H, W, 3), of any length.
@@ -71,10 +69,7 @@ def view_pictures(
     pictures = {TRUE_NORMALS: _normals(true_normal), name: _normals(normal)}
     for picture in pictures.values():
         picture[~scored] = NOT_SCORED
-    return [
-        *depth_pictures(srgb_bytes(np.nan_to_num(radiance)), true, predicted),
-        *(Picture(caption, data_url(pixels)) for caption, pixels in pictures.items()),
-    ]
+    return [Picture(caption, data_url(pixels)) for caption, pixels in pictures.items()]
 
 
 def depth_pictures(shown: NDArray[np.uint8], true: Array, predicted: Array) -> list[Picture]:
@@ -87,7 +82,8 @@ def depth_pictures(shown: NDArray[np.uint8], true: Array, predicted: Array) -> l
     near, far = (true[scored].min(), true[scored].max()) if scored.any() else (0.0, 1.0)
     span = max(float(far - near), 1e-9)
     drawn = np.clip(np.nan_to_num(predicted.astype(np.float64)), -FARTHEST, FARTHEST)
-    error = np.abs(predicted_or_far(predicted) - true) / (0.1 * span)
+    finite = np.nan_to_num(predicted.astype(np.float64), nan=FARTHEST)  # far off, if not a number
+    error = np.abs(np.clip(finite, -FARTHEST, FARTHEST) - true) / (0.1 * span)
     pictures = {
         TRUE_DEPTH: _coloured((true - near) / span, "depth"),
         DEPTH: _coloured((drawn - near) / span, "depth"),
@@ -102,12 +98,6 @@ def depth_pictures(shown: NDArray[np.uint8], true: Array, predicted: Array) -> l
         Picture(caption, data_url(pixels), **bars.get(caption, {}))
         for caption, pixels in {IMAGE: shown, **pictures}.items()
     ]
-
-
-def predicted_or_far(predicted: Array) -> Array:
-    """Return depth with values that are not finite as far as can be, whose error is the largest."""
-    finite = np.nan_to_num(predicted.astype(np.float64), nan=FARTHEST)
-    return np.clip(finite, -FARTHEST, FARTHEST)
 
 
 def data_url(pixels: NDArray[np.uint8]) -> str:
@@ -135,8 +125,4 @@ def _normals(normal: Array) -> NDArray[np.uint8]:
     vectors = np.clip(np.nan_to_num(normal.astype(np.float64)), -FARTHEST, FARTHEST)
     lengths = np.linalg.norm(vectors, axis=2, keepdims=True)
     unit = np.divide(vectors, lengths, out=np.zeros_like(vectors), where=lengths > 0.0)
-    return _bytes(255 * (0.5 + 0.5 * unit))
-
-
-def _bytes(values: Array) -> NDArray[np.uint8]:
-    return np.asarray(np.rint(values).astype(np.uint8))
+    return np.asarray(np.rint(255 * (0.5 + 0.5 * unit)).astype(np.uint8))

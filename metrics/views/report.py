@@ -8,9 +8,9 @@ import numpy as np
 
 from metrics.measured.reader import Images
 from metrics.score_file import read_scores
-from metrics.scoring.evaluate import Runs
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
 from metrics.scoring.records import ScoreFile, Scores
+from metrics.scoring.runs import Runs
 from metrics.scoring.truth_digests import require_truth, stated_truth
 from metrics.views.examples import examples_of
 from metrics.views.figures import draw_groups, draw_histogram, svg_url

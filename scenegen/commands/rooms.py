@@ -20,15 +20,13 @@ from scenegen.command_line.paths import (
     OutputPath,
     refuse_command_inputs,
 )
+from scenegen.rooms.export.formats import DATA_FORMATS, FOLDER_FORMATS, FORMATS, ROW_FORMATS
 
 if TYPE_CHECKING:
     from scenegen.description.specs import Request
 
-SINGLE = ("exr", "png", "ply", "obj")  # formats of files of one row
 NEEDED = 'pip install "pix2shape-bench[denoise]", or use --items 0: nothing is rendered again'
 MOST_NAMED = 20  # exported rows whose files are listed
-SHARED = ("parquet", "webdataset")  # of files of many rows
-FOLDERS = ("nerfstudio", "colmap", "bop", "coco", "moge")  # of folders that a tool reads
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen preview rooms.h5 --random 12 --out sheet.png")
@@ -146,17 +144,15 @@ def _check_images(path: Path, spec: "Request") -> None:
 )
 @click.argument("file", type=InputPath())
 @click.option(
-    "--items", type=Items(), help="Rows to export; exr, png, ply and obj need it, or --all."
+    "--items", type=Items(), help=f"Rows to export; {', '.join(ROW_FORMATS)} need it, or --all."
 )
 @click.option("--all", "every", is_flag=True, help="Export all rows.")
 @click.option(
     "--format",
     "form",
-    type=click.Choice([*SINGLE, *SHARED, *FOLDERS]),
+    type=click.Choice([*FORMATS]),
     required=True,
-    help="exr has all channels; png a picture of each, and a JSON file that says how to decode"
-    " them; ply the surfels; obj the scene's mesh; parquet and webdataset all values of many rows,"
-    " for data loaders; nerfstudio, colmap, bop, coco and moge the folder that the tool reads.",
+    help="; ".join(f"{form.name}: {form.holds}" for form in FORMATS.values()) + ".",
 )
 @ENCODING
 @click.option(
@@ -219,9 +215,9 @@ def export(
     folder = out or f"{Path(file).stem}-{form}"
     how = {"curve": curve, "bits": int(bits), "exposure": exposure}
     how |= {} if depth_unit is None else {"depth_unit": depth_unit}
-    if form in SHARED:
+    if form in DATA_FORMATS:
         _export_many(file, items, form, folder, curve, rows_per_file, overwrite)
-    elif form in FOLDERS:
+    elif form in FOLDER_FORMATS:
         _export_folder(file, items, form, folder, overwrite, device, meshes, how)
     elif items is None and not every:
         raise click.UsageError(f"--format {form} needs rows: use --items 0-9, or --all")

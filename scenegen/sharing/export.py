@@ -21,14 +21,10 @@ from scenegen.files.rows import RowFile
 from scenegen.files.schema import Column
 from scenegen.files.sets.shards import cut, shard_name
 from scenegen.rendering.ground_truth import undeveloped
+from scenegen.rooms.export.formats import DATA_FORMATS
 from scenegen.rooms.preview import srgb_bytes
-from scenegen.sharing.formats import write_parquet, write_tar
 from scenegen.sharing.task import Task, is_picture, stored_blocks
 
-FORMATS: dict[str, tuple[str, Callable[..., None]]] = {  # ending of file names, and writer
-    "parquet": (".parquet", write_parquet),
-    "webdataset": (".tar", write_tar),
-}
 ENCODINGS = ("srgb", "linear")  # of pictures
 ROWS_PER_FILE = 1000
 MOST_FILES = 100_000  # as many as their numbers of five digits can tell apart
@@ -61,7 +57,7 @@ def write_export(
     for Parquet, pyarrow and `datasets`.
 
     Args:
-        form: one of FORMATS.
+        form: one of DATA_FORMATS.
         folder: to make; with `overwrite`, an older one of such files is replaced.
         rows: which to write, in this order; all by default.
         encoding: one of ENCODINGS, of pictures. Images of floating-point numbers stay linear.
@@ -75,7 +71,7 @@ def write_export(
     """
     part = f", {file.part}" if file.part else ""
     what, count = f"rows of {file.path.name}{part}, {task.what}", len(file)
-    check_choice("format", form, FORMATS)
+    check_choice("format", form, DATA_FORMATS)
     check_choice("encoding", encoding, ENCODINGS)
     check(rows_per_file >= 1, "rows per file", rows_per_file, "1 or more")
     check(count > 0, what, "no rows", "at least one")
@@ -85,7 +81,7 @@ def write_export(
     check(len(set(chosen)) == len(chosen), "items", "a row twice", "each row once")
     parts = cut(len(chosen), rows_per_file)
     check(len(parts) <= MOST_FILES, "rows per file", rows_per_file, "fewer files than 100,000")
-    ending, write = FORMATS[form]
+    (ending,), write = DATA_FORMATS[form].endings, DATA_FORMATS[form].load_writer()
     stem = export_stem(file)
     names = [shard_name(f"{stem}{ending}", i, len(parts)) for i in range(len(parts))]
     columns = [ROW, *task.exported(file)]

@@ -16,9 +16,9 @@ from scenegen.common.records import check
 from scenegen.files.new_file import folder_written_beside
 from scenegen.objects.catalogue import Objects
 from scenegen.rooms.export.encoding import Encoding, plain, write_json
+from scenegen.rooms.export.formats import FOLDER_FORMATS
 from scenegen.rooms.reader import Room, RoomsFile
 
-FOLDER_FORMATS = ("nerfstudio", "colmap", "bop", "coco", "moge")
 CONVENTIONS = "conventions.json"
 
 
@@ -94,7 +94,8 @@ def export_folder(
     encoding = encoding or plain(rooms.spec.interior)
     source = Source(rooms, scenes, encoding, objects, device, progress)
     with folder_written_beside(folder, _older_names(Path(folder)), overwrite) as made:
-        conventions = _writer(form)(source, made)
+        write: Writer = FOLDER_FORMATS[form].load_writer()
+        conventions = write(source, made)
         about = {
             "format": form,
             "source": {"file": rooms.path.name, "fingerprint": rooms.fingerprint},
@@ -103,19 +104,6 @@ def export_folder(
         }
         write_json(made / CONVENTIONS, about)
     return Path(folder)
-
-
-def _writer(form: str) -> Writer:
-    """Return the writer of a format, whose module is imported only now."""
-    from scenegen.rooms.export import bop, coco, colmap, moge, nerfstudio
-
-    return {
-        "nerfstudio": nerfstudio.write,
-        "colmap": colmap.write,
-        "bop": bop.write,
-        "coco": coco.write,
-        "moge": moge.write,
-    }[form]
 
 
 def _older_names(folder: Path) -> list[str]:

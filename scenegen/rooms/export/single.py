@@ -9,26 +9,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.camera import transform_vectors
+from scenegen.common.names import check_choice
 from scenegen.files.new_file import written_beside
 from scenegen.objects.catalogue import Objects, built_in_shape, interior_shape
 from scenegen.rooms.export.encoding import Encoding, plain, write_png
+from scenegen.rooms.export.formats import PICTURES, ROW_FORMATS
 from scenegen.rooms.export.obj import one_word, write_mtl, write_obj
 from scenegen.rooms.reader import Room
 
 Array = NDArray[Any]
 Writer = Callable[[Room, Path], None]
-FORMATS = ("exr", "png", "ply", "obj")
-PICTURES = ("image", "depth", "normal", "object_id")  # a PNG file of each
+ShapeOf = Callable[[str], Any]  # from a name to the unit shape of an object
 
 
 def export_paths(row: int, folder: str | Path, stem: str, form: str) -> list[Path]:
-    """Return the paths of the files that one row is written to in a format (one of FORMATS).
+    """Return the paths of the files that one row is written to in one of ROW_FORMATS.
 
     Their names have no blanks, which would end a name inside other files.
+
+    Raises SpecError for another format.
     """
-    endings = {"png": [*(f"-{name}.png" for name in PICTURES), ".json"], "obj": [".obj", ".mtl"]}
+    check_choice("format", form, ROW_FORMATS)
     name = f"{one_word(stem)}-{row:06d}"
-    return [Path(folder) / f"{name}{ending}" for ending in endings.get(form, [f".{form}"])]
+    return [Path(folder) / f"{name}{ending}" for ending in ROW_FORMATS[form].endings]
 
 
 def export_room(
@@ -43,28 +46,37 @@ def export_room(
 
     "obj" needs the `objects` of the scene, unless they are built in.
 
-    Raises SpecError where a value does not fit into an encoding of fixed range, before a file is
-    written, and OSError as `new_file.written_beside`.
+    Raises SpecError for a format that is none of ROW_FORMATS and, before a file is written, where a
+    value does not fit into an encoding of fixed range; and OSError as `new_file.written_beside`.
     """
+    check_choice("format", form, ROW_FORMATS)
     interior = room.scene.interior is not None
     built_in = interior_shape if interior else built_in_shape
     shape_of = objects.shape if objects else built_in
     encoding = encoding or plain(interior)
-    if form == "png":
-        writers = _png_writers(room, encoding)
-    elif form == "ply":
-        colors = encoding.color_bytes(room)
-        writers = [lambda room, path: write_surfels_ply(room, path, colors)]
-    elif form == "obj":
-        writers = [
-            lambda room, path: write_obj(room.scene, path, paths[-1].name, shape_of),
-            lambda room, path: write_mtl(room.scene, path),
-        ]
-    else:
-        writers = [write_exr]
+    writers: list[Writer] = ROW_FORMATS[form].load_writer()(room, paths, encoding, shape_of)
     for path, write in zip(paths, writers, strict=True):
         with written_beside(path, overwrite) as temporary:
             write(room, temporary)
+
+
+def exr_writers(_room: Room, _paths: list[Path], _how: Encoding, _of: ShapeOf) -> list[Writer]:
+    """Return what writes the one file of a row."""
+    return [write_exr]
+
+
+def ply_writers(room: Room, _paths: list[Path], how: Encoding, _of: ShapeOf) -> list[Writer]:
+    """Return what writes the one file of a row. Raises SpecError where a colour does not fit."""
+    colors = how.color_bytes(room)
+    return [lambda room, path: write_surfels_ply(room, path, colors)]
+
+
+def obj_writers(_room: Room, paths: list[Path], _how: Encoding, shape_of: ShapeOf) -> list[Writer]:
+    """Return what writes the mesh of a row and its materials."""
+    return [
+        lambda room, path: write_obj(room.scene, path, paths[-1].name, shape_of),
+        lambda room, path: write_mtl(room.scene, path),
+    ]
 
 
 def write_exr(room: Room, path: str | Path) -> None:
@@ -128,7 +140,8 @@ def write_points_ply(
     Path(path).write_bytes("\n".join([*header, ""]).encode() + vertices.tobytes())
 
 
-def _png_writers(room: Room, encoding: Encoding) -> list[Writer]:
+def png_writers(room: Room, _paths: list[Path], encoding: Encoding, _of: ShapeOf) -> list[Writer]:
+    """Return what writes the pictures and their description. Raises SpecError as `encoding`."""
     bits = encoding.bits
     pictures = {
         "image": (encoding.colors(room) * encoding.largest, bits),

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 import pytest
 import torch
 from pix2shape_models import edited
@@ -18,8 +17,6 @@ from baselines.training.data import TrainingFiles
 from baselines.training.questions import question_images
 from baselines.training.submission import write_submission
 from iqtt import open_questions
-from iqtt.files.make import make_split
-from iqtt.questions.specs import SplitSpec
 from metrics.scoring.evaluate import score
 
 BASELINES = {"cnn": cnn.BASELINE, "siamese": siamese.BASELINE}
@@ -73,16 +70,3 @@ def test_no_answers_no_accuracy(run_folders, truths, tmp_path):
         file["answers"][:] = [scores_of(network, val, row).argmax() for row in rows]
 
     assert accuracy(network, edited(val, tmp_path / "v.h5", right), 16, 3) == 1.0
-
-
-def test_bundled_weights_are_small_and_tell_answers_apart(tmp_path):
-    path = siamese.BASELINE.files / "siamese.safetensors"
-    assert path.stat().st_size < 2_000_000
-    card = load_weights(path, siamese.BASELINE.method)[1]
-    assert (card.labels, card.answers, card.settings.seed) == (1000, 3, 0)
-    assert card.iteration == card.settings.iterations
-    spec = SplitSpec(train=0, labeled=0, val=0, test=2, height=64, width=64, min_cube_pixels=0)
-    make_split(tmp_path / "split", spec)
-    write_submission(siamese.BASELINE, tmp_path / "split/iqtt-test.h5", tmp_path / "a.h5")
-    with h5py.File(tmp_path / "a.h5") as file:
-        assert len(np.unique(file["scores"][:])) == 6

@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 from baselines.rezende.answers import mesh_distance, mesh_scores, refined, rotations
 from baselines.rezende.network import METHOD, Card, Settings
 from baselines.rezende.sphere import icosphere
-from baselines.rezende.training import BASELINE
-from baselines.training.checkpoint import bundled, load_weights, new_state, save_weights
+from baselines.training.checkpoint import new_state, save_weights
 from baselines.training.questions import question_images
 from iqtt import open_questions
 
@@ -63,10 +62,3 @@ def test_an_equal_image_has_the_best_score(split):
     assert scores.shape == (1, 3)
     assert scores.isfinite().all()
     assert scores.argmax() == 2
-
-
-def test_bundled_weights_were_trained_without_labels():
-    model, card = load_weights(bundled(BASELINE.files, METHOD), METHOD)
-    assert (card.labels, card.iteration) == (0, card.settings.iterations)
-    mean, _ = model.encode(torch.rand(2, 3, card.settings.size, card.settings.size))
-    assert (mean[0] != mean[1]).any()

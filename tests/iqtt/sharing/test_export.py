@@ -10,7 +10,8 @@ from refusals import refused
 from iqtt import open_questions
 from iqtt.sharing.questions import QUESTIONS
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.sharing.export import ABOUT, FORMATS, write_export
+from scenegen.rooms.export.formats import DATA_FORMATS
+from scenegen.sharing.export import ABOUT, write_export
 from tests.support.loaders import VALUES, check_srgb
 
 TABLES = (("train", "labeled"), ("train", "unlabeled"), ("val", None), ("test", None))
@@ -77,7 +78,7 @@ def test_folders_are_known_by_their_split(splits, load, tmp_path):
         assert len(load(str(tmp_path / f"folder-{split}"), split=name)) > 0
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", DATA_FORMATS)
 def test_nothing_of_the_answers_beside_a_test_file_is_written(form, splits, tmp_path):
     """An export is the same where the file of the answers is not there."""
     (tmp_path / "alone").mkdir()

@@ -5,17 +5,17 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import nullcontext
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
 
 from metrics.intake import model_file
-from metrics.intake.model_file import ModelError, _with_types, opened_model
-from metrics.intake.model_runner import plain
+from metrics.intake.model_file import ModelError, opened_model
+from metrics.intake.model_runner import _answer, _loaded, loads, plain
+from metrics.intake.outputs import OutputError
 from metrics.intake.running import Call, run_model
+from metrics.intake.running import _answer as _answer_of
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from scenegen.camera import intrinsics
@@ -27,33 +27,14 @@ WALL = "{'depth_metric': np.full(image.shape[:2], 1.5)}"
 INFER = f"import numpy as np\ndef infer(image, intrinsics=None):\n    return {WALL}\n"
 
 
-class Here:
-    """A model without a process of its own, for what is made of its values."""
-
-    name = path = "my_model.py"
-    sha256, takes_batches, takes_intrinsics, named, metres = "", False, False, False, False
-    provenance: ClassVar[dict[str, str]] = {}
-
-    def __init__(self, text):
-        exec(text, vars(self))
-
-    def ask_provenance(self):
-        pass
-
-    def begin(self, function, where, *arguments):
-        value = _with_types(plain(vars(self)[function](*arguments)))
-        return lambda: value
-
-
 @pytest.fixture
 def run(truths, tmp_path):
     """Run the text of a model; return what was said. The submission is at `run.out`."""
 
-    def go(text, data=truths.rooms, load=None, keep=None, timeout=None, here=False, **call):
+    def go(text, data=truths.rooms, load=None, keep=None, timeout=None, **call):
         path = tmp_path / "my_model.py"
         path.write_text(text)
-        process = nullcontext(Here(text)) if here else None
-        with process or opened_model(path, load, timeout, go.notes.append) as model:
+        with opened_model(path, load, timeout, go.notes.append) as model:
             return run_model(
                 model, data, go.out, call=Call(**call), method="m", overwrite=True, keep=keep,
                 options=load,
@@ -75,7 +56,15 @@ SHAPES = {
 
 
 @pytest.mark.parametrize("name", SHAPES)
-def test_a_model_of_any_shape(name, run, truths):
+def test_a_model_of_any_shape(name, tmp_path):
+    path, image = tmp_path / "my_model.py", np.zeros((4, 6, 3), np.uint8)
+    path.write_text(SHAPES[name])
+    model = _loaded(str(path), {}, ())
+    assert (model.infer(image)["depth_metric"] == np.full((4, 6), 1.5)).all()
+
+
+@pytest.mark.parametrize("name", ["function", "batch"])
+def test_a_model_in_its_process(name, run, truths):
     assert run(SHAPES[name], batch=3) == "depth_metric of 8 rows"
     assert [p for p in validate(run.out, truths.rooms) if not p.is_hint] == []
     with open_predictions(run.out) as found:
@@ -113,63 +102,6 @@ def test_a_model_sees_developed_pictures_as_they_are(run, interior_path, tmp_pat
         np.testing.assert_array_equal(np.load(tmp_path / "seen.npy"), rooms[0].image)
 
 
-def returning(**keys):
-    values = ", ".join(f"{name!r}: {value}" for name, value in keys.items())
-    return f"""
-import numpy as np
-def infer(image):
-    d = np.full((32, 32), 2.0)
-    return {{{values}}}
-"""
-
-
-POINTS = "np.dstack([0 * d, 0 * d + 0.5, d])"
-
-
-@pytest.mark.parametrize(
-    ("keys", "kind", "alignment", "value"),
-    [
-        ({"depth_metric": "d.astype('f2')"}, "depth", "none", 2.0),
-        ({"depth_scale_invariant": "d[None, ..., None]"}, "depth", "scale", 2.0),
-        ({"depth_affine_invariant": "__import__('torch').tensor(d)"}, "depth", "scale_shift", 2.0),
-        ({"disparity_affine_invariant": "d.tolist()"}, "disparity", "scale_shift", 2.0),
-        ({"points_metric": POINTS, "depth_affine_invariant": "d"}, "points", "none", -2.0),
-        ({"points_affine_invariant": POINTS}, "points", "scale_shift", -2.0),
-        ({"depth_metric": "np.kron(d, np.ones((3, 3)))", "other": "'x'"}, "depth", "none", 2.0),
-    ],
-)
-def test_the_keys_say_what_is_predicted(keys, kind, alignment, value, run):
-    run(returning(**keys, normal="np.dstack([0 * d, 0 * d, -d])",
-                  intrinsics="np.array([[1.2, 0, .5], [0, 1.2, .5], [0, 0, 1]])"),
-        here=True)  # fmt: skip
-    with open_predictions(run.out) as found:
-        view = found.view(3)
-    assert (view.kind, view.alignment) == (kind, alignment)
-    last = view.geometry[..., -1] if kind == "points" else view.geometry
-    assert (last == value).all()
-    if kind == "points":
-        assert (view.geometry[..., 1] == -0.5).all()
-    assert (view.normal == [0.0, 0.0, 2.0]).all()
-    assert view.fov_y_degrees == pytest.approx(np.degrees(2 * np.arctan(0.5 / 1.2)))
-
-
-def test_another_key_may_be_taken(run):
-    text = returning(points_metric=POINTS, depth_scale_invariant="d + 1")
-    run(text, here=True, key="depth_scale_invariant")
-    with open_predictions(run.out) as found:
-        assert (found.kind, found.alignment, found.depth(0)[0, 0]) == ("depth", "scale", 3.0)
-
-
-def test_a_mask_takes_values_out(run):
-    text = returning(depth_metric="d + np.arange(32)", mask="np.arange(32) * (d > 0) > 3")
-    with pytest.raises(SceneGenError) as caught:
-        run(text, here=True)
-    assert "--missing nearest" in caught.value.hint
-    run(text, here=True, missing="nearest")
-    with open_predictions(run.out) as found:
-        assert found.depth(0)[5].tolist() == [6.0] * 4 + list(range(6, 34))
-
-
 # ---- resuming ----
 
 
@@ -178,7 +110,6 @@ def failing(folder, error="ValueError"):
     return f"""
 import numpy as np
 from pathlib import Path
-from typing import ClassVar
 def infer(image):
     count = Path({str(folder / "calls")!r})
     count.write_text((count.read_text() if count.exists() else "") + ".")
@@ -188,7 +119,7 @@ def infer(image):
 """
 
 
-@pytest.mark.parametrize("error", ["ValueError('no')", "KeyboardInterrupt", "SystemExit(3)"])
+@pytest.mark.parametrize("error", ["ValueError('no')", "KeyboardInterrupt"])
 def test_a_stop_loses_nothing(error, run, tmp_path):
     calls = tmp_path / "calls"
     text = failing(tmp_path, error)
@@ -201,42 +132,24 @@ def test_a_stop_loses_nothing(error, run, tmp_path):
         assert "5 rows are kept" in caught.value.hint
     assert run(text) == "depth_metric of 8 rows, 5 of them from an earlier run"
     assert calls.read_text() == "." * 9
-    resumed = run.out.read_bytes()
-    run(text)
-    assert run.out.read_bytes() == resumed
     assert not (tmp_path / "p.h5.rows").exists()
-
-
-def test_a_row_that_was_cut_off_is_done_again(run, tmp_path):
-    with pytest.raises(ModelError):
-        run(failing(tmp_path))
-    (tmp_path / "p.h5.rows" / "00000002.npz").write_bytes(b"PK")
-    run(failing(tmp_path))
-    assert (tmp_path / "calls").read_text() == "." * 10
-
-
-def test_rows_of_another_model_are_not_mixed_in_silence(run, tmp_path):
-    text = failing(tmp_path)
-    with pytest.raises(ModelError):
-        run(text)
-    other = text.replace("1.5", "2.5")
-    weights = tmp_path / "weights.pt"
-    for changed in ({"text": other}, {"text": text, "missing": "nearest"}, {"text": text}):
-        if changed == {"text": text}:
-            weights.write_bytes(b"other weights")
-        with pytest.raises(SceneGenError) as caught:
-            run(**changed)
-        assert caught.value.where == str(tmp_path / "p.h5.rows")
-    weights.unlink()
-    run(other, keep="resume")
     with open_predictions(run.out) as found:
-        assert [found.depth(i)[0, 0] for i in (4, 5)] == [1.5, 2.5]
-    (tmp_path / "calls").unlink()
-    with pytest.raises(ModelError):
-        run(text)
-    run(other, keep="restart")
-    with open_predictions(run.out) as found:
-        assert found.depth(4)[0, 0] == 2.5
+        assert [found.depth(row)[0, 0] for row in range(8)] == [1.5] * 8
+
+
+def test_rows_depend_on_the_model_and_on_weights_beside_it(tmp_path):
+    path, weights = tmp_path / "m.py", tmp_path / "weights.pt"
+
+    def digest(text):
+        path.write_text(text)
+        with opened_model(path) as model:
+            return model.sha256
+
+    first = digest(INFER)
+    assert digest(INFER) == first != digest(INFER + "\n")
+    assert Call(missing="nearest").settings != Call().settings
+    weights.write_bytes(b"weights")
+    assert digest(INFER) != first
 
 
 # ---- a process of its own ----
@@ -310,7 +223,6 @@ def test_what_ends_or_hangs_is_named_by_its_row_and_rows_are_kept(how, run, tmp_
     assert len(list((tmp_path / "p.h5.rows").glob("*.npz"))) == 5
     assert any("row 5" in note for note in run.notes) == ("hang" in how)
     assert gone(int((tmp_path / "group").read_text())), "the model, or what it has started, lives"
-    assert run(INFER, keep="resume") == "depth_metric of 8 rows, 5 of them from an earlier run"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals of Linux")
@@ -366,39 +278,44 @@ def test_values_arrive_as_they_are(value):
 
 # ---- refusals ----
 
-BAD = {
-    "syntax": ("def infer(image:\n", ["my_model.py, line 1"]),
-    "import": ("import no_such_package\n", ["my_model.py, line 1", "no_such_package"]),
-    "exit": ("\nimport sys; sys.exit(2)\n", ["my_model.py, line 2", "SystemExit"]),
-    "nothing": ("x = 1\n", ["infer"]),
-    "two classes": ("class A:\n  def infer(self, i): 0\nclass B(A): 0\n", ["A, B"]),
-    "load of nothing": ("def load(): return 3\n", ["infer"]),
-    "load raises": ("def load():\n  1 / 0\n", ["line 2", "load()", "ZeroDivisionError"]),
+BAD_FILES = {
+    "syntax": ("def infer(image:\n", 1, ""),
+    "import": ("import no_such_package\n", 1, "no_such_package"),
+    "exit": ("\nimport sys; sys.exit(2)\n", 2, "SystemExit"),
+    "load raises": ("def load():\n  1 / 0\n", 2, "ZeroDivisionError"),
+    "nothing": ("x = 1\n", None, "infer"),
+    "two classes": ("class A:\n  def infer(self, i): 0\nclass B(A): 0\n", None, "A, B"),
+    "load of nothing": ("def load(): return 3\n", None, "infer"),
+}
+BAD_CALLS = {
     "raises": ("def f(): [][1]\ndef infer(image): f()\n", ["line 1", "row 0", "IndexError"]),
     "arguments": ("def infer(): pass\n", ["row 0", "TypeError"]),
     "short batch": (INFER + "def infer_batch(images): return [infer(images[0])]\n", ["rows 0 to"]),
-}
-BAD_VALUES = {
-    "None": ("def infer(image): pass\n", ["row 0", "None"]),
+    "nothing": ("def infer(image): pass\n", ["row 0", "None"]),
     "an array": ("def infer(image): return image\n", ["row 0", "ndarray of shape (32, 32, 3)"]),
-    "other keys": (returning(depth="d"), ["row 0", "'depth'"]),
-    "text": (returning(depth_metric="'far'"), ["row 0", "depth_metric"]),
-    "shape": (returning(depth_metric="d[0]"), ["row 0", "depth_metric", "(32,)"]),
-    "channels first": (returning(points_metric=f"{POINTS}.transpose(2, 0, 1)"), ["(3, 32, 32)"]),
-    "NaN": (returning(depth_metric="d * np.nan"), ["row 0", "depth_metric"]),
-    "infinite": (returning(depth_metric="np.where(np.eye(32), np.inf, d)"), ["row 0: depth"]),
-    "behind": (returning(depth_metric="-d"), ["row 0: depth"]),
-    "mask": (returning(depth_metric="d", mask="d[1:] > 0"), ["row 0", "mask"]),
-    "camera": (returning(depth_metric="d", intrinsics="d"), ["row 0", "intrinsics"]),
-    "normal": (returning(depth_metric="d", normal="d"), ["row 0", "normal"]),
+    "infinite": (INFER.replace("1.5", "np.inf"), ["row 0"]),
+    "behind": (INFER.replace("1.5", "-1.5"), ["row 0: depth"]),
 }
 
 
-@pytest.mark.parametrize("name", [*BAD, *BAD_VALUES])
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_a_file_that_makes_no_model(name, tmp_path):
+    text, line, words = BAD_FILES[name]
+    path = str(tmp_path / "my_model.py")
+    Path(path).write_text(text)
+    answer = _answer(path, lambda: _loaded(path, {}, ()))
+    told = loads(answer[1:])
+    assert answer[:1] == b"-"
+    assert told.get("line") == line
+    assert ("unusable" in told) == (line is None)
+    assert words in str(told)
+
+
+@pytest.mark.parametrize("name", BAD_CALLS)
 def test_one_line_that_says_where(name, run):
-    text, words = (BAD | BAD_VALUES)[name]
+    text, words = BAD_CALLS[name]
     with pytest.raises(SceneGenError) as caught:
-        run(text, here=name in BAD_VALUES)
+        run(text)
     line = str(caught.value)
     assert len(line.splitlines()) == 1
     assert [word for word in words if word not in line] == [], line
@@ -428,23 +345,22 @@ def test_settings_that_it_takes(run):
 # ---- questions ----
 
 
-@pytest.mark.parametrize("value", ["2", "[0.5, 1.0, 2.0]", "np.array([1, 0, 9])", "np.int8(2)"])
+@pytest.mark.parametrize("value", ["2", "[0.5, 1.0, 2.0]"])
 def test_questions(value, run, truths):
     assert "6 questions" in run(
         "import numpy as np\ndef infer(reference, answers):\n"
         "    assert reference.shape == (32, 32, 3) and answers.shape == (3, 32, 32, 3)\n"
         f"    assert reference.dtype == answers.dtype == np.uint8\n    return {value}\n",
         truths.iqtt,
-        here=value != "2",
     )
     with open_predictions(run.out) as found:
         assert found.answers.tolist() == [2] * 6
-        assert (found.scores is None) == (value in ("2", "np.int8(2)"))
+        assert (found.scores is None) == (value == "2")
 
 
-@pytest.mark.parametrize("value", ["None", "3", "'B'", "[1.0, 2.0]", "[1.0, 2.0, float('nan')]"])
-def test_what_is_no_answer(value, run, truths, tmp_path):
-    with pytest.raises(SceneGenError, match="row 0"):
-        run(f"def infer(reference, answers): return {value}\n", truths.iqtt, here=True)
-    assert not run.out.exists()
-    assert not (tmp_path / "p.h5.rows").exists()
+def test_answers_of_many_kinds():
+    for value in (2, np.int8(2), np.array([1, 0, 9])):
+        np.testing.assert_array_equal(_answer_of(value, 3, "row 0"), value)
+    for value in (None, 3, -2, "B", [1.0, 2.0], [1.0, 2.0, np.nan]):
+        with pytest.raises(OutputError):
+            _answer_of(value, 3, "row 0")

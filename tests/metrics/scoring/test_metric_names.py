@@ -1,5 +1,6 @@
 """The table of names against the functions that make the scores, and against the docs."""
 
+import re
 from pathlib import Path
 from typing import get_args
 
@@ -20,8 +21,11 @@ from metrics.measures.surfaces.normals import normal_scores
 from metrics.measures.surfaces.points import local_point_scores, point_map_scores
 from metrics.scoring.metric_names import (
     ALL,
+    BASELINES,
     HEADLINE,
+    PRINTED,
     SKILLED,
+    TABLE,
     UnknownMetricError,
     in_order,
     markdown_table,
@@ -111,8 +115,36 @@ def test_names_that_are_derived():
     assert aligned.definition.startswith("`delta_1`: the same after the scale, at least 0, and")
     assert metric("derived_normal_within_30").higher_is_better
     assert metric("iqtt_accuracy").tasks == ("iqtt",)
-    for task, names in HEADLINE.items():
+    tasks = {name: metric(name).tasks for name in ("normal_mean_degrees", "flat_rmse", "silog")}
+    assert tasks == {
+        "normal_mean_degrees": ("rooms", "measured"), "flat_rmse": ("measured",),
+        "silog": ("rooms", "measured"),
+    }  # fmt: skip
+    derived = metric("derived_normal_mean_degrees")
+    assert (derived.tasks, derived.of, derived.lacking) == (("rooms",), "points", "planes")
+    assert (derived.redefined, metric("empty_room_chamfer").redefined) == (True, False)
+    for task, names in (*HEADLINE.items(), *PRINTED.items()):
         assert all(task in metric(name).tasks for name in names)
+    assert HEADLINE == {
+        "rooms": ("shape_error", "behind_depth_error", "relief_iou", "chamfer", "hausdorff",
+                  "mse_depth"),
+        "iqtt": ("iqtt_accuracy",),
+        "measured": ("abs_rel", "delta_1", "rmse", "silog"),
+    }  # fmt: skip
+    assert PRINTED["rooms"][:3] == ("abs_rel", "delta_1", "mse_depth")
+    roots = {"rmse", "rmse_log", "irmse", "normal_rmse_degrees"}
+    aligned = {name for name in ALL if name.startswith("rmse_after_")}
+    assert {n for n, m in ALL.items() if m.is_root} == roots | aligned | {
+        "derived_normal_rmse_degrees", "flat_rmse", "ramp_rmse",
+    }  # fmt: skip
+    behind = metric("behind_depth_error")
+    shown = {s: behind.baselines_shown(s) for s in ("no_view", "first_view", "scored_view")}
+    assert shown == {
+        "no_view": ["empty_room_"],
+        "first_view": ["empty_room_", "balls_", "blocks_"],
+        "scored_view": ["empty_room_", "cut_out_", "leaning_", "balls_", "blocks_"],
+    }
+    assert metric("shape_error").baselines_shown("no_view")[0] == "cut_out_"
 
 
 THRESHOLDS = "<threshold>", "", "0", "0.050", "5e-2", "-1", "1.2.3", "1e999", "٣"
@@ -142,3 +174,12 @@ def test_no_number_is_better_than_depth_at_the_camera():
         assert metric(name).worst(80.0) == far
         assert metric(name).worst(2.0) == metric(name).worst() == near
     assert metric("iqtt_accuracy").worst(80.0) == 0.0
+
+
+def test_every_metric_has_its_formula_on_the_page_of_definitions():
+    page = (DOCS.parent / "definitions.md").read_text()
+    families = {m.name: re.sub(r"([\d.]+|<threshold>)$", "", m.name) for m in TABLE}
+    formulas = [{name, f"{family}<x>", f"{family}k"} for name, family in families.items()]
+    assert [names for names in formulas if not any(name in page for name in names)] == []
+    of_rooms = BASELINES.keys() - {"flat_", "ramp_"}
+    assert [begins for begins in of_rooms if begins not in page] == []

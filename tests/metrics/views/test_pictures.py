@@ -17,7 +17,8 @@ from metrics.views.pictures import (
     TRUE_DEPTH,
     TRUE_NORMALS,
     data_url,
-    view_pictures,
+    depth_pictures,
+    normal_pictures,
 )
 
 LARGEST_ERROR = [252, 254, 164]
@@ -32,7 +33,8 @@ def test_pictures_show_depth_on_the_truths_scale_and_errors_up_to_a_tenth_of_it(
     true = np.array([[1.0, 2.0], [3.0, np.nan]])
     predicted = np.array([[1.0, 2.2], [0.0, 5.0]])
     up = np.tile([0.0, 1.0, 0.0], (2, 2, 1))
-    pictures = view_pictures(np.zeros((2, 2, 3)), true, predicted, up, 50.0, 7 * up)
+    pictures = depth_pictures(np.zeros((2, 2, 3), np.uint8), true, predicted)
+    pictures += normal_pictures(true, predicted, up, 50.0, 7 * up)
     shown = {picture.caption: decoded(picture.url) for picture in pictures}
     assert {p.caption: p.ends for p in pictures if p.bar == "error"} == {ERROR: ("0", "≥ 0.2")}
     assert {p.ends for p in pictures if p.bar == "depth"} == {("1.000", "3.000")}
@@ -50,9 +52,9 @@ def test_any_prediction_can_be_drawn(value):
     true = np.full((4, 4), 2.0)
     normal = np.full((4, 4, 3), value)
     for given in (None, normal):
-        pictures = view_pictures(
-            np.ones((4, 4, 3)), true, np.full((4, 4), value), normal, 50.0, given
-        )
+        predicted = np.full((4, 4), value)
+        pictures = depth_pictures(np.ones((4, 4, 3), np.uint8), true, predicted)
+        pictures += normal_pictures(true, predicted, normal, 50.0, given)
         urls = {picture.caption: picture.url for picture in pictures}
         assert (DERIVED_NORMALS in urls) == (given is None)
         assert decoded(urls[ERROR])[0, 0].tolist() == LARGEST_ERROR

@@ -77,8 +77,8 @@ def test_what_bench_score_prints_is_short_and_begins_with_warnings():
         == "m on rooms.h5: 4 images, 2 scenes   alignment: none (metric)   unit: scene unit"
     )
     assert lines[1].startswith("WARNING  not comparable: ")
-    table = [line.split()[0] for line in lines if line.startswith("  ") and "[" in line]
-    assert table[:2] == ["abs_rel", "delta_1"]
+    table = [line.split()[:2] for line in lines if line.startswith("  ") and "[" in line]
+    assert table[:2] == [["abs_rel", "down"], ["delta_1", "up"]]
     notes = notes_of(scores)
     assert len(notes) == 5
     assert "none 0.2000 | scale 0.2000;" in next(n for n in notes if n.startswith("abs_rel by"))

@@ -5,6 +5,8 @@ import sys
 
 import pytest
 
+from scenegen.rooms.export.formats import ROW_FORMATS
+
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="uses Linux system calls")
 PR_CAPBSET_DROP, CAP_DAC_OVERRIDE = 24, 1
 UNPRIVILEGED = f"""
@@ -69,7 +71,7 @@ def test_a_full_disk_is_one_clear_line(
         assert list(disk.iterdir()) == []
 
 
-@pytest.mark.parametrize("form", ["exr", "png", "ply", "obj"])
+@pytest.mark.parametrize("form", ROW_FORMATS)
 def test_an_export_to_a_full_disk_is_one_clear_line(
     run, small_disk, check_refusal, rooms_path, form
 ):

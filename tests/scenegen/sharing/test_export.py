@@ -12,7 +12,8 @@ from PIL import Image
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.layout import FIELDS
-from scenegen.sharing.export import ABOUT, FORMATS, write_export
+from scenegen.rooms.export.formats import DATA_FORMATS
+from scenegen.sharing.export import ABOUT, write_export
 from scenegen.sharing.rooms import ROOMS
 from tests.support.loaders import VALUES, check_srgb
 
@@ -50,7 +51,7 @@ def check_rows(found, path, rows, column):
             assert np.isnan(rooms.read("depth", 0)).any(), "or NaN is not tested"
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", DATA_FORMATS)
 def test_every_value_in_datasets(form, path, load, tmp_path):
     """From a list of files, and from their folder."""
     made = export_rows(path, form, tmp_path / "out", encoding="linear", rows_per_file=4)
@@ -66,7 +67,7 @@ def test_every_value_in_datasets(form, path, load, tmp_path):
     assert picture == ("Image" if path.name == "set.h5" else "Array3D")
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", DATA_FORMATS)
 def test_pictures_are_srgb_and_decode_to_the_stored_radiance(form, holey_set, load, tmp_path):
     made = export_rows(holey_set, form, tmp_path / "out", rows_per_file=99)
     about = json.loads((tmp_path / "out" / ABOUT).read_text())["columns"]["image"]
@@ -117,7 +118,7 @@ def test_archives_tell_nothing_of_their_maker(path, tmp_path):
     assert [m.name for m in members[:5]] == sorted(m.name for m in members[:5])
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", DATA_FORMATS)
 def test_the_same_bytes_again_and_an_older_folder_is_replaced(form, path, tmp_path):
     def contents():
         return {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()}
@@ -155,7 +156,7 @@ def no_text(file):
     file["object/model"][5, 0] = b"\xff"
 
 
-@pytest.mark.parametrize("form", FORMATS)
+@pytest.mark.parametrize("form", DATA_FORMATS)
 @pytest.mark.parametrize(("name", "damage"), [("depth", shortened), ("object/model", no_text)])
 def test_a_damaged_row_leaves_nothing(name, damage, form, damaged, tmp_path):
     path = damaged(damage)

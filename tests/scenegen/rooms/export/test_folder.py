@@ -14,7 +14,8 @@ from scenegen.common.errors import SpecError
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.rooms.export.bop import diameter
 from scenegen.rooms.export.encoding import Encoding
-from scenegen.rooms.export.folder import CONVENTIONS, FOLDER_FORMATS, export_folder
+from scenegen.rooms.export.folder import CONVENTIONS, export_folder
+from scenegen.rooms.export.formats import FOLDER_FORMATS
 from tests.support.loaders import check_srgb
 
 ROWS = [0, 1, 5, 3, 2]  # both views of scenes 0 and 1, one of scene 2

@@ -15,7 +15,8 @@ from scenegen.common.errors import SpecError
 from scenegen.description.names import SHAPE_NAMES
 from scenegen.objects.scene_mesh import scene_parts
 from scenegen.rooms.export.encoding import Encoding
-from scenegen.rooms.export.single import PICTURES, export_paths, export_room
+from scenegen.rooms.export.formats import PICTURES, ROW_FORMATS
+from scenegen.rooms.export.single import export_paths, export_room
 
 
 @pytest.fixture(scope="module")
@@ -259,7 +260,7 @@ def test_meshes_of_100_rooms_give_the_depth(tmp_path, make_rooms):
     assert check_depth_by_embree(path, mesh) == set(SHAPE_NAMES)
 
 
-@pytest.mark.parametrize("form", ["exr", "png", "ply", "obj"])
+@pytest.mark.parametrize("form", ROW_FORMATS)
 def test_existing_files_are_kept_without_overwrite(tmp_path, simple, form):
     paths = export(simple, tmp_path, form)
     for path in paths:

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 import cli
 from iqtt.quiz.page import quiz_name
-from metrics.intake.quiz_answers import QuizError, import_quiz, read_answers
+from metrics.intake.answers.quiz_answers import QuizError, import_quiz, read_answers
 from metrics.scoring.evaluate import score
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import open_predictions

@@ -55,7 +55,7 @@ def ask(
                 continue_on_fail=True,
                 retry_attempts=0,
                 retry_immediate=False,
-                display="none",
+                display="rich" if sys.stderr.isatty() else "none",
                 **given,
             )
     except PrerequisiteError as error:

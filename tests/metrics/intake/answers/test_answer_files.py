@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from metrics.intake.answer_files import import_answers
+from metrics.intake.answers.answer_files import import_answers
 from metrics.submissions.reader import open_predictions
 from scenegen.common.errors import SceneGenError
 

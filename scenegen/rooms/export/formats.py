@@ -1,0 +1,62 @@
+"""The formats that rows are exported to, a record each: options, docs and tests derive from them.
+
+A record names its writer, so that a list of formats imports nothing heavy.
+"""
+
+import importlib
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+HERE = "scenegen.rooms.export"
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format of exports.
+
+    Attributes:
+        name: as `--format` takes it.
+        holds: what its files hold, for the help.
+        writer: module and function that write it: of ROW_FORMATS, of which the function returns
+            what writes each file of `single.export_paths`; of FOLDER_FORMATS `folder.Writer`; of
+            DATA_FORMATS a writer of `scenegen.sharing.formats`.
+        endings: of the files of a row, or of a file of many rows; () for a tool's folder.
+    """
+
+    name: str
+    holds: str
+    writer: str
+    endings: tuple[str, ...] = ()
+
+    def load_writer(self) -> Any:
+        """Import the function that writes it."""
+        module, _, function = self.writer.partition(":")
+        return getattr(importlib.import_module(module), function)
+
+
+def _by_name(formats: Iterable[Format]) -> dict[str, Format]:
+    return {form.name: form for form in formats}
+
+
+PICTURES = ("image", "depth", "normal", "object_id")  # a PNG file of each
+ROW_FORMATS = _by_name((
+    Format("exr", "all channels", f"{HERE}.single:exr_writers", (".exr",)),
+    Format("png", "a picture of each channel, and a JSON file that says how to decode them",
+           f"{HERE}.single:png_writers", (*(f"-{name}.png" for name in PICTURES), ".json")),
+    Format("ply", "the surfels", f"{HERE}.single:ply_writers", (".ply",)),
+    Format("obj", "the scene's mesh", f"{HERE}.single:obj_writers", (".obj", ".mtl")),
+))  # fmt: skip
+DATA_FORMATS = _by_name((
+    Format("parquet", "all values of many rows, for data loaders",
+           "scenegen.sharing.formats:write_parquet", (".parquet",)),
+    Format("webdataset", "the same as tar files", "scenegen.sharing.formats:write_tar", (".tar",)),
+))  # fmt: skip
+FOLDER_FORMATS = _by_name(
+    Format(name, f"the folder that {tool} reads", f"{HERE}.{name}:write")
+    for name, tool in (
+        ("nerfstudio", "nerfstudio"), ("colmap", "COLMAP"), ("bop", "BOP's toolkit"),
+        ("coco", "a reader of COCO"), ("moge", "MoGe"),
+    )
+)  # fmt: skip
+FORMATS = ROW_FORMATS | DATA_FORMATS | FOLDER_FORMATS
