@@ -34,7 +34,7 @@ JOBS = {
     "interiors": Job(
         [f"scenegen render --preset interiors --n 5000 --spp 1 --no-denoise {SMALL}"], 1400
     ),
-    "shapes": Job([f"scenegen render --n 50000 {SMALL}"], 700),
+    "shapes": Job([f"scenegen render --n 50000 {SMALL}"], 500),
     "objects": Job([f"scenegen render --preset shapenet --n 20000 {SMALL}"], 900),
     "questions": Job(
         [
