@@ -150,6 +150,7 @@ def write_recording(
     import rerun as rr
 
     panels, timeline, count = dict[str, list[str]](), SCENE, 0
+    first: View | None = None
     with written_beside(path, overwrite) as temporary:
         recording = rr.RecordingStream("pix2shape-bench", send_properties=False)
         try:
@@ -160,8 +161,9 @@ def write_recording(
                 _start_scene(recording, scene)
                 timeline = next(iter(scene.steps))
                 panels |= {view.name: _record_view(recording, view) for view in scene.views}
-                count += len(scene.views)
-            recording.send_blueprint(_layout(panels, timeline))
+                first, count = first or scene.views[0], count + len(scene.views)
+            if first is not None:
+                recording.send_blueprint(_layout(panels, timeline, first))
         finally:
             recording.disconnect()
     return count
@@ -181,10 +183,7 @@ def _start_scene(recording: "RecordingStream", scene: RecordedScene) -> None:
         for place in ("pixels", "world/cameras", "world/truth", "world/prediction"):
             recording.log(f"{place}/{name}", rr.Clear(recursive=True))
     recording.log("about", rr.TextDocument(scene.text, media_type="text/markdown"))
-    first = scene.views[0]
-    across = np.ptp([0.0, *first.truth.points[first.truth.in_view][:, 0]])
-    right = GAP * across * first.world_from_camera[:3, 0]
-    recording.log("world/prediction", rr.Transform3D(translation=right))
+    recording.log("world/prediction", rr.Transform3D(translation=_beside(scene.views[0])))
     ids = np.arange(len(scene.objects) + 1)
     labels = ["the room", *map(printable, scene.objects)]
     classes = list(zip(ids.tolist(), labels, id_colors(ids).tolist(), strict=True))
@@ -226,6 +225,12 @@ def _record_view(recording: "RecordingStream", view: View) -> list[str]:
     return list(pictures)
 
 
+def _beside(view: View) -> Array:
+    """Return by how much predictions are moved to the right of a view, to be beside the truth."""
+    across = np.ptp([0.0, *view.truth.points[view.truth.in_view][:, 0]])
+    return np.asarray(GAP * across * view.world_from_camera[:3, 0])
+
+
 def _normal_picture(normal: Array, pose: Array) -> "Image":
     """Return normals in the world frame, so that a surface has one colour in all views."""
     from rerun import Image
@@ -243,10 +248,21 @@ def error_colors(error: Array) -> Array:
     return np.asarray(colors[..., :3])
 
 
-def _layout(panels: Mapping[str, Sequence[str]], timeline: str) -> "Blueprint":
-    """Return what the viewer shows where: 3D, the pictures of each view, and the text."""
+def _layout(panels: Mapping[str, Sequence[str]], timeline: str, first: View) -> "Blueprint":
+    """Return what the viewer shows where: 3D, the pictures of each view, and the text.
+
+    The eye is behind the camera of the first view, and sees a prediction beside the truth.
+    """
     import rerun.blueprint as rrb
 
+    place, back = first.world_from_camera[:3, 3], first.world_from_camera[:3, 2]
+    distance = float(np.median([1.0, *first.truth.depth[first.truth.in_view]]))
+    aside = 0.5 * _beside(first) if first.prediction is not None else np.zeros(3)
+    eye = rrb.EyeControls3D(
+        position=place + aside + distance * back,
+        look_target=place + aside - distance * back,
+        eye_up=(0.0, 1.0, 0.0),
+    )
     tabs = [
         rrb.Grid(*(rrb.Spatial2DView(origin=f"pixels/{v}/{p}", name=p) for p in pictures), name=v)
         for v, pictures in sorted(panels.items(), key=lambda panel: (len(panel[0]), panel[0]))
@@ -254,7 +270,7 @@ def _layout(panels: Mapping[str, Sequence[str]], timeline: str) -> "Blueprint":
     about = rrb.TextDocumentView(origin="about")
     return rrb.Blueprint(
         rrb.Horizontal(
-            rrb.Spatial3DView(origin="world", name="points and cameras"),
+            rrb.Spatial3DView(origin="world", name="points and cameras", eye_controls=eye),
             rrb.Vertical(rrb.Tabs(*tabs), about, row_shares=[3, 1]),
         ),
         rrb.TimePanel(timeline=timeline, state="collapsed", play_state="paused"),

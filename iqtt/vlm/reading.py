@@ -97,11 +97,6 @@ def _quoted(text: str) -> str:
     return json.dumps(line if len(line) <= QUOTE else f"...{line[3 - QUOTE :]}", ensure_ascii=False)
 
 
-def is_thought_alone(text: str) -> bool:
-    """Return whether a text holds nothing outside of the model's thoughts."""
-    return not any(replies(plain_characters(text)))
-
-
 def _letters(text: str, offered: str, cut_off: bool) -> set[str]:
     """Return the letters that a reply answers with: one, several where it is unclear, or none."""
     for part in reversed(declared_parts(text)):

@@ -63,7 +63,7 @@ def ask(
         "max_retries": tries - 1, "max_connections": concurrency, "model_base_url": base_url,
     }
     log = read_returned(ask_rows(model, log_dir, task, settings))
-    for note in filter(None, (log.failure_note, log.unread_note, log.tokens_note)):
+    for note in log.notes:
         print_line(f"{log.path}: {note}")
     write_returned(out, file, log, overwrite=overwrite)
     print_line(f"{out}: answers of {log.model}; next: bench score {out}")

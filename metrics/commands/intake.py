@@ -191,7 +191,7 @@ def _import_answers(
             log = read_returned(answers)
             texts["notes"] = texts["notes"] or log.settings
             count = write_returned(out, truth, log, method=method or "", **texts)
-            for note in filter(None, (log.failure_note, log.unread_note)):
+            for note in log.notes:
                 print_line(f"{answers}: {note}")
         else:
             name = method or Path(answers).stem

@@ -21,8 +21,8 @@ NEAREST = 1e-6  # smaller depths are raised to this
 def boundary_scores(depth: Array, true_depth: Array, mask: Array) -> dict[str, float]:
     """Return `boundary_f1` and `boundary_recall` of planar depth, (H, W) each.
 
-    At each ratio, a pixel and a neighbour of at least so much larger depth are a boundary, in each
-    of four directions.
+    At each ratio, a pixel and a neighbour whose depth is larger by more than that are a boundary,
+    in each of four directions.
 
     - boundary_f1: the published score. Precision and recall are means over the directions, F1 is
       their harmonic mean, and all are 0 where nothing can be counted. So the truth scores below 1

@@ -91,19 +91,20 @@ class Log:
         return f"{len(self.failures)} of {rows} samples failed in {self.harness}: {told}"
 
     @property
-    def tokens_note(self) -> str:
-        """How many tokens were used; "" where the log does not tell."""
-        return f"{self.tokens[0]:,} + {self.tokens[1]:,} tokens" if any(self.tokens) else ""
-
-    @property
-    def unread_note(self) -> str:
-        """The share of answers without a letter, and the first texts of these."""
+    def notes(self) -> list[str]:
+        """What to tell of a log: failures, replies without a letter or an end, and tokens."""
         unread = [
             (f"{answer.question}-{answer.rotation}", answer.text)
             for answer in self.answers
             if answer.answer == ABSTAINED
         ]
-        return unread_note(unread, len(self.answers))
+        notes = [self.failure_note, unread_note(unread, len(self.answers))]
+        cut_off = sum(answer.outcome == "cut off" for answer in self.answers)
+        if cut_off:
+            notes.append(f"{cut_off} of {len(self.answers)} replies reached the limit of tokens")
+        if any(self.tokens):
+            notes.append(f"{self.tokens[0]:,} + {self.tokens[1]:,} tokens")
+        return list(filter(None, notes))
 
 
 def is_log(path: str | Path) -> bool:

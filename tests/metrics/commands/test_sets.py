@@ -52,6 +52,11 @@ def test_the_table_is_consistent():
     assert {"rooms-1", "rooms-shadows-1", "rooms-128-1", "objects-1", "rotation-1"} <= set(sets())
     tests = [test for some in sets().values() for test in some]
     assert all(len(test.digest) == 64 and len(test.pictures) in (0, 64) for test in tests)
+    for test in tests:
+        words = test.command.split()
+        option = "--n" if test.task == "rooms" else "--test"
+        views = words[words.index("--views") + 1].split(",") if "--views" in words else [0]
+        assert test.rows == int(words[words.index(option) + 1]) * len(views), test.name
 
 
 def test_a_set_is_made_once_and_known(tiny, run_command, tmp_path):

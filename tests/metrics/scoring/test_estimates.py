@@ -5,7 +5,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from metrics.scoring.estimates import ROUNDING, Bootstrap, floor_column, skills
+from metrics.scoring.estimates import (
+    ROUNDING,
+    Bootstrap,
+    floor_column,
+    pooled_estimates,
+    skills,
+)
 from metrics.scoring.metric_names import SKILLED
 
 SCENES = 6
@@ -100,3 +106,22 @@ def test_the_floor_is_the_lowest_over_scenes_not_over_images():
 def test_the_floor_is_the_best_guess(name, floors, best):
     items = {begin + name: np.full(SCENES, value) for begin, value in floors.items()}
     assert floor_column(items, np.arange(SCENES), name) == best + name
+
+
+def test_the_spread_of_runs_is_that_of_a_sample():
+    runs = {"abs_rel": np.array([[0.1, 0.1], [0.3, 0.3]])}
+    (score,) = pooled_estimates(runs, np.arange(2), np.ones(2), Bootstrap(0, 200)).values()
+    assert (score.value, score.std) == (
+        pytest.approx(0.2),
+        pytest.approx(np.std([0.1, 0.3], ddof=1)),
+    )
+
+
+def test_another_seed_gives_another_interval():
+    rng = np.random.default_rng(1)
+    items = columns(chamfer=rng.random(SCENES), empty_room_chamfer=rng.random(SCENES))
+    first, other = (
+        skills(items, np.arange(SCENES), Bootstrap(seed, 200))["chamfer"] for seed in (0, 1)
+    )
+    assert first.value == other.value
+    assert first.high != other.high

@@ -1,5 +1,7 @@
 """Objects, relief and skill: independent computations, guesses that must not win, empty rooms."""
 
+from dataclasses import replace
+
 import h5py
 import numpy as np
 import pytest
@@ -11,13 +13,20 @@ from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
-from metrics.scoring.image_scores import reference_of, score_prediction, true_relief
-from metrics.scoring.metric_names import CUT_OUT, SKILLED, metric
+from metrics.scoring.image_scores import (
+    FirstView,
+    _guesses,
+    reference_of,
+    score_prediction,
+    true_relief,
+)
+from metrics.scoring.metric_names import CUT_OUT, LEANING, SKILLED, metric
 from metrics.scoring.rows import other_scenes
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.truths import TrueView
 from metrics.views.score_tables import partner_sentences
+from scenegen.camera import back_project
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
@@ -234,3 +243,43 @@ def test_a_truth_whose_objects_have_no_shape_is_refused(folder, tmp_path, value,
         score([folder / "noisy-0.h5"], truth)
     assert caught.value.where == f"{truth}: object/shape, row 3"
     assert told in caught.value.found
+
+
+@pytest.fixture(scope="module")
+def closed(interior_path):
+    """The view of a closed room, and the depth of its walls."""
+    with RoomsFile(interior_path) as rooms:
+        room, size = rooms[0], np.asarray(rooms.room_size(0), float)
+    names = ("depth", "normal", "object_id", "fov_y_degrees", "world_from_camera")
+    view = TrueView(*(getattr(room, name) for name in names), size)
+    empty, _ = empty_room(view.world_from_camera, view.fov_y_degrees, *view.depth.shape, size)
+    return view, empty
+
+
+def test_leaning_cut_outs_lean_half_as_much_as_the_walls(closed):
+    view, empty = closed
+    first = FirstView(view.depth, view.object_id, view.world_from_camera)
+    guesses = _guesses(view, empty, view.object_id > 0, first)
+    lean = guesses[LEANING] - guesses[CUT_OUT]
+    for number in np.unique(view.object_id[view.object_id > 0]):
+        own = view.object_id == number
+        assert lean[own] == pytest.approx((empty[own] - np.median(empty[own])) / 2.0)
+    assert np.ptp(lean) > 0.1
+
+
+def test_true_points_of_a_closed_room_are_perfect_and_the_worst_are_as_far_as_it(closed):
+    view, _ = closed
+    points = back_project(np.nan_to_num(view.depth, nan=1.0), view.fov_y_degrees)
+    pose = view.world_from_camera.copy()
+    pose[:3, 3] *= 10.0
+    far = replace(
+        view, depth=10.0 * view.depth, world_from_camera=pose, room_size=10.0 * view.room_size
+    )
+    for name, truth, value, expected in (
+        ("relief_correlation", view, points, 1.0),
+        ("chamfer", view, points, 0.0),
+        ("chamfer", far, np.full_like(points, np.nan), np.nanmax(far.depth)),
+    ):
+        predicted = PredictedView("points", "none", value, None, None)
+        scores = score_prediction(predicted, truth, reference_of(truth), None, "penalise").scores
+        assert scores[name] == pytest.approx(expected, abs=1e-6), name

@@ -93,6 +93,7 @@ SPOILED = [
     *((CAMERA, put(CAMERA, (ROW, 0, 3), v)) for v in (np.nan, np.inf)),
     *((CAMERA, put(CAMERA, (ROW, 0, 0), v)) for v in (np.nan, 1e300, 0.0)),
     (CAMERA, put(CAMERA, (ROW, 3, 3), 2.0)),
+    (CAMERA, values(CAMERA, lambda v: v * np.diag([1.001, 1.001, 1.001, 1.0]).sum(0))),
     (CAMERA, values(CAMERA, lambda v: v * np.array([-1, 1, 1, 1]))),  # turns space inside out
 ]
 

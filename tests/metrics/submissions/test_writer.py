@@ -105,6 +105,7 @@ REFUSED = {
     "infinite": ((1, spoiled(np.inf)), "row 1: depth", "(3, 4)"),
     "beyond float32": ((1, spoiled(1e39)), "row 1: depth", "(3, 4)"),
     "negative z": ((1, -DEPTH), "row 1: depth", "at or below 0"),
+    "zeros": ((1, 0.0 * DEPTH), "row 1: depth", "at or below 0"),
     "normal NaN": ((1, DEPTH, spoiled(np.nan, (5, 6, 0), GOOD_NORMAL)), "row 1: normal", "(5, 6)"),
     "normal zero": ((1, DEPTH, spoiled(0.0, (5, 6), GOOD_NORMAL)), "row 1: normal", "length 0"),
     "no normal": ((1, DEPTH, None), "row 1: normal", "none"),

@@ -1,0 +1,166 @@
+"""Edges of the measures, by hand; `scoring/test_definitions` has the formulas on whole files."""
+
+import numpy as np
+import pytest
+
+from metrics.measures.answers import ABSTAINED, answers_from_scores
+from metrics.measures.behind import MARGIN, hidden_from
+from metrics.measures.boundaries import RATIOS, boundary_scores
+from metrics.measures.checks import MeasureError
+from metrics.measures.objects import LEAST_PIXELS, object_means, single_objects, size_range
+from metrics.measures.relief import depth_along, empty_room, relief_scores
+from metrics.measures.shape import inside_objects
+from metrics.measures.skill import skill_intervals
+from metrics.measures.statistics import pooled_means
+from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, f_score
+from scenegen.camera import Camera
+from scenegen.rooms.reader import RoomsFile
+
+RNG = np.random.default_rng(5)
+
+
+@pytest.mark.parametrize("ids", [[0] * 20, [], [5] * (LEAST_PIXELS - 1)])
+def test_without_objects_there_is_no_score(ids):
+    none = np.array(ids, np.int8)
+    scores = single_objects(none, np.ones(len(none)), np.ones(len(none)))
+    assert not any(map(len, scores.values()))
+    assert len(object_means(scores)) == 4
+    assert all(np.isnan(list(object_means(scores).values())))
+
+
+def test_sizes_are_ranges_of_percent():
+    shares = (0.0, 0.0099, 0.01, 0.05, 0.08, 1.0)
+    assert list(map(size_range, shares)) == ["0-1", "0-1", "1-2", "4-8", "8-100", "8-100"]
+
+
+@pytest.mark.parametrize(
+    ("small", "inside"), [((6, 6), 16), ((5, 5), 0), ((6, 5), 0), ((7, 6), 20)]
+)
+def test_objects_with_16_pixels_inside_count(small, inside):
+    ids = np.zeros((12, 12), np.int8)
+    ids[2 : 2 + small[0], 2 : 2 + small[1]] = 1
+    assert (inside_objects(ids) == 1).sum() == inside
+
+
+def test_the_highest_score_is_the_answer_and_a_tie_is_none():
+    scores = [[0.1, 0.7, 0.2], [3, 1, 2], [-5.0, -4.0, -3.0], [1, 1, 0], [0, 2, 2], [1, 1, 1]]
+    assert answers_from_scores(scores).tolist() == [1, 0, 2, *[ABSTAINED] * 3]
+    assert answers_from_scores([[0.2, 0.1], [0.0, 3.0], [1, 1]]).tolist() == [0, 1, ABSTAINED]
+    for candidates in (1, 4):
+        with pytest.raises(MeasureError):
+            answers_from_scores(np.eye(4)[:, :candidates])
+
+
+def test_boundaries_that_lack_a_direction_count_as_published():
+    """One step, in one direction of four and at five ratios of ten: the truth itself has .21."""
+    flat, whole = np.ones((6, 6)), np.ones((6, 6), bool)
+    step = np.where(np.arange(6) < 3, 1.0, 1.1) * flat
+    expected = 0.25 * RATIOS[RATIOS < 1.1].sum() / RATIOS.sum()
+    for scale in (1.0, 7.0):
+        scores = boundary_scores(scale * step, step, whole)
+        assert scores == {"boundary_f1": pytest.approx(expected), "boundary_recall": 1.0}
+    assert set(boundary_scores(flat, step, whole).values()) == {0.0}
+    nothing = boundary_scores(step, flat, whole)
+    assert nothing["boundary_f1"] == 0.0
+    assert np.isnan(nothing["boundary_recall"])
+
+
+def test_a_step_of_exactly_a_ratio_is_not_above_it():
+    step = np.where(np.arange(6) < 3, 1.0, RATIOS[4]) * np.ones((6, 1))
+    scores = boundary_scores(step, step, np.ones_like(step, bool))
+    assert scores["boundary_f1"] == pytest.approx(0.25 * RATIOS[:4].sum() / RATIOS.sum())
+
+
+def test_a_hole_in_the_mask_is_no_boundary():
+    flat, mask = np.full((5, 5), 2.0), np.ones((5, 5), bool)
+    mask[2, 2] = False
+    scores = boundary_scores(flat, flat, mask)
+    assert scores["boundary_f1"] == 0.0
+    assert np.isnan(scores["boundary_recall"])
+
+
+def test_recall_is_of_all_true_boundaries_and_needs_no_precision():
+    """Noise adds boundaries of its own, and hides none."""
+    true = np.where(np.arange(12) < 6, 1.0, 2.0) * np.ones((8, 1))
+    said = true * RNG.choice([1.0, 1.3], true.shape, p=[0.7, 0.3])
+    scores = boundary_scores(said, true, np.ones_like(true, bool))
+    assert scores["boundary_recall"] == pytest.approx(np.mean(said[:, 6] / said[:, 5] > 1.25))
+    assert scores["boundary_f1"] < 0.5 * scores["boundary_recall"]
+
+
+def test_points_farther_than_the_margin_behind_a_wall_are_hidden():
+    wall, toward = np.full((8, 8), 2.0), np.tile([0.0, 0.0, 1.0], (2, 1))
+    points = np.array([[0.0, 0.0, -2.0 - 0.5 * MARGIN], [0.0, 0.0, -2.0 - 1.5 * MARGIN]])
+    assert MARGIN == 0.01
+    assert hidden_from(points, toward, wall, np.eye(4), 40.0).tolist() == [False, True]
+    assert hidden_from(points, -toward, wall, np.eye(4), 40.0).tolist() == [True, True]
+
+
+def test_an_empty_room_is_the_truth_wherever_no_object_is(rooms_path):
+    with RoomsFile(rooms_path) as rooms:
+        for room in rooms:
+            size = rooms.spec.height, rooms.spec.width
+            depth, normal = empty_room(room.world_from_camera, room.fov_y_degrees, *size)
+            wall = room.object_id == 0
+            assert depth[wall] == pytest.approx(room.depth[wall], rel=1e-5)
+            assert normal[wall] == pytest.approx(room.normal[wall], abs=1e-5)
+            assert (depth[room.object_id > 0] > room.depth[room.object_id > 0] - 1e-4).all()
+
+
+@pytest.mark.parametrize("toward", [-1.0, 1.0])
+def test_normals_of_closed_rooms_face_the_camera(toward):
+    """From the middle of a room of edge 2, along -z and +z."""
+    camera = np.eye(4)
+    camera[:3, :3] = np.diag([-toward, 1.0, -toward])
+    camera[:3, 3] = 1.0
+    depth, normal = empty_room(camera, 40.0, 1, 1, np.full(3, 2.0))
+    assert depth.item() == pytest.approx(1.0)
+    assert normal[0, 0] == pytest.approx([0.0, 0.0, 1.0])
+
+
+def test_where_a_line_meets_no_plane_the_depth_is_the_farthest_of_others():
+    camera = np.diag([-1.0, 1.0, -1.0, 1.0])  # looks along +z
+    camera[:3, 3] = 1.0
+    lines = np.array([[0.0, 0.0, -1.0], [0.0, -1.0, -1.0], [0.0, -0.5, -1.0]])
+    assert depth_along(lines, camera).tolist() == [2.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("position", "target"),
+    [
+        ((-1.0, -1.0, -1.0), (0.0, 0.0, 0.1)),
+        ((2.0,) * 3, (9.0,) * 3),
+        ((-1.0, 1.0, 1.0), (-9.0, 1.1, 1.0)),
+    ],
+)
+def test_a_camera_that_sees_no_plane_still_has_a_depth(position, target):
+    """Behind the walls, or turned away; no file of ours has one, but a stranger's may."""
+    depth, normal = empty_room(Camera(position, target, 40.0).world_from_camera, 40.0, 4, 6)
+    assert (np.isfinite(depth) & (depth > 0.0)).all()
+    assert np.isfinite(normal).all()
+
+
+def test_a_correlation_never_exceeds_1():
+    for seed in range(200):
+        true = np.abs(np.random.default_rng(seed).normal(0.0, 0.3, 9)) + 0.1
+        assert relief_scores(3.0 * true, true)["relief_correlation"] <= 1.0
+
+
+@pytest.mark.parametrize(("forward", "reverse"), [([0.0], [0.5]), ([0.5], [0.0])])
+def test_an_f_score_counts_strictly_nearer_points_both_ways(forward, reverse):
+    assert f_score(NearestDistances(np.array(forward), np.array(reverse)), 0.5) == 0.0
+    assert f_score(NearestDistances(np.array(forward), np.array(reverse)), 0.6) == 1.0
+
+
+def test_a_root_mean_square_over_clusters_is_that_of_the_delta_method():
+    means = pooled_means([1.0, 3.0], [0, 1], np.ones(2), True)
+    assert means == pytest.approx(np.sqrt(5.0) + np.array([-1.0, 1.0]) * 2.0 / np.sqrt(5.0))
+    assert pooled_means([1.0, 3.0], [0, 1], np.array([3.0, 1.0]), False).mean() == 1.5
+
+
+def test_every_interval_of_a_skill_holds_the_skill():
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        scores, floors = rng.gamma(0.5, 1.0, (2, 9, 1))
+        low, high = skill_intervals(scores, floors, seed, 100, confidence=0.2)
+        assert low <= (floors.mean() - scores.mean()) / floors.mean() <= high
