@@ -12,9 +12,9 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks.markdown import table
+from scenegen.common.cgroup import processors
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.sets.cluster import LOCAL, connected
-from scenegen.files.sets.workers import processors
 from scenegen.rendering.sameness import renderer_identity
 from scenegen.rooms.make import make_dataset
 
@@ -42,7 +42,7 @@ def scheduling(count: int, workers: int) -> float:
     """Return the seconds that the scheduler takes for each of many calls that do nothing."""
     with connected(LOCAL, workers, partial(renderer_identity, "auto")) as cluster:
         start = time.perf_counter()
-        calls = sum(1 for _ in cluster.in_any_order(abs, range(count)))
+        calls = sum(1 for _ in cluster.results(abs, range(count)))
         return (time.perf_counter() - start) / calls
 
 

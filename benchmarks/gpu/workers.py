@@ -10,9 +10,9 @@ import time
 from pathlib import Path
 
 from benchmarks.markdown import table
+from scenegen.common.cgroup import processors
 from scenegen.common.errors import BackendError
 from scenegen.description.presets import preset_spec
-from scenegen.files.sets.workers import processors
 from scenegen.rendering.backend import select_variant
 from scenegen.rooms.make import make_dataset
 

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from typing import Any
 
 from benchmarks.markdown import table
+from scenegen.common.cgroup import processors
 from scenegen.description.presets import preset_spec
-from scenegen.files.sets.workers import processors
 from scenegen.objects.catalogue import objects_of
 from scenegen.rendering.backend import point_to_llvm
 from scenegen.rendering.packing import SceneBatch, pack_arrays

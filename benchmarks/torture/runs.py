@@ -25,7 +25,7 @@ QUESTIONS = (
 EVENTS = {
     "packing": ("scenegen.rooms.render:pack_rooms", 25),
     "writing": ("scenegen.files.table:Table.extend_packed", 25),
-    "manifest": ("scenegen.files.sets.making:write_manifest", 10),
+    "part": ("scenegen.files.sets.making:move", 18),
     "replace": ("os:replace", 18),
     "unlink": ("os:unlink", 18),
 }
@@ -94,7 +94,10 @@ class Torture:
 
     def under_way(self, process: Process, shards: int = 1) -> bool:
         """Wait until some shards are there; return whether the process still runs."""
-        while len(list(self.where.glob("rooms-*"))) < shards and process.poll() is None:
+        while (
+            len(list(self.where.glob(".rooms.h5.parts/rooms-*"))) < shards
+            and process.poll() is None
+        ):
             time.sleep(0.02)
         return process.poll() is None
 

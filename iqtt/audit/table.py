@@ -194,7 +194,8 @@ def read_table(
     if cluster is None:
         opening = lambda: nullcontext(questions)  # noqa: E731
     scan = partial(_scan_images, opening, chunk, background, measured)
-    for parts, digest in map(scan, tasks) if cluster is None else cluster.in_order(scan, tasks):
+    scanned = map(scan, tasks) if cluster is None else cluster.results(scan, tasks, _told)
+    for parts, digest in scanned:
         scans += parts
         digests_of_images.append(digest)
         progress(sum(len(part[0]) for part in parts))
@@ -240,6 +241,10 @@ def _opened(table: AuditTable) -> list[OpenFile]:
     """Return the open file of a table, and that of its answers if it is another one."""
     beside = table.questions.beside
     return [table.questions.opened, *([] if beside is None else [beside.opened])]
+
+
+def _told(rows: range) -> str:
+    return f"statistics of questions {rows[0]} to {rows[-1]}"
 
 
 def _scan_images(

@@ -233,15 +233,13 @@ def verify(
 ) -> None:
     """Check all files of a split in FOLDER, and make some questions again from the seed.
 
-    With a manifest the SHA-256 of every file is checked, and that every question is there once.
     Exits with 1 if a check fails. `iqtt audit` proves that the answers are right.
     """
     from iqtt.files.verify import verify_split
     from iqtt.questions.specs import secret_seed as read_seed
 
     seed = None if secret_seed is None else read_seed(secret_seed)
-    with progress_bar(None, "question") as bar:
-        checks = verify_split(folder, items, device, seed, bar.update)
+    checks = verify_split(folder, items, device, seed)
     ctx.exit(print_checks(folder, checks))
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from iqtt.files.reader import QuestionsFile
-from iqtt.files.split import MANIFEST, split_part, split_plan
+from iqtt.files.split import ALL_FILES, split_part, split_plan
 from iqtt.files.work import QuestionsWork
 from iqtt.questions.distractors import Pools, make_pools
 from iqtt.questions.specs import SUITE, SplitSpec
@@ -17,9 +17,9 @@ from iqtt.render import DEFAULT_BATCH
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
 from scenegen.files.new_file import EXISTS, check_place
-from scenegen.files.places import as_place, check_store, is_remote
+from scenegen.files.places import as_place, check_store, is_remote, remove_folder
 from scenegen.files.sets.cluster import Cluster
-from scenegen.files.sets.making import make_set
+from scenegen.files.sets.making import check_request, make_set, write_request
 from scenegen.files.sets.plan import Part
 from scenegen.files.sets.sets import merge_file
 from scenegen.rendering.backend import select_variant, versions
@@ -78,7 +78,7 @@ def make_split(
     with _folder(as_place(folder)) as place:
         work = QuestionsWork(pools or make_pools(spec), batch, device, compression)
         make_set(
-            place / MANIFEST, plan, work, shard_size,
+            place, plan, work, shard_size,
             workers=workers or useful_workers(count * (1 + spec.answers), variant),
             cluster=cluster, overwrite=overwrite, progress=progress, note=tally.add,
         )  # fmt: skip
@@ -103,25 +103,58 @@ def make_suite(
         name: replace(spec, distractors=kind, answers=answers)
         for name, (kind, answers) in SUITE.items()
     }
-    tally, complete = Tally(), 0
-    with _folder(as_place(folder)) as home:
+    tally = Tally()
+    with _folder(as_place(folder)) as home, _suite_begun(home, spec, overwrite, **options) as kept:
         pools = {name: make_pools(of_split) for name, of_split in specs.items()}
         for name, of_split in specs.items():
             how: dict[str, Any] = {"pools": pools.pop(name), "overwrite": overwrite, **options}
             try:
                 tally.add(make_split(home / name, of_split, **how))
             except FileExistsError:
-                complete += 1
-        if complete == len(specs):
-            raise FileExistsError(errno.EEXIST, EXISTS, str(home))
+                if not kept:
+                    raise
     return tally
+
+
+@contextmanager
+def _suite_begun(
+    home: Path,
+    spec: SplitSpec,
+    overwrite: bool,
+    device: str = "auto",
+    compression: str = "gzip",
+    secret: bool = False,
+    shard_size: int = SHARD_SIZE,
+    **_: Any,
+) -> Iterator[bool]:
+    """Record the request of a suite until it is complete; give whether an earlier run began it.
+
+    Raises FileExistsError where splits are there that it did not begin, and as `check_request`.
+    """
+    record = home / ".suite.parts"
+    renderer = {"variant": select_variant(device), **versions()}
+    request = split_plan(spec, renderer, compression, "", secret).request(shard_size)
+
+    def begun() -> bool:
+        return any((home / name / ALL_FILES[0]).exists() for name in SUITE)
+
+    kept = check_request(record, request, overwrite)
+    if begun() and not (kept or overwrite):
+        raise FileExistsError(errno.EEXIST, EXISTS, str(home))
+    try:
+        write_request(record, request)
+        yield kept
+        remove_folder(record)
+    finally:
+        if not begun():
+            remove_folder(record)
 
 
 @contextmanager
 def _folder(folder: Path) -> Iterator[Path]:
     """Make a folder unless it is there; it goes again if nothing is in it when the block ends."""
     if is_remote(folder):
-        check_store(folder / MANIFEST)
+        check_store(folder / ALL_FILES[0])
         yield folder
         return
     check_place(folder)

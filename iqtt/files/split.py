@@ -27,7 +27,6 @@ FILES = {
     "test": ("iqtt-test.h5", ANSWERS),
 }  # of images, and of what is known of the questions
 ALL_FILES = tuple(name for split in SPLITS for name in FILES[split])
-MANIFEST = "iqtt.manifest.json"
 # What tells questions apart; the answer is where the kind of distractor is -1.
 FINGERPRINTED = ("cubes", "world_from_shape", "light_position", "light_color", "distractor_kind")
 

@@ -11,7 +11,7 @@ import h5py
 
 from iqtt.files.layout import FORMAT, ROOT_TEXTS, named
 from iqtt.files.reader import QuestionsFile, table_names
-from iqtt.files.split import ANSWERS, FILES, MANIFEST
+from iqtt.files.split import ANSWERS, FILES
 from iqtt.questions.specs import SPLITS, SplitSpec
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.attributes import read_root
@@ -107,17 +107,11 @@ def _beside_images(file: h5py.File) -> list[str]:
 
 
 def handed_out(tables: Sequence[QuestionsFile]) -> list[tuple[Path, str]]:
-    """Return the files of the tables of a split, and what each of them holds.
-
-    The manifest lists the file of the test answers, and is handed out with that alone.
-    """
+    """Return the files of the tables of a split, and what each of them holds."""
     answers = [table.beside.opened for table in tables if table.beside is not None]
     holds = {table.opened: f"questions: {table.split}" for table in tables}
     holds |= dict.fromkeys(answers, "answers to the test questions")
     files: list[tuple[Path, str]] = []
     for opened, meaning in holds.items():
         files += with_shards(opened, meaning)
-    manifest = tables[0].path.with_name(MANIFEST)
-    if answers and manifest.is_file():
-        files.append((manifest, "manifest"))
     return files

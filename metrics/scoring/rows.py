@@ -26,10 +26,11 @@ from metrics.scoring.truth_digests import RowDigests, view_digests
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import Identity, RoomPredictions, on_any_machine, open_predictions
 from metrics.submissions.truths import read_true_view
+from scenegen.common.cgroup import processors
 from scenegen.common.threads import one_thread
 from scenegen.files.pool import LostWorkerError
 from scenegen.files.sets.cluster import Cluster
-from scenegen.files.sets.workers import in_processes, processors
+from scenegen.files.sets.workers import in_processes
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
@@ -279,11 +280,18 @@ def _scored_here(
 def _in_processes(job: Job, chunks: Sequence[Array], processes: int) -> Iterator[ScoredRows]:
     """Yield what `RowScorer.score` gives for the chunks, in their order."""
     try:
-        yield from in_processes(functools.partial(_score_in_worker, job), chunks, processes)
+        yield from in_processes(functools.partial(_score_in_worker, job), chunks, processes, _told)
     except LostWorkerError as error:
-        hint = "memory may be short: take fewer --processes"
-        what = f"a process that scores ended ({error.found})"
-        raise ScoringError(job[0][0][0], what, "", hint) from error
+        hint = error.hint.replace("--workers", "--processes")
+        raise ScoringError(f"{job[0][0][0]}: {error.where}", error.found, "", hint) from error
+
+
+def _told(rows: Array) -> str:
+    return f"scores of rows {rows[0]} to {rows[-1]}"
+
+
+def _told_of_several(chunks: Sequence[Array]) -> str:
+    return _told(np.concatenate(chunks))
 
 
 def _on_cluster(job: Job, chunks: Sequence[Array], cluster: Cluster) -> Iterator[ScoredRows]:
@@ -291,7 +299,7 @@ def _on_cluster(job: Job, chunks: Sequence[Array], cluster: Cluster) -> Iterator
     submissions = tuple((path, on_any_machine(identity)) for path, identity in job[0])
     apart = (submissions, *job[1:])
     tasks = [chunks[i : i + CHUNKS] for i in range(0, len(chunks), CHUNKS)]
-    for scored in cluster.in_order(functools.partial(_score_apart, apart), tasks):
+    for scored in cluster.results(functools.partial(_score_apart, apart), tasks, _told_of_several):
         yield from scored
 
 

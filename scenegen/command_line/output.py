@@ -62,8 +62,8 @@ def on_scheduler(
     if scheduler is None:
         yield None
         return
+    from scenegen.common.cgroup import processors
     from scenegen.files.sets.cluster import connected
-    from scenegen.files.sets.workers import processors
 
     with connected(
         scheduler, workers or processors(), versions, lambda text: print_line(text, err=True)

@@ -269,18 +269,16 @@ def _set_bytes(out: str) -> int:
 
 @contextmanager
 def _told_how_to_go_on(out: str) -> Iterator[None]:
-    """Say which shards are complete, and what to do, where the block is ended from outside."""
-    from scenegen.common.errors import FileFormatError
-    from scenegen.files.sets.manifest import manifest_path, read_manifest
+    """Say how many shards are complete, and what to do, where the block is ended from outside."""
+    from scenegen.files.places import as_place
+    from scenegen.files.sets.making import complete_parts, parts_folder
 
     try:
         yield
     except KeyboardInterrupt:
-        with suppress(OSError, FileFormatError):
-            found = read_manifest(manifest_path(out))
-            if not found.complete:
-                done, all_ = len(found.shards), -(-found.count // found.shard_size)
-                told = f"{done} of {all_} shards are complete; the same command goes on"
+        with suppress(OSError):
+            if done := len(complete_parts(parts_folder(as_place(out)))):
+                told = f"{done} shards are complete; the same command goes on"
                 print_line(f"{out}: {told}", err=True)
         raise
 

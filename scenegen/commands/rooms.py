@@ -95,33 +95,24 @@ def verify(
     """Check digests and values of every row of a file, and render some rows again.
 
     Of a file without its truth, check the digests of what it holds.
-    Of a folder with a manifest, check the SHA-256 of every file and that every row is there once.
     Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
     rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
     """
-    from scenegen.files.sets.manifest import Manifest, manifests_in
-    from scenegen.files.verify import Check
-    from scenegen.layout import FORMAT_NAME
     from scenegen.objects.sources import file_objects
     from scenegen.rendering.pictures.places import ASSETS as PLACES
     from scenegen.rooms.reader import RoomsFile
-    from scenegen.rooms.verify import verify_file, verify_set, verify_withheld
+    from scenegen.rooms.verify import verify_file, verify_withheld
 
     PLACES.use(materials, environment)
-    paths: list[tuple[Path, Manifest | None]] = [(Path(file), None)]
-    if Path(file).is_dir():
-        sets = manifests_in(Path(file), FORMAT_NAME)
-        paths = [(place.with_name(manifest.files[0]), manifest) for place, manifest in sets]
-    checks: list[Check] = []
-    for path, manifest in paths:
-        with RoomsFile(path) as rooms, progress_bar(len(rooms), "image") as bar:
-            if not rooms.has_truth:
-                checks += verify_withheld(rooms, bar.update)
-                continue
+    path = Path(file)
+    with RoomsFile(path) as rooms, progress_bar(len(rooms), "image") as bar:
+        if rooms.has_truth:
             if items:
                 _check_images(path, rooms.spec)
-            how = (items, device, file_objects(rooms.spec, **meshes), bar.update)
-            checks += verify_set(rooms, manifest, *how) if manifest else verify_file(rooms, *how)
+            objects = file_objects(rooms.spec, **meshes)
+            checks = verify_file(rooms, items, device, objects, bar.update)
+        else:
+            checks = verify_withheld(rooms, bar.update)
     ctx.exit(print_checks(file, checks))
 
 

@@ -22,7 +22,7 @@ from scenegen.common.records import (
     normalise,
     to_json,
 )
-from scenegen.description.names import FAMILY_NAMES, FURNITURE_NAMES, SHAPE_NAMES
+from scenegen.description.names import DRAWN_SHAPES, FAMILY_NAMES, FURNITURE_NAMES, SHAPE_NAMES
 
 if TYPE_CHECKING:
     import numpy as np
@@ -103,7 +103,7 @@ class RoomSpec:
         (1, 3), "Number of objects in a scene", limits=(0, 100)
     )  # fmt: skip
     source: str = setting("shapes", choices=(*BUILT_IN, *FOLDERS))
-    shapes: tuple[str, ...] = setting(SHAPE_NAMES)
+    shapes: tuple[str, ...] = setting(DRAWN_SHAPES)
     object_split: str = setting("all", choices=SPLITS)
     listing: str = setting("")
     views: tuple[float, ...] = setting(

@@ -11,6 +11,7 @@ It does not depend on how the values are stored (chunks, compression).
 import hashlib
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -83,6 +84,12 @@ def fingerprint(request: str, digests: Mapping[str, str]) -> str:
     It does not depend on how values are stored, or on the machine that rendered.
     """
     return joint_digest({"request": hashlib.sha256(request.encode()).hexdigest(), **digests})
+
+
+def file_sha256(path: Path) -> str:
+    """Return the SHA-256 of all bytes of a file, as hex. Raises OSError."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def seal(file: h5py.File) -> None:

@@ -3,13 +3,12 @@
 import errno
 import os
 import shutil
-import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from scenegen.common.signals import held_back
-from scenegen.files.places import as_place, is_remote, upload
+from scenegen.files.places import as_place, is_remote, scratch, upload
 from scenegen.files.sets.workspace import remove_leftovers, workspace
 
 EXISTS = "exists already; say --overwrite to replace it"
@@ -27,8 +26,7 @@ def written_beside(path: str | Path, overwrite: bool = False) -> Iterator[Path]:
     """
     check_writable(path, overwrite)
     path = as_place(path)
-    parent = Path(tempfile.gettempdir()) if is_remote(path) else path.parent
-    with workspace(parent, path) as folder:
+    with workspace(scratch(path.parent), path) as folder:
         temporary = folder / f"file{path.suffix[:8]}"
         yield temporary
         check_writable(path, overwrite)

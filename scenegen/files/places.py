@@ -8,6 +8,8 @@ import hashlib
 import os
 import re
 import secrets
+import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
@@ -62,6 +64,32 @@ def listing(folder: Path) -> list[Path]:
         return list(folder.iterdir())
     except (FileNotFoundError, NotADirectoryError):
         return []
+
+
+def scratch(folder: Path) -> Path:
+    """Return where files for a folder are written: there, or here for a remote one."""
+    return Path(tempfile.gettempdir()) if is_remote(folder) else folder
+
+
+def move(file: Path, place: Path) -> None:
+    """Give a file its place, and replace an older one; a store copies it. Raises OSError."""
+    remote = cast("Any", place)
+    if not is_remote(place):
+        os.replace(file, place)
+    elif is_remote(file):
+        with _told_by_store(place):
+            remote.fs.mv(cast("Any", file).path, remote.path)
+    else:
+        upload(file, place)
+
+
+def remove_folder(folder: Path) -> None:
+    """Remove a folder and all that is in it, if it is there."""
+    if not is_remote(folder):
+        shutil.rmtree(folder, ignore_errors=True)
+        return
+    for path in listing(folder):
+        path.unlink(missing_ok=True)
 
 
 def files_below(folder: Path, pattern: str = "*") -> list[Path]:

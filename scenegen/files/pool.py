@@ -3,6 +3,9 @@
 They are started by `subprocess`, as those of `multiprocessing` import the main module of the
 caller: a script without `if __name__ == "__main__":` would run once more in each. They end with the
 process that started them, however it ends, and their libraries use one thread.
+
+A task whose process a signal ended is done again once, alone: a crash may depend on where memory
+lies, and memory may be short while other tasks are done.
 """
 
 import os
@@ -18,6 +21,7 @@ from contextlib import contextmanager, suppress
 from queue import SimpleQueue
 from typing import IO, Any
 
+from scenegen.common.cgroup import oom_kills
 from scenegen.common.errors import SceneGenError
 from scenegen.common.signals import without_interrupts
 from scenegen.common.threads import ONE_THREAD
@@ -25,10 +29,21 @@ from scenegen.common.threads import ONE_THREAD
 SIZE = 8  # bytes of a message's length, before it
 PATIENCE = 5.0  # seconds, until a process that closed its pipes has ended
 END = b""  # the message after the last task
+SIGNAL = "signal"  # how `ended` begins
 
 
 class LostWorkerError(SceneGenError):
     """A process ended by itself while it did a task."""
+
+    @property
+    def by_signal(self) -> bool:
+        """Whether a signal ended it."""
+        return self.found.startswith(SIGNAL)
+
+    def of(self, what: str) -> "LostWorkerError":
+        """Return the error of a second process that ended while it made the same rows."""
+        where = f"{what}: the process that makes them ended twice"
+        return LostWorkerError(where, self.found, "", self.hint)
 
 
 class Pool:
@@ -37,17 +52,26 @@ class Pool:
     A process that ended is replaced when the next task comes.
     """
 
-    def __init__(self, count: int, function: Callable[[Any], Any]) -> None:
-        """Take the function of all tasks, which is pickled once for each process."""
+    def __init__(
+        self, count: int, function: Callable[[Any], Any], told: Callable[[Any], str] = str
+    ) -> None:
+        """Take the function of all tasks, which is pickled once for each process.
+
+        Args:
+            told: says what a task makes, for errors.
+        """
+        self._told = told
         self._function = pickle.dumps(function)
         self._threads = ThreadPoolExecutor(count, thread_name_prefix="worker")
         self._idle: list[Process] = []
         self._started: list[Process] = []
         self._lock, self._killed = threading.Lock(), False
+        self._turns = threading.Condition()
+        self._busy = self._alone = 0  # tasks that are done; those that wait to be done alone, too
 
     def submit(self, task: Any) -> Future[Any]:
         """Return the future of the function's result; its error may be a LostWorkerError."""
-        return self._threads.submit(self._do, task)
+        return self._threads.submit(self.do, task)
 
     def close(self) -> None:
         """Wait for all tasks, and for the end of the processes."""
@@ -64,17 +88,49 @@ class Pool:
                 process.kill()
         self.close()
 
-    def _do(self, task: Any) -> Any:
+    def do(self, task: Any) -> Any:
+        """Return what the future of `submit` would, in this thread."""
         message = pickle.dumps(task)
+        try:
+            with self._turn(alone=False):
+                succeeded, result = self._answer(message)
+        except LostWorkerError as error:
+            if not error.by_signal:
+                raise
+            with self._turn(alone=True):
+                while self._idle:  # they hold memory
+                    self._idle.pop().end()
+                try:
+                    succeeded, result = self._answer(message)
+                except LostWorkerError as again:
+                    raise again.of(self._told(task)) from error
+        if not succeeded:
+            raise result
+        return result
+
+    @contextmanager
+    def _turn(self, alone: bool) -> Iterator[None]:
+        """Wait until a task may be done: beside others, or alone, which comes first."""
+        with self._turns:
+            self._alone += alone
+            self._turns.wait_for(lambda: not self._busy if alone else not self._alone)
+            self._busy += 1
+        try:
+            yield
+        finally:
+            with self._turns:
+                self._busy -= 1
+                self._alone -= alone
+                self._turns.notify_all()
+
+    def _answer(self, message: bytes) -> tuple[bool, Any]:
         try:
             process = self._idle.pop()
         except IndexError:
             process = self._start()
-        succeeded, result = process.answer(message)
+        answer = process.answer(message)
         self._idle.append(process)
-        if not succeeded:
-            raise result
-        return result
+        return answer
 
     def _start(self) -> "Process":
         with self._lock:
@@ -100,6 +156,7 @@ class Process:
         command = python_command(f"from {__name__} import serve; serve()")
         pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         environment = {**os.environ, **ONE_THREAD}
+        self._oom_kills = oom_kills()
         try:
             with without_interrupts():
                 self._popen = subprocess.Popen(command, **pipes, pass_fds=files, env=environment)
@@ -125,7 +182,7 @@ class Process:
         assert self._popen.stdin is not None
         try:
             _write(self._popen.stdin, message)
-        except OSError:  # it has closed the pipe, as it ends
+        except (OSError, ValueError):  # it has closed the pipe, as it ends, or `_lost` has
             raise self._lost() from None
 
     def heard(self) -> tuple[bool, Any]:
@@ -133,7 +190,7 @@ class Process:
         assert self._popen.stdout is not None
         try:
             answer = _read(self._popen.stdout)
-        except (OSError, EOFError):
+        except (OSError, ValueError, EOFError):
             raise self._lost() from None
         succeeded, result = pickle.loads(answer)
         return succeeded, result
@@ -142,13 +199,19 @@ class Process:
         with suppress(subprocess.TimeoutExpired):
             self._popen.wait(PATIENCE)
         self.kill()
-        what, hint = "A worker process ended", "memory may be short: use fewer --workers"
-        return LostWorkerError(what, ended(self._popen.wait()), "", hint)
+        code = self._popen.wait()
+        self.end()
+        hint = ""
+        if oom_kills() > self._oom_kills:
+            hint = "memory ran out, as the kernel says: use fewer --workers"
+        elif code == -getattr(signal, "SIGKILL", 0):
+            hint = "memory may be short: use fewer --workers"
+        return LostWorkerError("A worker process ended", ended(code), "", hint)
 
     def end(self) -> None:
         """Let it end by itself where it lives, wait for that, and close the pipes."""
         assert self._popen.stdin is not None
-        with suppress(OSError):
+        with suppress(OSError, ValueError):  # it is gone, or its pipes are closed
             _write(self._popen.stdin, END)
         with suppress(OSError), self._popen:
             pass
@@ -168,15 +231,17 @@ def ended(code: int) -> str:
     if code >= 0:
         return f"exit code {code}"
     try:
-        return f"signal {-code}, {signal.Signals(-code).name}"
+        return f"{SIGNAL} {-code}, {signal.Signals(-code).name}"
     except ValueError:  # of real time
-        return f"signal {-code}"
+        return f"{SIGNAL} {-code}"
 
 
 @contextmanager
-def worker_pool(count: int, function: Callable[[Any], Any]) -> Iterator[Pool]:
+def worker_pool(
+    count: int, function: Callable[[Any], Any], told: Callable[[Any], str] = str
+) -> Iterator[Pool]:
     """Open a pool. The block waits for all tasks at its end; where it raises, they are killed."""
-    pool = Pool(count, function)
+    pool = Pool(count, function, told)
     try:
         yield pool
     except BaseException:

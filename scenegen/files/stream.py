@@ -15,7 +15,7 @@ import tempfile
 import weakref
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import replace
 from itertools import accumulate, chain, count, cycle, islice
 from types import MappingProxyType
@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
 from scenegen.common.records import check
-from scenegen.files.pool import Process
+from scenegen.files.pool import LostWorkerError, Process
 from scenegen.files.schema import Column
 
 if TYPE_CHECKING:
@@ -57,8 +57,8 @@ class RowStream(Base):
     """Endless batches of rows, dicts of arrays (B, ...). See `RoomStream` and `QuestionStream`.
 
     Every loop begins at row `start`, or where `load_state_dict` says. It raises what the makers
-    raise, and LostWorkerError where a process ended. Where torch is imported, this is an
-    `IterableDataset`; torch is not imported here.
+    raise, and LostWorkerError where a process ended, twice for the same batch if by a signal. Where
+    torch is imported, this is an `IterableDataset`; torch is not imported here.
 
     Attributes:
         columns: what the arrays are: `schema.Column`s with unit, frame and meaning, by field.
@@ -211,10 +211,16 @@ class RowStream(Base):
         memory, owner = _Memory(self, _unnamed_file()), os.getpid()
         waiting = [deque[int]() for _ in range(processes)]
         started: list[Process] = []
+        step, taken = shares * processes, [0] * processes  # batches that each process has made
 
-        def ask(which: int) -> None:
-            waiting[which].append(memory.free_slot())
-            started[which].ask(pickle.dumps(waiting[which][-1]))
+        def begin(which: int) -> None:
+            """Start a process that makes the batches that were not taken yet."""
+            started[which:] = [Process([memory.file]), *started[which + 1 :]]
+            row = first + taken[which] * step * self.batch
+            part = (row, share + shares * which, step, processes * readers)
+            started[which].ask(pickle.dumps(_Filler(self, part, memory.file)))
+            for slot in waiting[which]:
+                started[which].ask(pickle.dumps(slot))
 
         def answer(which: int) -> Any:
             succeeded, result = started[which].heard()
@@ -222,20 +228,35 @@ class RowStream(Base):
                 raise result
             return result
 
+        def rows_of_next(which: int) -> int:
+            """Wait for a batch; where a signal ended its process, another one makes it again."""
+            try:
+                return int(answer(which))
+            except LostWorkerError as error:
+                if not error.by_signal:
+                    raise
+            try:
+                begin(which)
+                answer(which)
+                return int(answer(which))
+            except LostWorkerError as error:
+                row = first + (taken[which] * step + share + shares * which) * self.batch
+                raise error.of(f"rows {row} to {row + self.batch - 1}") from None
+
         try:
             for which in range(processes):
-                started.append(Process([memory.file]))
-                part = (first, share + shares * which, shares * processes, processes * readers)
-                started[which].ask(pickle.dumps(_Filler(self, part, memory.file)))
-                for _ in range(AHEAD):
-                    ask(which)
+                waiting[which].extend(memory.free_slot() for _ in range(AHEAD))
+                begin(which)
             for which in range(processes):
                 answer(which)  # that it is ready
             for which in cycle(range(processes)):
-                rows, slot = answer(which), waiting[which].popleft()
+                rows, slot = rows_of_next(which), waiting[which].popleft()
                 if not rows:
                     return
-                ask(which)
+                taken[which] += 1
+                waiting[which].append(memory.free_slot())
+                with suppress(LostWorkerError):  # `rows_of_next` meets it
+                    started[which].ask(pickle.dumps(waiting[which][-1]))
                 yield memory.arrays(slot, rows)
         finally:
             if os.getpid() == owner:  # not in a fork

@@ -21,11 +21,11 @@ import numpy as np
 from isal import isal_zlib
 from numpy.typing import NDArray
 
+from scenegen.common.cgroup import processors
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
 from scenegen.files.content import SHA256, ColumnDigest, row_digest
 from scenegen.files.schema import Column, name_axes
-from scenegen.files.sets.workers import processors
 
 Array = NDArray[Any]
 COMPRESSIONS = ("gzip", "lzf", "none")

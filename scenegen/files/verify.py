@@ -3,14 +3,12 @@
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from scenegen.files.content import ColumnDigest
 from scenegen.files.rows import RowBlock, RowFile, content_problems
-from scenegen.files.sets.manifest import Manifest, wrong_files
 from scenegen.files.sets.shards import OpenFile
 
 SHOWN = 5  # problems that a check names; of more it gives the number
@@ -62,24 +60,6 @@ def content_check(name: str, file: OpenFile, digests: Mapping[str, str]) -> Chec
     """Check that values and attributes are those that were written; `digests` as there."""
     problems = content_problems(file, digests)
     return listed_check(name, "every value and attribute as written, by SHA-256", problems)
-
-
-def manifest_checks(
-    folder: Path, manifest: Manifest, progress: Callable[[int], Any]
-) -> list[Check]:
-    """Check that a set is complete, and every byte of its files by their SHA-256.
-
-    `progress` is called with the number of rows of each file that was read. Raises OSError.
-    """
-    checked = f"SHA-256 of {len(manifest.shards)} files"
-    missing = [] if manifest.complete else ["the set is not complete"]
-    wrong = wrong_files(folder, manifest.shards, progress)
-    return [
-        listed_check("manifest", "every file is complete", missing),
-        listed_check(
-            "checksums", checked, [f"{file} {problem}" for file, problem in wrong.items()]
-        ),
-    ]
 
 
 def spread_rows(count: int, items: int) -> list[int]:

@@ -149,17 +149,5 @@ def _teapot() -> UnitShape:
 
 
 _BUILDERS: dict[str, Callable[[], UnitShape]] = {
-    "box": _box,
-    "sphere": _sphere,
-    "cone": _cone,
-    "torus": _torus,
-    "cylinder": _cylinder,
-    "teapot": _teapot,
-    "capsule": _capsule,
-    "pyramid": _pyramid,
-    "prism": _prism,
-    "tetrahedron": _tetrahedron,
-    "octahedron": _octahedron,
-    "dodecahedron": _dodecahedron,
-    "icosahedron": _icosahedron,
+    name: globals()[f"_{name}"] for name in SHAPE_NAMES
 }

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.common.cgroup import processors
 from scenegen.common.errors import BackendError
 from scenegen.description.specs import Request
-from scenegen.files.sets.workers import processors
 from scenegen.objects.catalogue import face_count
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering.backend import HOW_TO_GET_LLVM, select_variant

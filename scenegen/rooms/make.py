@@ -11,7 +11,6 @@ from scenegen.files.places import as_place
 from scenegen.files.row_file import writer_name
 from scenegen.files.sets.cluster import Cluster
 from scenegen.files.sets.making import make_set
-from scenegen.files.sets.manifest import manifest_path
 from scenegen.files.sets.plan import Bundle, Mark, Part, Plan, Sheet
 from scenegen.files.sets.sets import merge_file
 from scenegen.layout import (
@@ -88,7 +87,7 @@ def make_dataset(
     work = RoomsWork(spec, batch, device, objects, compression, MEMBER_STORE.folder,
                      (ASSETS.materials, ASSETS.environment))  # fmt: skip
     make_set(
-        manifest_path(place), plan, work, shard_size,
+        place.parent, plan, work, shard_size,
         workers=workers or useful_workers(count * views, variant, work.worthwhile),
         cluster=cluster, overwrite=overwrite, progress=progress, note=objects.problems.update,
     )  # fmt: skip
@@ -139,7 +138,7 @@ def rooms_plan(
 
 def rooms_part(spec: Request, count: int, marks: tuple[Mark, ...] = ()) -> Part:
     """Return the rows of so many scenes."""
-    return Part("", "", count, [Sheet(columns(spec))], marks, len(spec.views))
+    return Part("", "", count, [Sheet(columns(spec))], marks, len(spec.views), "scenes")
 
 
 def merge_rooms(

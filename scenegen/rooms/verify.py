@@ -18,14 +18,11 @@ from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import Request
 from scenegen.files.content import fingerprint
 from scenegen.files.rows import RowBlock, content_problems
-from scenegen.files.sets.manifest import Manifest
 from scenegen.files.verify import (
-    SHOWN,
     Check,
     content_check,
     listed_check,
     made_elsewhere,
-    manifest_checks,
     read_all,
     spread_rows,
 )
@@ -119,42 +116,6 @@ def verify_withheld(
         listed_check("layout", layout, rooms.problems(whole=False)),
         listed_check("content", "every value as written, by SHA-256", wrong),
         Check("truth", True, truth),
-    ]
-
-
-def verify_set(
-    rooms: RoomsFile,
-    manifest: Manifest,
-    items: int = 8,
-    device: str = "auto",
-    objects: Objects | None = None,
-    progress: Callable[[int], Any] = lambda done: None,
-) -> list[Check]:
-    """Check the shards of a set against its manifest, and render `items` rows again.
-
-    Every byte is checked by the SHA-256 of its file, so values are not looked at one by one.
-
-    Args and errors as `verify_file`.
-    """
-    checks = manifest_checks(rooms.path.parent, manifest, progress)
-    if not checks[-1].ok:
-        return checks
-    views = len(rooms.spec.views)
-    scene, view = (rooms.read(name, slice(None)) for name in ("scene_index", "view_index"))
-    count = manifest.count * views
-    recorded = [(shard.file, shard.rows, shard.content_digest) for shard in manifest.shards]
-    shards = [(shard.file, shard.rows, shard.content_digest) for shard in rooms.opened.shards]
-    wrong = [] if len(scene) == count else [f"{len(scene)} rows, not {count}"]
-    wrong += ["other shards than in the manifest"] if shards and shards != recorded else []
-    if not wrong:
-        every = np.arange(count)
-        misplaced = np.flatnonzero((scene != every // views) | (view != every % views))
-        wrong = [f"row {row}" for row in misplaced[:SHOWN].tolist()]
-    return [
-        *checks,
-        listed_check("layout", f"{len(rooms)} rows", rooms.problems()),
-        listed_check("rows", f"each of {count} once, in order", wrong),
-        *_some_again(rooms, items, device, objects or objects_of(rooms.spec)),
     ]
 
 

@@ -13,9 +13,9 @@ from typing import Any
 
 from scenegen.common.records import check
 from scenegen.common.text_table import markdown, piped, printable
+from scenegen.files.content import file_sha256
 from scenegen.files.new_file import write_text
 from scenegen.files.rows import RowFile
-from scenegen.files.sets.manifest import file_sha256
 from scenegen.files.sets.shards import OpenFile
 from scenegen.sharing.export import export_stem
 

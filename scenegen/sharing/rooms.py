@@ -6,7 +6,6 @@ from pathlib import Path
 
 from scenegen.common.records import check
 from scenegen.description.specs import BUILT_IN
-from scenegen.files.sets.manifest import manifest_path
 from scenegen.layout import columns, fields, markdown_table
 from scenegen.rooms.reader import RoomsFile
 from scenegen.sharing.card import TEMPLATES, Publication, with_shards, write_card
@@ -37,9 +36,6 @@ def write_rooms_card(
     files: list[tuple[Path, str]] = []
     for file in rooms:
         files += with_shards(file.opened, "rooms with ground truth")
-        manifest = manifest_path(file.path)
-        if file.opened.shards and manifest.is_file():
-            files.append((manifest, f"manifest of {file.path.name}"))
     interior = {file.spec.interior for file in rooms}
     check(len(interior) == 1, "files", "interiors and other rooms", "a card for each kind")
     scenes = [{file.read("scene", row) for row in range(len(file))} for file in rooms]

@@ -10,15 +10,15 @@ import numpy as np
 
 from iqtt.files.make import make_split, merge_questions
 from iqtt.files.reader import open_tables
-from iqtt.files.split import ALL_FILES, MANIFEST
+from iqtt.files.split import ALL_FILES
 from iqtt.files.verify import verify_split
 from iqtt.questions.specs import SplitSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.files.sets.manifest import Manifest, read_manifest
+from scenegen.files.sets.making import complete_parts, parts_folder
 from scenegen.files.verify import Check
 from scenegen.rooms.make import make_dataset, merge_rooms
 from scenegen.rooms.reader import RoomsFile
-from scenegen.rooms.verify import verify_set
+from scenegen.rooms.verify import verify_file
 
 SEED = 8_123_456_789_012_345
 
@@ -30,7 +30,6 @@ class SetTask:
     Attributes:
         spec: the request.
         files: those that readers open.
-        manifest: name of the manifest.
         rows: number of rows in all files of images.
         size: items of a shard, so that there are at least three.
         run: makes a set, given a folder, a spec and options.
@@ -40,7 +39,6 @@ class SetTask:
 
     spec: Any
     files: tuple[str, ...]
-    manifest: str
     rows: int
     size: int
     run: Callable[..., Any]
@@ -57,9 +55,9 @@ class SetTask:
         """Make a set of shards."""
         self.make(folder, **{"shard_size": self.size, **options})
 
-    def read_manifest(self, folder: Path) -> Manifest:
-        """Read the manifest of a folder."""
-        return read_manifest(folder / self.manifest)
+    def parts(self, folder: Path) -> dict[str, Path]:
+        """Return the parts of a set that is not complete, by their names."""
+        return complete_parts(parts_folder(folder / self.files[0]))
 
 
 def rooms(**settings: Any) -> SetTask:
@@ -72,15 +70,14 @@ def rooms(**settings: Any) -> SetTask:
 
     def verify(folder: Path) -> list[Check]:
         with RoomsFile(folder / "rooms.h5") as file:
-            manifest = read_manifest(folder / "rooms.manifest.json")
-            return verify_set(file, manifest, 2)
+            return verify_file(file, 2)
 
     def merge(path: Path, out: Path) -> None:
         with RoomsFile(path) as file:
             merge_rooms(file, out)
 
     rows = 11 * len(spec.views)
-    return SetTask(spec, ("rooms.h5",), "rooms.manifest.json", rows, 4, run, merge, verify)
+    return SetTask(spec, ("rooms.h5",), rows, 4, run, merge, verify)
 
 
 def questions(**settings: Any) -> SetTask:
@@ -97,7 +94,7 @@ def questions(**settings: Any) -> SetTask:
             merge_questions(tables, out)
 
     rows = spec.train + spec.val + spec.test
-    return SetTask(spec, ALL_FILES, MANIFEST, rows, 4, make_split, merge, verify_split)
+    return SetTask(spec, ALL_FILES, rows, 4, make_split, merge, verify_split)
 
 
 def contents(folder: Path) -> dict[str, bytes]:

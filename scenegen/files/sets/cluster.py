@@ -1,12 +1,14 @@
 """Spread tasks over the workers of a Dask cluster, on this machine or on others.
 
-Dask gives the task of a worker that died to another one. It is an optional extra, which is imported
-only here.
+Dask gives the task of a worker that is lost to another one. It is an optional extra, which is
+imported only here. Each worker does its tasks in a process of `pool`, so that a crash costs no
+worker, and is told as anywhere.
 """
 
 import importlib
 import logging
 import os
+import secrets
 import subprocess
 import sys
 import threading
@@ -15,12 +17,13 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 from scenegen.common.errors import SceneGenError
 from scenegen.common.signals import without_interrupts
 from scenegen.files.places import lacking
-from scenegen.files.pool import ended, python_command
+from scenegen.files.pool import LostWorkerError, Pool, ended, python_command
 
 T = TypeVar("T")
 Task = TypeVar("Task")
@@ -30,6 +33,8 @@ BATCH = 200  # tasks that the scheduler is told of at once, as each message cost
 PATIENCE = 10  # seconds in which a scheduler must answer, or workers must end
 MOMENT = 0.05  # seconds between two looks whether workers are there
 _one_at_a_time = threading.Lock()  # Mitsuba and HDF5 take one task in a process
+_pools: "dict[str, Pool]" = {}  # of this worker: at most one, by the name of its work
+_threads = 1  # of the worker that this is a process of
 Versions = Callable[[], Mapping[str, str]]
 
 
@@ -45,77 +50,98 @@ class Cluster:
     client: Any
     versions: Versions
 
-    def in_any_order(self, function: Callable[[Task], T], tasks: Iterable[Task]) -> Generator[T]:
-        """Call a function for each task on the workers; yield results as they come.
-
-        Each worker process does one task at a time.
-
-        Raises what the function raises, and SceneGenError where a task has ended several workers,
-        where a worker has other versions, or where the scheduler is gone.
-        """
-        yield from self._results(function, tasks, in_order=False)
-
-    def in_order(self, function: Callable[[Task], T], tasks: Iterable[Task]) -> Generator[T]:
-        """Call a function for each task as `in_any_order`, but yield results in order."""
-        yield from self._results(function, tasks, in_order=True)
-
-    def _results(
-        self, function: Callable[[Task], T], tasks: Iterable[Task], in_order: bool
+    def results(
+        self,
+        function: Callable[[Task], T],
+        tasks: Iterable[Task],
+        told: Callable[[Task], str] = str,
+        in_order: bool = True,
     ) -> Generator[T]:
+        """Call a function for each task on the workers; yield results in order, or as they come.
+
+        Each worker does one task at a time. `told` is as of `Pool`.
+
+        Raises what the function raises, LostWorkerError where a task ended its process twice, or
+        several workers, and SceneGenError where a worker has other versions, or where the scheduler
+        is gone.
+        """
         from distributed import KilledWorker, as_completed
         from distributed.comm import CommClosedError
 
         # The function travels as the result of a task: workers pass it on to each other, and Dask
         # makes it again where all that had it are gone.
-        work = self.client.submit(_as_is, (function, self.versions, dict(self.versions())))
-        futures = self.client.map(_call, list(tasks), work=work, pure=False, batch_size=BATCH)
+        work = _Work(secrets.token_hex(8), function, told, self.versions, dict(self.versions()))
+        work_there = self.client.submit(_as_is, work)
+        all_tasks = list(tasks)
+        futures = self.client.map(_call, all_tasks, work=work_there, pure=False, batch_size=BATCH)
         try:
             for future in futures if in_order else as_completed(futures):
-                result = future.result()
+                try:
+                    result = future.result()
+                except KilledWorker as error:
+                    what = told(all_tasks[futures.index(future)])
+                    where = f"{what}: all workers that were to make them ended"
+                    raise LostWorkerError(where, hint="see the workers' logs") from error
                 future.release()
                 yield result
-        except KilledWorker as error:
-            what = "cluster: a task ended several workers, probably because memory ran out"
-            raise SceneGenError(what, hint="see the workers' logs") from error
         except (CancelledError, CommClosedError) as error:
             hint = "run the same command again to continue"
             raise SceneGenError("The Dask scheduler disconnected", hint=hint) from error
         finally:
             with suppress(Exception):  # the scheduler may be gone; nothing depends on it
-                self.client.cancel([*futures, work])
+                self.client.cancel([*futures, work_there])
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """What workers do with each task; `name` tells it from other work."""
+
+    name: str
+    function: Callable[[Any], Any]
+    told: Callable[[Any], str]
+    versions: Versions
+    expected: Mapping[str, str]
+
+    def done(self, worker: str, threads: int, task: Any) -> Any:
+        """Do a task in a process of a worker, which may have joined at any time."""
+        global _threads  # noqa: PLW0603
+        _threads = threads
+        here = dict(self.versions())
+        differences = [
+            f"{name} {here.get(name)}, not {self.expected.get(name)}"
+            for name in sorted(here.keys() | self.expected.keys())
+            if here.get(name) != self.expected.get(name)
+        ]
+        if differences:
+            hint = (
+                "install the same versions on all machines, or the bits of the files could differ"
+            )
+            found, expected = "; ".join(differences), "the versions of the main process"
+            raise SceneGenError(f"worker {worker}", found, expected, hint)
+        return self.function(task)
 
 
 def threads_of_worker() -> int:
-    """Return how many threads the worker has that calls this, as it was started with."""
-    from distributed import get_worker
-
-    return int(get_worker().state.nthreads)
+    """Return how many threads the worker has whose process calls this, as it was started with."""
+    return _threads
 
 
 def _as_is(work: T) -> T:
     return work
 
 
-def _call(task: Task, work: tuple[Callable[[Task], T], Versions, dict[str, str]]) -> T:
-    """Do a task on a worker, which may have joined at any time and have other versions."""
+def _call(task: Any, work: _Work) -> Any:
+    """Do a task on a worker, in a process that ends with it."""
     from distributed import get_worker
 
-    function, versions, expected = work
     with _one_at_a_time:
-        here = dict(versions())
-        differences = [
-            f"{name} {here.get(name)}, not {expected.get(name)}"
-            for name in sorted(here.keys() | expected.keys())
-            if here.get(name) != expected.get(name)
-        ]
-        if differences:
-            hint = (
-                "install the same versions on all machines, or the bits of the files could differ"
-            )
-            where = f"worker {get_worker().address}"
-            found, expected_here = "; ".join(differences), "the versions of the main process"
-            raise SceneGenError(where, found, expected_here, hint)
-        return function(task)
+        if work.name not in _pools:
+            while _pools:
+                _pools.popitem()[1].close()
+            worker = get_worker()
+            done = partial(work.done, worker.address, int(worker.state.nthreads))
+            _pools[work.name] = Pool(1, done, work.told)
+        return _pools[work.name].do(task)
 
 
 @contextmanager

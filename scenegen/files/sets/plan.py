@@ -4,6 +4,7 @@ A set answers one request. Its rows go to whole files, or to shards beside a fil
 one. A task says all of that in a `Plan`, and adds only the rows.
 """
 
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -11,7 +12,6 @@ from typing import Any
 from scenegen.common.records import check
 from scenegen.files.content import fingerprint, joint_digest
 from scenegen.files.schema import Column
-from scenegen.files.sets.manifest import FORMAT, Manifest
 from scenegen.files.sets.shards import MOST_SHARDS, shard_name
 
 
@@ -69,6 +69,7 @@ class Part:
         sheets: the tables.
         marks: what follows from the rows.
         item_rows: rows of an item in each table.
+        noun: what items are, for errors.
     """
 
     bundle: str
@@ -77,6 +78,7 @@ class Part:
     sheets: Sequence[Sheet]
     marks: Sequence[Mark] = ()
     item_rows: int = 1
+    noun: str = "questions"
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,10 @@ class Block:
     def rows(self) -> int:
         """Number of rows in each table."""
         return len(self.items) * self.part.item_rows
+
+    def __str__(self) -> str:
+        of_part = " ".join(filter(None, (self.part.bundle, self.part.name, self.part.noun)))
+        return f"{of_part} {self.items[0]} to {self.items[-1]}"
 
     def cut(self, size: int) -> Iterator["Block"]:
         """Yield blocks of at most `size` items."""
@@ -150,6 +156,11 @@ class Piece:
     blocks: tuple[Block, ...]
     is_shard: bool
 
+    @property
+    def rows(self) -> int:
+        """Number of rows in each of its tables, in all."""
+        return sum(block.rows for block in self.blocks)
+
 
 @dataclass(frozen=True)
 class Plan:
@@ -169,9 +180,14 @@ class Plan:
     compression: str
     bundles: Sequence[Bundle]
 
-    def manifest(self, shard_size: int) -> Manifest:
-        """Return the manifest of a run that has made nothing yet."""
-        files = tuple(name for bundle in self.bundles for name in bundle.files)
+    @property
+    def files(self) -> list[str]:
+        """Return the names of all files that readers open."""
+        return [name for bundle in self.bundles for name in bundle.files]
+
+    def request(self, shard_size: int) -> dict[str, Any]:
+        """Return what the bytes of the files depend on."""
         count = sum(part.items for bundle in self.bundles for part in bundle.parts)
-        settings = tuple(sorted({**self.settings, "compression": self.compression}.items()))
-        return Manifest(FORMAT, self.kind, files, self.spec, count, shard_size, settings)
+        names = {"files": ", ".join(self.files), "kind": self.kind}
+        how = {"compression": self.compression, "n": count, "shard-size": shard_size}
+        return {**json.loads(self.spec), **self.settings, **names, **how}

@@ -12,11 +12,9 @@ import numpy as np
 
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import CONTENT_DIGEST, SHA256, dataset_digest, seal
-from scenegen.files.new_file import written_beside
 from scenegen.files.row_file import new_hdf5, new_hdf5_file
 from scenegen.files.schema import Column, name_axes
-from scenegen.files.sets.manifest import FileRecord, file_sha256
-from scenegen.files.sets.plan import Bundle, Part, Piece, Sheet
+from scenegen.files.sets.plan import Bundle, Part, Piece, Plan, Sheet
 from scenegen.files.sets.shards import (
     ROW_DIGESTS,
     SHARDS,
@@ -39,30 +37,20 @@ COPIED_ROWS = 64  # that a merge reads and packs in one go
 
 
 def write_piece(
-    folder: Path,
+    paths: Sequence[Path],
     piece: Piece,
     rows: Iterator[Packed],
     compression: str,
-    overwrite: bool = True,
     progress: Progress = lambda rows: None,
-) -> list[FileRecord]:
-    """Write the files of a piece with the next rows of `rows`; they appear when all are complete.
+) -> None:
+    """Write the files of a piece with the next rows of `rows`.
 
     The bytes depend on the rows alone, not on how many come at a time. `progress` is called with
-    the number of rows that were written. Raises OSError as `written_beside`.
+    the number of rows that were written.
     """
-    with ExitStack() as naming:
-        places = [folder / name for name in piece.names]
-        hidden = [naming.enter_context(written_beside(place, overwrite)) for place in places]
-        with ExitStack() as writing:
-            files = [writing.enter_context(new_hdf5(path)) for path in hidden]
-            _fill(files, piece, rows, compression, progress)
-            digests = [str(file.attrs[CONTENT_DIGEST]) for file in files]
-        count = sum(block.rows for block in piece.blocks)
-        return [
-            FileRecord(name, count, path.stat().st_size, file_sha256(path), digest)
-            for name, path, digest in zip(piece.names, hidden, digests, strict=True)
-        ]
+    with ExitStack() as writing:
+        files = [writing.enter_context(new_hdf5(path)) for path in paths]
+        _fill(files, piece, rows, compression, progress)
 
 
 def _fill(
@@ -91,28 +79,47 @@ def _fill(
 
 
 def write_views(
-    folder: Path, shards: Sequence[Piece], records: Mapping[str, FileRecord], compression: str
+    folder: Path, parts: Mapping[str, Path], pieces: Sequence[Piece], plan: Plan
 ) -> None:
-    """Write the files that show all shards of a bundle as one; they tell what whole files tell.
+    """Write the files that show the shards of a bundle as one; they tell what whole files tell.
 
-    Raises FileFormatError where a shard is not the one that was recorded.
+    Args:
+        parts: the complete files, by the names that they will have.
     """
-    bundle = shards[0].bundle
+    for bundle in plan.bundles:
+        shards = [piece for piece in pieces if piece.is_shard and piece.bundle is bundle]
+        if shards:
+            lists = [
+                [
+                    _shard(parts[name], name, piece)
+                    for name, piece in zip(names, shards, strict=True)
+                ]
+                for names in zip(*(piece.names for piece in shards), strict=True)
+            ]
+            _write_view(folder, parts, bundle, lists, plan.compression)
+
+
+def _shard(path: Path, name: str, piece: Piece) -> Shard:
+    with opened(path) as file:
+        digest = str(file.attrs[CONTENT_DIGEST])
+    return Shard(name, piece.rows, digest, piece.blocks[0].part.name)
+
+
+def _write_view(
+    folder: Path,
+    parts: Mapping[str, Path],
+    bundle: Bundle,
+    lists: Sequence[Sequence[Shard]],
+    compression: str,
+) -> None:
     attributes = [dict(of_file) for of_file in bundle.files.values()]
-    lists = [
-        [
-            Shard(name, records[name].rows, records[name].content_digest, piece.blocks[0].part.name)
-            for name, piece in zip(names, shards, strict=True)
-        ]
-        for names in zip(*(piece.names for piece in shards), strict=True)
-    ]
     with ExitStack() as writing:
         places = [folder / name for name in bundle.files]
         files = [writing.enter_context(new_hdf5_file(place, overwrite=True)) for place in places]
         for part in bundle.parts:
             if part.items:
                 of_part = [[one for one in listed if one.part == part.name] for listed in lists]
-                digests = _write_virtual_columns(files, folder, part, of_part)
+                digests = _write_virtual_columns(files, parts, part, of_part)
             else:
                 digests = _digests(_tables(files, part, 0, compression))
             _add_marks(attributes, part, digests)
@@ -122,10 +129,13 @@ def write_views(
 
 
 def _write_virtual_columns(
-    files: Sequence[h5py.File], folder: Path, part: Part, shards: Sequence[Sequence[Shard]]
+    files: Sequence[h5py.File],
+    parts: Mapping[str, Path],
+    part: Part,
+    shards: Sequence[Sequence[Shard]],
 ) -> dict[str, str]:
     """Write columns that show a part of all shards of each file; return their digests by name."""
-    joined = [_joined_columns(folder, of_file) for of_file in shards]
+    joined = [_joined_columns([parts[s.file] for s in of_file]) for of_file in shards]
     digests = {}
     for sheet in part.sheets:
         group = _group(files[sheet.file], sheet)
@@ -253,21 +263,15 @@ def _write_row_digests(file: h5py.File, digests: Mapping[str, bytes]) -> None:
     dataset.attrs[SHA256] = dataset_digest(values)
 
 
-def _joined_columns(folder: Path, shards: Sequence[Shard]) -> dict[str, tuple[str, Any]]:
+def _joined_columns(shards: Sequence[Path]) -> dict[str, tuple[str, Any]]:
     """Return the `column_digest` of each data set over all shards, and its type.
 
     Texts are as long as in the shard where they are longest.
-
-    Raises FileFormatError where a shard is not the one that was recorded.
     """
     hashes: dict[str, hashlib._Hash] = {}
     types: dict[str, Any] = {}
     for shard in shards:
-        with opened(folder / shard.file) as file:
-            if file.attrs.get(CONTENT_DIGEST) != shard.content_digest:
-                problem = "another run has written it meanwhile"
-                hint = "run the same command again to continue"
-                raise FileFormatError(f"{folder / shard.file}: {problem}", hint=hint)
+        with opened(shard) as file:
             digests = file[ROW_DIGESTS]
             values = digests[()]
             for i, name in enumerate(digests.attrs["names"]):

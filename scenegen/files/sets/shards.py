@@ -44,7 +44,7 @@ from scenegen.files.schema import DIGEST
 Array = NDArray[Any]
 SHARDS = "shards"  # in the file of a set: a line of JSON for each shard
 ROW_DIGESTS = "row_sha256"  # in a shard: (rows, data sets, 32) bytes; its attribute has the names
-MOST_SHARDS = 10_000  # whose manifest is still read
+MOST_SHARDS = 10_000
 LONGEST_LINE = 1000  # characters
 PART = re.compile(r"\w{0,40}")
 SHARD_NAME = re.compile(r"(.+)-\d{5}-of-\d{5}(\.[^.]*|)", re.DOTALL)

@@ -1,14 +1,10 @@
-"""Work spread over threads and processes, and how many processors there are for it."""
+"""Work spread over threads and processes."""
 
-import math
-import os
 import warnings
 from collections import deque
 from collections.abc import Callable, Generator, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import suppress
 from functools import partial
-from pathlib import Path
 from typing import Any, TypeVar
 
 from scenegen.files.pool import worker_pool
@@ -17,49 +13,6 @@ T = TypeVar("T")
 Task = TypeVar("Task")
 Made = Callable[[Task], Generator[T, None, Any]]
 AHEAD = 2  # tasks for each process that are begun, or done and not yet taken
-
-
-def processors() -> int:
-    """Return how many processors this process may use: its affinity and its cgroup limit both."""
-    count = os.cpu_count() or 1
-    if hasattr(os, "sched_getaffinity"):
-        count = len(os.sched_getaffinity(0))
-    return max(1, math.ceil(min(count, _cgroup_processors())))
-
-
-def _cgroup_processors(
-    root: Path = Path("/sys/fs/cgroup"), self_file: str = "/proc/self/cgroup"
-) -> float:
-    """Return the least limit on processor time of this process's cgroups, v2 or v1; inf for none.
-
-    `docker --cpus 1.5` sets 1.5. A container may see its own cgroup at `root`, too.
-    """
-    limits = [math.inf]
-    try:
-        lines = Path(self_file).read_text().splitlines()
-    except OSError:
-        return math.inf
-    for line in lines:
-        _, kinds, path = line.split(":", 2)
-        home = root if not kinds else root / "cpu"
-        if kinds and "cpu" not in kinds.split(","):
-            continue
-        place = home / path.lstrip("/")
-        for folder in (place, *place.parents):
-            limits.append(_limit_in(folder))
-            if folder == home:
-                break
-    return min(limits)
-
-
-def _limit_in(folder: Path) -> float:
-    with suppress(OSError, ValueError):
-        quota, period = (folder / "cpu.max").read_text().split()
-        return int(quota) / int(period)  # "max" is none
-    with suppress(OSError, ValueError):
-        quota, period = ((folder / f"cpu.cfs_{n}_us").read_text() for n in ("quota", "period"))
-        return int(quota) / int(period) if int(quota) > 0 else math.inf
-    return math.inf
 
 
 def in_threads(
@@ -113,15 +66,24 @@ def _listed(make: Made[Task, T], task: Task) -> tuple[list[T], Any]:
             return results, end.value
 
 
-def in_processes(function: Callable[[Task], T], tasks: Iterable[Task], count: int) -> Generator[T]:
+def in_processes(
+    function: Callable[[Task], T],
+    tasks: Iterable[Task],
+    count: int,
+    told: Callable[[Task], str] = str,
+) -> Generator[T]:
     """Call a function for each task, in `count` processes; yield the results in order.
 
     The function is pickled once for each process. At most AHEAD tasks for each process are begun
     before their results are taken. Warnings are given again here, where Python drops repeated ones.
 
-    Raises what the function raises, and as `worker_pool`.
+    Args:
+        told: as of `Pool`.
+
+    Raises what the function raises, and LostWorkerError where a task ended its process, twice if by
+    a signal.
     """
-    with worker_pool(count, partial(_with_warnings, function)) as pool:
+    with worker_pool(count, partial(_with_warnings, function), told) as pool:
         for result, caught in _oldest_first(pool.submit, tasks, AHEAD * count - 1):
             for text, category in caught:
                 warnings.warn(text, category, stacklevel=2)

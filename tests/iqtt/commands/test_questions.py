@@ -48,7 +48,7 @@ def test_every_option_is_recorded(run, monkeypatch, tmp_path):
     assert result.exit_code == 0, result.output
     assert result.stdout.startswith("x: 6 + 3 + 4 questions (2 of training labelled), ")
     assert "views hid a cube and were refused" in result.stdout
-    assert files_in(tmp_path / "x") == [*FILES, "iqtt.manifest.json"]
+    assert files_in(tmp_path / "x") == [*FILES]
     with h5py.File("x/iqtt-test-answers.h5") as file:
         spec = json.loads(file.attrs["spec"])
         assert file.attrs["creation_command"] == "iqtt " + line.replace(" --batch 2", "")

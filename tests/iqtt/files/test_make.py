@@ -14,7 +14,7 @@ from iqtt.files import make as module
 from iqtt.files import work
 from iqtt.files.make import make_split, make_suite
 from iqtt.files.reader import QuestionsFile
-from iqtt.files.split import ALL_FILES, MANIFEST
+from iqtt.files.split import ALL_FILES
 from iqtt.questions.kinds import question_kind
 from iqtt.questions.specs import SUITE, SplitSpec
 from iqtt.questions.views import Tally
@@ -200,7 +200,7 @@ def test_other_files_of_a_folder_are_left_alone(tmp_path, monkeypatch):
     (tmp_path / "notes.txt").write_text("mine")
     make_split(".", TINY)
     make_split(".", TINY, overwrite=True)
-    assert sorted(listing(tmp_path)) == sorted([*ALL_FILES, MANIFEST, "notes.txt"])
+    assert sorted(listing(tmp_path)) == sorted([*ALL_FILES, "notes.txt"])
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
 

@@ -23,7 +23,7 @@ def make_card(folder, path, with_answers=False):
 @pytest.mark.parametrize("kind", ["whole", "shards", "floats"])
 def test_nothing_is_told_of_the_test_answers(kind, splits, tmp_path):
     """The card is the same where the file of the answers is not there."""
-    private = [*splits[kind].glob("iqtt-test-answers*"), splits[kind] / "iqtt.manifest.json"]
+    private = [*splits[kind].glob("iqtt-test-answers*")]
     public = tmp_path / "public"
     shutil.copytree(splits[kind], public, ignore=lambda *_: [path.name for path in private])
     page = make_card(splits[kind], tmp_path / "README.md")
@@ -41,7 +41,7 @@ def test_with_answers_everything_is_told(splits, tmp_path):
     page = make_card(splits["shards"], tmp_path / "README.md", True)
     assert "    iqtt --seed 8123456789012345" in page.splitlines()
     assert "are part of this data" in page
-    for name in ("iqtt-test-answers.h5", "iqtt.manifest.json"):
+    for name in ("iqtt-test-answers.h5",):
         data = (splits["shards"] / name).read_bytes()
         assert f"| {name} | {len(data)} | {hashlib.sha256(data).hexdigest()} |" in page
 

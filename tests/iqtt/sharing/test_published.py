@@ -16,7 +16,7 @@ PUBLIC = [
 ]  # fmt: skip
 ANSWERS = [
     "iqtt-test-answers.h5", "iqtt-test-answers-00000-of-00002.h5",
-    "iqtt-test-answers-00001-of-00002.h5", "iqtt.manifest.json",
+    "iqtt-test-answers-00001-of-00002.h5",
 ]  # fmt: skip
 
 

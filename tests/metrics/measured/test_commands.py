@@ -110,7 +110,7 @@ def test_pages_and_figures_are_drawn(here):
     assert made("--unit", "mm", "--invalid", "0", "--groups", "scenes.csv").exit_code == 0
     done(*WAY, *PICTURES)
     assert Path("a.html").read_text().count("data:image/webp") >= 4
-    assert Path("c.html").read_text().count("data:image/webp") >= 4
+    assert "better/worse/same" in Path("c.html").read_text()
     assert Path("grid.png").stat().st_size > 5000
     assert Path("all.svg").read_text().count("<g id") > 20
     assert not set(OBJECT_SCORES) & set(read_scores("a.json").metrics)

@@ -12,7 +12,7 @@ from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.files.places import as_place, files_below, is_remote
-from scenegen.files.sets.manifest import manifest_path, read_manifest
+from scenegen.files.sets.making import complete_parts, parts_folder
 
 pytest.importorskip("upath")
 SPLIT = SplitSpec(
@@ -90,9 +90,10 @@ def test_a_run_goes_on_behind_a_url(home, temporary, make_rooms, tmp_path):
     options = {"shard_size": 2, "batch": 2}
     with pytest.raises(KeyboardInterrupt):
         make_rooms(path, 7, {**options, "progress": stop})
-    kept = read_manifest(manifest_path(path)).shards
+    kept = complete_parts(parts_folder(as_place(path)))
     assert kept
-    as_place(f"{home}/{kept[0].file}").write_bytes(b"damaged")
+    assert not contents(as_place(home))
+    min(kept.values()).write_bytes(b"damaged")
     with pytest.raises(SpecError):
         make_rooms(path, 7, options, seed=99)
     make_rooms(path, 7, options)

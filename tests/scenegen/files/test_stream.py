@@ -179,11 +179,22 @@ def test_what_goes_wrong_in_a_process_ends_the_loop(nothing_left):
         with pytest.raises(LostWorkerError) as lost:
             found(counted(killed=41, workers=1))
         assert lost.value.found == "signal 9, SIGKILL"
-    batches, others = iter(counted(workers=1)), children()
-    next(batches)
-    os.kill(int(*(children() - others)), signal.SIGKILL)
-    with pytest.raises(LostWorkerError):
-        list(zip(batches, range(10)))
+        assert lost.value.where.startswith("rows 40 to 43:")
+
+
+@linux
+@pytest.mark.parametrize(("workers", "share"), [(1, (None, None)), (2, (1, 3))])
+def test_batches_whose_process_a_signal_ended_are_made_again(workers, share, nothing_left):
+    """It is ended while it waits, and while it makes the next batches."""
+    how = {"start": 3, "stop": 190, "rank": share[0], "world_size": share[1]}
+    batches, others = iter(counted(workers=workers, **how)), children()
+    rows = []
+    for number, batch in enumerate(batches):
+        rows.append(batch["row"].tolist())
+        for process in children() - others if number in (2, 20) else ():
+            time.sleep(0.2 * (number == 20))
+            os.kill(int(process), signal.SIGKILL)
+    assert rows == rows_of(counted(**how))
 
 
 @linux

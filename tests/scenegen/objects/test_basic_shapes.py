@@ -1,7 +1,5 @@
 """The basic shapes against closed forms, the room, and the mesh of a whole scene."""
 
-import math
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,30 +12,16 @@ from scenegen.common.errors import SpecError
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.names import SHAPE_NAMES
 from scenegen.description.scenes import PlacedObject, SceneSpec
+from scenegen.description.shapes import BASIC_SHAPES
 from scenegen.objects import basic_hulls
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.objects.scene_mesh import room_mesh, scene_parts, welded, world_from_object
 
 Array = NDArray[np.float64]
-CURVED = ("sphere", "cone", "torus", "cylinder", "capsule")
-SOLID = tuple(name for name in SHAPE_NAMES if name != "teapot")  # Newell's has no seam at its lid
+SOLID = [shape for shape in BASIC_SHAPES if shape.volume]  # the teapot has no seam at its lid
+CURVED = [shape.name for shape in SOLID if shape.curved]
 TESSELLATION = 4.5e-5  # the most that a unit mesh may lie off its smooth surface
-CYLINDER, PYRAMID, PRISM = 1.64**-0.5, 2.49**-0.5, (0.75 + 0.81 + 0.5625) ** -0.5  # scales
-DODECAHEDRON, ICOSAHEDRON = 4 / (3**0.5 * (1 + 5**0.5)), 4 / (10 + 2 * 5**0.5) ** 0.5  # edges
-VOLUMES = {
-    "box": 8 / 3**1.5,
-    "sphere": 4 / 3 * math.pi,
-    "cone": math.pi / 3 * 0.5 * 2**0.5,
-    "torus": 2 * math.pi**2 * 0.68 * 0.32**2,
-    "cylinder": math.pi * (0.8 * CYLINDER) ** 2 * 2 * CYLINDER,
-    "capsule": math.pi * 0.25 + 4 / 3 * math.pi * 0.125,
-    "pyramid": 4 * 1.4 / 3 * PYRAMID**3,
-    "prism": 0.75 * 3**0.5 * 1.8 * PRISM**3,
-    "tetrahedron": 8 / (9 * 3**0.5),
-    "octahedron": 4 / 3,
-    "dodecahedron": (15 + 7 * 5**0.5) / 4 * DODECAHEDRON**3,
-    "icosahedron": 5 * (3 + 5**0.5) / 12 * ICOSAHEDRON**3,
-}
+CYLINDER = 1.64**-0.5  # its scale
 SIDES = {"box": 6, "pyramid": 5, "prism": 5, "tetrahedron": 4, "octahedron": 8}
 SIDES |= {"dodecahedron": 12, "icosahedron": 20, "torus": 2, "sphere": 0}
 
@@ -68,13 +52,13 @@ def test_bounding_radius_is_one_and_normals_agree_with_faces(name):
     assert agreement > (0.9 if name == "teapot" else 0.9999)
 
 
-@pytest.mark.parametrize("name", SOLID)
-def test_solids_are_closed_and_have_the_volume_of_their_formula(name):
-    mesh = welded(unit_shape(name))
+@pytest.mark.parametrize("solid", SOLID, ids=lambda shape: shape.name)
+def test_solids_are_closed_and_have_the_volume_of_their_formula(solid):
+    mesh = welded(unit_shape(solid.name))
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
-    missing = VOLUMES[name] - mesh.volume
-    if name in CURVED:
+    missing = solid.volume - mesh.volume
+    if solid.curved:
         assert 0 < missing < TESSELLATION * mesh.area
     else:
         assert missing == pytest.approx(0.0, abs=1e-12)

@@ -14,9 +14,9 @@ from scenegen.objects.families.store import MEMBER_STORE
 from scenegen.objects.sources import object_source
 
 CLASSES = ("chair", "table", "sofa", "lamp", "shelf", "cabinet", "plant", "vase", "book", "box")
-# Renders the truth of 400 interiors, and prints the peak of memory in MB at their half and end.
+# Renders the truth of 400 interiors, and prints the peak of memory in kB at their half and end.
 RENDER = """
-import resource, sys
+import sys
 from scenegen.description.presets import preset_spec
 from scenegen.objects.sources import object_source
 from scenegen.rendering.renderer import share_processors
@@ -31,7 +31,7 @@ for items in render_items(spec, range(400), 16, "auto", source.objects, ("depth"
     for _ in items:
         done += 1
         if done in (200, 400):
-            print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1000)
+            print(open("/proc/self/status").read().split("VmHWM:")[1].split()[0])
 """
 
 
@@ -44,7 +44,7 @@ def write_models(root, count, side):
         folder = root / CLASSES[i % len(CLASSES)]
         folder.mkdir(parents=True, exist_ok=True)
         shades = rng.integers(0, 256, (side // 16, side // 16, 3), np.uint8)
-        picture = Image.fromarray(shades).resize((side, side))
+        picture = Image.fromarray(shades).resize((side, side), Image.Resampling.NEAREST)
         material = trimesh.visual.material.SimpleMaterial(image=picture)
         sphere.visual = trimesh.visual.TextureVisuals(uv, material=material)
         scaled = sphere.copy().apply_scale([1.0, 1 + i / count, 1.0])

@@ -42,7 +42,7 @@ def test_what_the_header_tells(page):
 
 
 def test_files_and_their_sha256(page, holey_set, float_path):
-    names = ["set.h5", *(f"set-0000{i}-of-00003.h5" for i in range(3)), "set.manifest.json"]
+    names = ["set.h5", *(f"set-0000{i}-of-00003.h5" for i in range(3))]
     files = [*(holey_set.with_name(name) for name in names), float_path]
     for path in files:
         data = path.read_bytes()

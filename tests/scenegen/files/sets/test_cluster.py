@@ -19,9 +19,9 @@ from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.scoring.runs import scorer_versions
 from scenegen.common.errors import SceneGenError
+from scenegen.files.pool import LostWorkerError
 from scenegen.files.sets.cluster import LOCAL, connected
-from scenegen.files.sets.making import check_shared
-from scenegen.files.sets.manifest import FORMAT, Manifest, write_manifest
+from scenegen.files.sets.making import REQUEST, check_shared
 from scenegen.rendering.sameness import renderer_identity
 
 pytest.importorskip("distributed")
@@ -36,6 +36,12 @@ def cluster():
     """Return a cluster of two worker processes."""
     with connected(LOCAL, 2, renderer_identity) as found:
         yield found
+
+
+@pytest.fixture(scope="module")
+def plain(cluster):
+    """Return the same cluster, whose processes need not render a picture to be compared."""
+    return replace(cluster, versions=dict)
 
 
 def contents(folder):
@@ -70,21 +76,38 @@ def slow_square(folder, number):
     return number * number
 
 
-def test_tasks_of_workers_that_die_go_to_others(cluster, tmp_path):
+def test_tasks_of_workers_that_die_go_to_others(plain, tmp_path):
     """One of two is killed in the midst of it."""
-    squares = cluster.in_order(partial(slow_square, tmp_path), range(12))
+    squares = plain.results(partial(slow_square, tmp_path), range(12))
     assert next(squares) == 0
     os.kill(int((tmp_path / "0").read_text()), signal.SIGKILL)
     assert [*squares] == [number * number for number in range(1, 12)]
+
+
+def crash(folder, always, number):
+    """Return the number; at 3 a signal ends the process, once or always."""
+    if number == 3 and (always or not (folder / "tried").exists()):
+        (folder / "tried").touch()
+        os.kill(os.getpid(), signal.SIGSEGV)
+    return number
+
+
+def test_a_crash_is_tried_again_and_named(plain, tmp_path):
+    once = plain.results(partial(crash, tmp_path, False), range(5))
+    assert list(once) == [0, 1, 2, 3, 4]
+    with pytest.raises(LostWorkerError) as lost:
+        list(plain.results(partial(crash, tmp_path, True), range(5), "part {}".format))
+    assert lost.value.where.startswith("part 3:")
+    assert lost.value.found == "signal 11, SIGSEGV"
 
 
 def fail(number):
     raise SceneGenError("row 3", "a task that fails", "one that does not", "mend it")
 
 
-def test_errors_of_workers_are_raised_here(cluster):
+def test_errors_of_workers_are_raised_here(plain):
     with pytest.raises(SceneGenError) as raised:
-        list(cluster.in_any_order(fail, range(3)))
+        list(plain.results(fail, range(3)))
     assert raised.value.found == "a task that fails"
 
 
@@ -101,7 +124,7 @@ def test_workers_with_other_versions_are_refused(cluster):
     here = partial(version_by_process, os.getpid())
     address = cluster.client.scheduler.address
     with pytest.raises(SceneGenError) as refused, connected(address, 0, here) as other:
-        list(other.in_any_order(len, ["a"]))
+        list(other.results(len, ["a"]))
     assert "mitsuba_version 3.8.0, not 3.9.1" in refused.value.found
 
 
@@ -109,24 +132,24 @@ def shared(task):
     check_shared(*task)
 
 
-def test_a_folder_that_workers_do_not_see_is_named(cluster, tmp_path):
+def test_a_folder_that_workers_do_not_see_is_named(plain, tmp_path):
     """Or one in which another run has begun."""
-    place = tmp_path / "rooms.manifest.json"
-    asked = Manifest(FORMAT, "", ("rooms.h5",), "{}", 1, 1, ())
+    home, asked = tmp_path / ".rooms.h5.parts", {"n": 1}
     with pytest.raises(SceneGenError) as refused:
-        list(cluster.in_any_order(shared, [(place, asked)]))
-    assert str(place) in refused.value.where
-    write_manifest(place, asked)
-    list(cluster.in_any_order(shared, [(place, asked)]))
+        list(plain.results(shared, [(home, asked)]))
+    assert str(home) in refused.value.where
+    home.mkdir()
+    (home / REQUEST).write_text('{"n": 1}')
+    list(plain.results(shared, [(home, asked)]))
     with pytest.raises(SceneGenError) as refused:
-        list(cluster.in_any_order(shared, [(place, replace(asked, count=2))]))
+        list(plain.results(shared, [(home, {"n": 2})]))
     assert "n 1, not 2" in refused.value.found
 
 
 @pytest.mark.slow
 def test_a_scheduler_that_goes_away_is_one_line(tmp_path):
     with connected(LOCAL, 1, scorer_versions) as found:
-        results = found.in_order(partial(slow_square, tmp_path), range(50))
+        results = found.results(partial(slow_square, tmp_path), range(50))
         next(results)
         found.client.cluster.close()
         with pytest.raises(SceneGenError) as lost:
@@ -148,7 +171,7 @@ PLAIN = """
 print("once")
 from scenegen.files.sets.cluster import LOCAL, connected
 with connected(LOCAL, 2, dict) as cluster:
-    print(list(cluster.in_order(abs, [-1, 2, -3])))
+    print(list(cluster.results(abs, [-1, 2, -3])))
 """
 
 

@@ -1,7 +1,6 @@
 """Sets of rooms and of questions: one file to every reader, and the same bytes whatever happens."""
 
 import hashlib
-import json
 import os
 import shutil
 import signal
@@ -15,9 +14,11 @@ import pytest
 from made_sets import SEED, contents, everything, questions, rooms, same_values
 
 from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
-from scenegen.files.sets.manifest import read_manifest, write_manifest
+from scenegen.files.pool import LostWorkerError
+from scenegen.files.sets.making import complete_parts, parts_folder
 from scenegen.files.sets.shards import ROW_DIGESTS
 from scenegen.files.sets.workspace import run_lock
+from scenegen.rooms.render import RoomsWork
 
 TASKS = {
     "rooms": rooms(),
@@ -87,31 +88,21 @@ def test_plain_h5py_and_a_merge_give_the_whole_file(made, tmp_path, monkeypatch)
         assert (tmp_path / name).read_bytes() == (whole / name).read_bytes()
 
 
-def test_a_merge_of_changed_values_leaves_nothing(copied, tmp_path):
+def test_changed_values_are_told_and_never_merged(copied, tmp_path):
     task, folder = copied
-    shard = task.read_manifest(folder).shards_of(task.files[0])[-1]
-    with h5py.File(folder / shard.file, "r+") as file:
+    assert all(check.ok for check in task.verify(folder))
+    with h5py.File(max(folder.glob(task.files[0].replace(".h5", "-*.h5"))), "r+") as file:
         data = file["image" if "image" in file else "unlabeled/questions"]
         data[0] = data[0] ^ 1
+    assert not all(check.ok for check in task.verify(folder))
     with pytest.raises(FileFormatError):
         task.merge(folder / task.files[0], tmp_path / "merged.h5")
     assert not (tmp_path / "merged.h5").exists()
 
 
-def test_a_manifest_lists_the_files_with_rows(made):
-    task, shards, whole = made
-    manifest = task.read_manifest(shards)
-    listed = {record.file: (record.bytes, record.sha256) for record in manifest.shards}
-    data = {name: (shards / name).read_bytes() for name in listed}
-    assert listed == {n: (len(raw), hashlib.sha256(raw).hexdigest()) for n, raw in data.items()}
-    assert {path.name for path in shards.iterdir()} == {*task.files, task.manifest, *listed}
-    assert manifest.complete
-    assert (whole / task.manifest).exists() == (len(task.files) > 1)
-
-
 def test_row_digests_are_those_of_the_rows(made):
-    task, folder, _ = made
-    with h5py.File(folder / task.read_manifest(folder).shards[0].file) as file:
+    folder = made[1]
+    with h5py.File(min(folder.glob("*-of-*.h5"))) as file:
         for number, name in enumerate(file[ROW_DIGESTS].attrs["names"]):
             values = file[name][()]
             rows = [row.tobytes() for row in values]
@@ -123,79 +114,91 @@ def test_row_digests_are_those_of_the_rows(made):
             assert [row.tobytes() for row in stored] == expected, name
 
 
-def test_a_damaged_or_lost_shard_is_named_and_made_again(copied, made):
-    task, folder = copied
-    assert all(check.ok for check in task.verify(folder))
-    damaged, lost = (task.read_manifest(folder).shards[i].file for i in (1, -1))
-    flip(folder / damaged)
-    (wrong,) = [check for check in task.verify(folder) if not check.ok]
-    assert (wrong.name, damaged in wrong.detail) == ("checksums", True)
-    (folder / lost).unlink()
-    task.shards(folder)
-    assert contents(folder) == contents(made[1])
-
-
 @pytest.mark.parametrize(
     ("made", "share"), [("views", 0.0), ("questions", 0.5), ("views", 1.0)], indirect=["made"]
 )
 def test_a_run_goes_on_where_it_stopped(made, tmp_path, share):
-    """The manifest lacks a file that is complete, as after a kill at that moment."""
+    """One part is lost and one damaged; what readers open appears at the end."""
     task, folder = made[0], tmp_path / "set"
     with pytest.raises(StopError):
         task.shards(folder, progress=stopping(share * (task.rows - 1)))
+    assert not contents(folder)
+    kept = sorted(task.parts(folder).values()) if share else []
     if not share:
         assert not list(tmp_path.rglob("*.*")), "nothing was complete"
     else:
-        manifest = task.read_manifest(folder)
-        assert not manifest.complete
-        lacking = {**vars(manifest), "shards": manifest.shards[:-1]}
-        write_manifest(folder / task.manifest, type(manifest)(**lacking))
-    kept = {folder / r.file for r in task.read_manifest(folder).shards} if share else set()
-    before = {path: path.stat().st_mtime_ns for path in kept}
-    for other in ({"seed": 9}, {"shard_size": 5}, {"compression": "none"}) if kept else ():
+        lost, damaged, *kept = kept
+        lost.unlink()
+        flip(damaged)
+    before = {path.stem: path.stat().st_mtime_ns for path in kept}
+    for other in ({"seed": 9}, {"shard_size": 5}, {"compression": "none"}) if share else ():
         with pytest.raises(SpecError):
             task.shards(folder, **other)
     rows = []
     task.shards(folder, progress=rows.append)
     assert sum(rows) == task.rows
-    assert {path: path.stat().st_mtime_ns for path in kept} == before
+    assert {name: (folder / name).stat().st_mtime_ns for name in before} == before
     assert contents(folder) == contents(made[1])
     assert hidden(folder) == []
     with pytest.raises(FileExistsError):
         task.shards(folder)
 
 
+@pytest.mark.parametrize("made", ["questions"], indirect=True)
+@pytest.mark.parametrize("moved", [0, 1, 5])
+def test_a_run_that_stopped_while_files_got_their_names_goes_on(made, tmp_path, monkeypatch, moved):
+    """Other files there are never replaced but with `overwrite`."""
+    task, folder = made[0], tmp_path / "set"
+    folder.mkdir()
+    count = iter(range(100))
+
+    def move(path, place):
+        if place.parent == folder and next(count) >= moved:
+            raise StopError
+        os.replace(path, place)
+
+    monkeypatch.setattr("scenegen.files.sets.making.move", move)
+    with pytest.raises(StopError):
+        task.shards(folder)
+    monkeypatch.undo()
+    assert contents(folder).items() <= contents(made[1]).items()
+    (folder / task.files[0]).write_text("mine")
+    with pytest.raises(FileExistsError):
+        task.shards(folder)
+    assert (folder / task.files[0]).read_text() == "mine"
+    task.shards(folder, overwrite=True)
+    assert contents(folder) == contents(made[1])
+    assert hidden(folder) == []
+
+
 @pytest.mark.parametrize(
     "task", [TASKS["views"], pytest.param(TASKS["questions"], marks=pytest.mark.slow)], ids=TASK_IDS
 )
-def test_other_requests_are_refused_by_name_and_replace_only_when_told(task, tmp_path):
+def test_files_are_replaced_only_when_told(task, tmp_path):
+    """Older files stay until the new ones are complete; parts of the same request are kept."""
     folder = tmp_path / "set"
     task.shards(folder)
     before = contents(folder)
-    for other, word in (
-        ({"seed": 9}, "seed"),
-        ({"shard_size": 5}, "shard-size"),
-        ({"compression": "none"}, "compression"),
-        ({"height": 40}, "height"),
-        ({"shard_size": 100}, "shard-size"),
-    ):
-        with pytest.raises(SpecError) as refused:
-            task.shards(folder, **other)
-        assert word in refused.value.found
+    for make in (task.make, task.shards):
+        with pytest.raises(FileExistsError):
+            make(folder, seed=9)
+    with pytest.raises(StopError):
+        task.shards(folder, overwrite=True, seed=9, progress=stopping(task.rows - 1))
     assert contents(folder) == before
+    kept = {name: path.stat().st_mtime_ns for name, path in task.parts(folder).items()}
+    task.shards(folder, overwrite=True, seed=9)
+    assert {name: (folder / name).stat().st_mtime_ns for name in kept} == kept
+    assert contents(folder).keys() == before.keys()
+    with pytest.raises(StopError):
+        task.shards(folder, overwrite=True, seed=8, progress=stopping(task.rows - 1))
+    with pytest.raises(SpecError):
+        task.make(folder)
     task.make(folder, overwrite=True)
     whole = contents(folder)
     assert whole.keys() == set(task.files)
-    with pytest.raises((FileExistsError, SpecError)):
-        task.shards(folder)
-    task.shards(folder, overwrite=True, seed=9)
     task.shards(folder, overwrite=True)
     assert contents(folder) == before
-    (folder / task.manifest).write_text("{")
-    with pytest.raises(FileFormatError):
-        task.shards(folder)
-    task.make(folder, overwrite=True)
-    assert contents(folder) == whole
+    assert hidden(folder) == []
 
 
 @BOTH
@@ -217,24 +220,10 @@ def test_files_of_others_are_kept(task, tmp_path):
 def test_two_runs_never_make_one_set(task, tmp_path):
     folder = tmp_path / "set"
     folder.mkdir()
-    place = folder / task.manifest
-    with run_lock(folder / f".{task.manifest}.lock", place), pytest.raises(SceneGenError):
+    first = folder / task.files[0]
+    with run_lock(folder / f".{first.name}.lock", first), pytest.raises(SceneGenError):
         task.shards(folder)
     assert list(folder.iterdir()) == []
-
-
-def test_a_manifest_of_other_files_is_never_replaced(tmp_path):
-    task = TASKS["rooms"]
-    task.shards(tmp_path)
-    (tmp_path / "rooms.h5").rename(tmp_path / "rooms.hdf5")
-    manifest = task.read_manifest(tmp_path)
-    write_manifest(
-        tmp_path / task.manifest, type(manifest)(**{**vars(manifest), "files": ("rooms.hdf5",)})
-    )
-    for overwrite in (False, True):
-        for make in (task.make, task.shards):
-            with pytest.raises(SpecError):
-                make(tmp_path, overwrite=overwrite)
 
 
 @BOTH
@@ -278,44 +267,48 @@ def test_workers_and_batches_never_change_a_byte(made, tmp_path, monkeypatch, wo
     assert contents(tmp_path / "shards") == contents(made[1])
 
 
+class DyingRooms(RoomsWork):
+    """Work whose process a signal ends at scene 4: once, or always."""
+
+    def packed_rows(self, block, workers):
+        tried = Path(os.environ["TRIED"])
+        if 4 in block.items and (os.environ["DIES"] == "always" or not tried.exists()):
+            tried.touch()
+            os.kill(os.getpid(), signal.SIGSEGV)
+        return (yield from super().packed_rows(block, workers))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
+@pytest.mark.parametrize("made", ["views"], indirect=True)
+def test_no_scene_stops_a_run_for_ever(made, tmp_path, monkeypatch):
+    """A crash that happens again is told with its scenes, and what is complete is kept."""
+    task, folder = made[0], tmp_path / "set"
+    monkeypatch.setattr("scenegen.rooms.make.RoomsWork", DyingRooms)
+    monkeypatch.setenv("TRIED", str(tmp_path / "tried"))
+    monkeypatch.setenv("DIES", "always")
+    with pytest.raises(LostWorkerError) as lost:
+        task.shards(folder, workers=2)
+    assert lost.value.where.startswith("scenes 4 to 7:")
+    assert lost.value.found == "signal 11, SIGSEGV"
+    assert list(task.parts(folder)) == ["rooms-00000-of-00003.h5"]
+    monkeypatch.setenv("DIES", "once")
+    (tmp_path / "tried").unlink()
+    task.shards(folder, workers=2)
+    assert contents(folder) == contents(made[1])
+
+
 @pytest.mark.parametrize("made", ["questions"], indirect=True)
 def test_no_file_but_the_answers_tells_the_seed(made, tmp_path):
     task, known, _ = made
-    task.shards(tmp_path / "secret", secret=True, command="")
-    for folder in (tmp_path / "secret", known):
-        for path in folder.iterdir():
-            tells = str(SEED).encode() in path.read_bytes()
-            assert tells == (folder == known and path.match("iqtt-test-answers*")), path.name
+    with pytest.raises(StopError):
+        task.shards(tmp_path / "part", secret=True, command="", progress=stopping(task.rows - 1))
     with pytest.raises(SpecError):
-        task.shards(tmp_path / "secret", secret=False)
-
-
-@pytest.mark.parametrize("made", ["views"], indirect=True)
-@pytest.mark.parametrize("name", ["../rooms.h5", "", "a/b", ".."])
-def test_a_manifest_names_only_files_beside_it(copied, name):
-    task, folder = copied
-    stored = json.loads((folder / task.manifest).read_text())
-    first, second, *others = stored["shards"]
-    for wrong in ({"files": [name]}, {"shards": [first, second | {"file": name}, *others]}):
-        (folder / task.manifest).write_text(json.dumps(stored | wrong))
-        with pytest.raises(FileFormatError):
-            task.read_manifest(folder)
-
-
-@pytest.mark.parametrize("made", ["views"], indirect=True)
-def test_no_manifest_is_believed(copied):
-    task, folder = copied
-    stored = json.loads((folder / task.manifest).read_text())
-    for wrong in (
-        {"files": []}, {"spec": "[]"}, {"spec": "{"}, {"count": 0}, {"count": 10**30},
-        {"count": 4 * 10**9}, {"shards": []}, {"shard_size": -1}, {"format": "2"},
-    ):  # fmt: skip
-        (folder / task.manifest).write_text(json.dumps(stored | wrong))
-        try:
-            checks = task.verify(folder)
-        except FileFormatError:
-            continue
-        assert not all(check.ok for check in checks), wrong
+        task.shards(tmp_path / "part", secret=False)
+    task.shards(tmp_path / "secret", secret=True, command="")
+    for folder in (tmp_path / "secret", tmp_path / "part", known):
+        for path in folder.rglob("*.*"):
+            tells = path.is_file() and str(SEED).encode() in path.read_bytes()
+            assert tells == (folder == known and path.match("iqtt-test-answers*")), path.name
 
 
 HELD = """
@@ -366,28 +359,26 @@ def test_the_same_command_goes_on(run, tmp_path, monkeypatch, workers):
     """After SIGKILL, and then after SIGTERM, which is answered with how to go on."""
     command = [*RENDER.split(), "--workers", workers]
     monkeypatch.setattr(sys, "argv", ["scenegen", *command])  # is recorded
-    done = {}
+    home, done = parts_folder(tmp_path / "rooms.h5"), {}
     for number in (signal.SIGKILL, signal.SIGTERM):
-        before = len(list(tmp_path.glob("rooms-*.h5")))
         process = subprocess.Popen(
             [sys.executable, "-c", SLOWLY, *command], cwd=tmp_path,
             stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
         deadline = time.monotonic() + 60
-        while len(list(tmp_path.glob("rooms-*.h5"))) <= before and time.monotonic() < deadline:
+        while len(complete_parts(home)) <= len(done) and time.monotonic() < deadline:
             time.sleep(0.01)
         process.send_signal(number)
         _, message = process.communicate(timeout=30)
         assert process.returncode == (143 if number == signal.SIGTERM else -number), message
-        assert not (tmp_path / "rooms.h5").exists()
-        assert {path: path.stat().st_mtime_ns for path in done} == done, "complete shards are kept"
-        records = read_manifest(tmp_path / "rooms.manifest.json").shards
-        done = {p: p.stat().st_mtime_ns for p in (tmp_path / record.file for record in records)}
-        assert len(done) >= len(list(tmp_path.glob("rooms-*.h5"))) - 1
-    assert f"{len(done)} of 12 shards are complete" in message
-    assert hidden(tmp_path) == []
+        assert not contents(tmp_path)
+        now = {p.stem: p.stat().st_mtime_ns for p in complete_parts(home).values()}
+        assert now.items() >= done.items(), "complete shards are kept"
+        done = now
+    assert f"{len(done)} shards are complete" in message
+    assert [path.name for path in home.glob(".*")] == []
     assert run(*command).exit_code == 0
-    assert {path: path.stat().st_mtime_ns for path in done} == done
+    assert {name: (tmp_path / name).stat().st_mtime_ns for name in done} == done
     assert hidden(tmp_path) == []
     unbroken = tmp_path / "unbroken"
     unbroken.mkdir()

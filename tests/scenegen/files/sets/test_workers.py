@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 import warnings
 from pathlib import Path
 from unittest.mock import Mock
@@ -16,7 +17,6 @@ import pytest
 from scenegen.common.errors import SceneGenError
 from scenegen.files import pool
 from scenegen.files.pool import LostWorkerError
-from scenegen.files.sets import workers
 from scenegen.files.sets.workers import in_order, in_processes, in_threads
 
 BUSY = """
@@ -108,26 +108,59 @@ def _strange(task):
 def test_a_process_that_ends_by_itself_is_told():
     with pytest.raises(LostWorkerError) as lost:
         list(in_processes(os._exit, [1, 2, 3], 2))
-    assert lost.value.found.startswith("exit code")
+    assert (lost.value.found.startswith("exit code"), lost.value.hint) == (True, "")
 
 
-def test_processors_are_those_of_the_cgroup(tmp_path):
-    """Version 2 with a limit above and none here; version 1; a limit that is no number."""
-    cgroup, root = tmp_path / "cgroup", tmp_path / "fs"
-    for line, file, text, limit in [
-        ("0::/pod/box", "pod/cpu.max", "150000 100000", 1.5),
-        ("0::/pod/box", "pod/box/cpu.max", "max 100000", 1.5),
-        ("0::/", "cpu.max", "50000 100000", 0.5),
-        ("4:memory:/x\n3:cpu,cpuacct:/box", "cpu/box/cpu.cfs_quota_us", "300000", math.inf),
-        ("4:memory:/x\n3:cpu,cpuacct:/box", "cpu/box/cpu.cfs_period_us", "100000", 3.0),
-        ("3:cpu:/", "cpu/cpu.cfs_quota_us", "-1", math.inf),
-    ]:
-        cgroup.write_text(line + "\n")
-        (root / file).parent.mkdir(parents=True, exist_ok=True)
-        (root / file).write_text(text + "\n")
-        assert workers._cgroup_processors(root, str(cgroup)) == limit
-    assert workers._cgroup_processors(root, str(tmp_path / "none")) == math.inf
-    assert 1 <= workers.processors() <= os.cpu_count()
+def _dies_by(folder, number, dying, task):
+    """Return the square; a signal ends the process at 3, at the first try or at each."""
+    if task == 3 and (dying == "always" or not (folder / "tried").exists()):
+        (folder / "tried").touch()
+        os.kill(os.getpid(), number)
+    return task * task
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
+@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGKILL])
+def test_a_task_whose_process_a_signal_ended_is_done_again_once(tmp_path, number):
+    for dying in ("once", "always"):
+        results = in_processes(
+            functools.partial(_dies_by, tmp_path, number, dying), range(8), 2, "square {}".format
+        )
+        if dying == "once":
+            assert list(results) == [task * task for task in range(8)]
+            continue
+        with pytest.raises(LostWorkerError) as lost:
+            list(results)
+    assert lost.value.where.startswith("square 3:")
+    assert lost.value.found == f"signal {number:d}, {number.name}"
+    assert ("memory" in lost.value.hint) == (number == signal.SIGKILL)
+
+
+def _alone(folder, task):
+    """Return how many tasks are being done; the process of task 1 dies once."""
+    if task == 1 and not (folder / "tried").exists():
+        (folder / "tried").touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    mine = folder / f"running-{task}"
+    mine.touch()
+    time.sleep(0.3)
+    running = len(list(folder.glob("running-*")))
+    mine.unlink()
+    return running
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
+def test_what_is_done_again_is_done_alone(tmp_path):
+    running = list(in_processes(functools.partial(_alone, tmp_path), range(9), 3))
+    assert running[1] == 1
+
+
+def test_memory_is_blamed_where_the_kernel_says_so(monkeypatch):
+    counts = iter(range(10))
+    monkeypatch.setattr(pool, "oom_kills", lambda: next(counts))
+    with pytest.raises(LostWorkerError) as lost:
+        list(in_processes(os._exit, [1], 1))
+    assert "memory" in lost.value.hint
 
 
 def test_where_no_processes_are_to_be_had_workers_are_named(monkeypatch):

@@ -5,11 +5,11 @@ import pytest
 from trimesh import Trimesh
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from scenegen.description.names import SHAPE_NAMES
+from scenegen.description.shapes import BASIC_SHAPES
 from scenegen.objects.basic_shapes import unit_shape
 from scenegen.rendering.surfaces.in_numpy import cast_at_surface
 
-EXACT = tuple(name for name in SHAPE_NAMES if name != "teapot")
+EXACT = tuple(shape.name for shape in BASIC_SHAPES if shape.volume)
 POLYHEDRA = set(EXACT) - {"sphere", "cone", "torus", "cylinder", "capsule"}
 RAYS = 5000  # from outside, and as many from inside
 TESSELLATION = 4.5e-5  # how far a mesh may lie off its surface
