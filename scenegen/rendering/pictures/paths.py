@@ -19,7 +19,7 @@ dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
 # Of a sequence whose points fill four dimensions evenly (M. Roberts' R4).
 STEPS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)
-OFF = 1e-4  # of a surface's distance, in units of length, at which rays start
+OFF = 1e-4  # from a surface to the start of its rays, in the unit of length of the room
 
 
 class Meeting(NamedTuple):

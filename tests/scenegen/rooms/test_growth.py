@@ -25,8 +25,9 @@ from scenegen.rooms.render import render_items
 share_processors(2)
 root, cache = sys.argv[1:]
 source = object_source("interiors", objects_root=root or None, cache_dir=cache)
-settings = {"objects": (3, 9), "height": 32, "width": 32, **source.settings}
-spec = preset_spec("interiors", seed=5, **settings)
+small = {"height": 32, "width": 32, "min_visible_pixels": 1}
+few = {"objects": (12, 24)} if root else {}
+spec = preset_spec("interiors", seed=5, **small, **few, **source.settings)
 done = 0
 for items in render_items(spec, range(400), 16, "auto", source.objects, ("depth", "object_id")):
     for _ in items:
