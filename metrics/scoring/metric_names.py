@@ -3,7 +3,7 @@
 To add a metric: write its function in `metrics.measures`, call it where images are scored, and add
 a row here. All lists of metrics are read from these rows: the order in files and tables, what is
 printed first, units, directions, bounds, baselines of skills, roots, and the table of
-`docs/scores.md`, which `markdown_table` makes.
+`docs/scores.md`, which `python -m metrics.scoring.metric_names` prints.
 """
 
 import itertools
@@ -515,3 +515,7 @@ def markdown_table() -> str:
         rows.append((f"{begins}<score>", *["the same"] * 4, text))
     head = ["| name | of | unit | better | worst | definition |", "| --- " * 6 + "|"]
     return "\n".join([*head, *(f"| `{name}` | {' | '.join(cells)} |" for name, *cells in rows)])
+
+
+if __name__ == "__main__":
+    print(markdown_table())

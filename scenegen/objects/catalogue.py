@@ -96,7 +96,7 @@ class _Furniture:
         return name.partition("/")[0] in self.store.folder.models
 
 
-@recent(400_000_000)
+@recent(250_000_000)  # bytes: some 400 built-in pieces, more than the rooms of a street show
 def _kept(furniture: _Furniture | None, name: str) -> UnitShape:
     """Return a piece of furniture, of a folder's models or of a family's members."""
     if furniture is None:

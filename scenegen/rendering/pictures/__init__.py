@@ -3,7 +3,7 @@
 - `paths` follows light through a `Room`; `paper_rooms` and `closed_rooms` are the two kinds.
   `tracer` makes pictures of them.
 - `matter` gathers a closed room's triangles and materials in arrays of the same form for all rooms,
-  so that one compiled kernel serves them all; `surfaces` looks them up where rays meet them.
+  so that one compiled kernel serves them all.
 - `lights` are sun, sky and lamps, sampled by their power; `sky` draws what is outside.
 - `denoiser` removes noise, `development` exposes and applies the tone curve.
 

@@ -31,7 +31,7 @@ WARM = (1.0, 0.72, 0.44)  # linear RGB of lamps, of some 3000 K
 
 @dataclass(frozen=True, eq=False)
 class Tables:
-    """Materials of triangles, as `surfaces` looks them up.
+    """Materials of triangles, as `closed_rooms` looks them up.
 
     Attributes:
         of_face: row of each triangle's material, (F,) uint32.

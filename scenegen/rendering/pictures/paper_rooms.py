@@ -17,7 +17,7 @@ import numpy as np
 
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.pictures.paths import Lobes, Meeting
+from scenegen.rendering.pictures.paths import Meeting
 from scenegen.rendering.rays import (
     BEFORE_LIGHTS,
     Scenes,
@@ -129,7 +129,7 @@ class PaperRooms:
         ambient, background = mi.Color3f(*about[:3]), mi.Color3f(*about[8:BEFORE_LIGHTS])
         return dr.select(direct, background, ambient), mi.Float(0)
 
-    def sample_light(self, lobes: Lobes, p: Any, which: Any, _place: Any) -> tuple[Any, ...]:
+    def sample_light(self, lobes: Any, p: Any, which: Any, _place: Any) -> tuple[Any, ...]:
         """Draw one of the lights by what the surface reflects of it, shadows apart."""
         about, total, lights = self._about(), mi.Float(0), []
         for j in range(self.scenes.light_slots):

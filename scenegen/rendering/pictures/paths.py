@@ -19,20 +19,7 @@ dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
 # Of a sequence whose points fill four dimensions evenly (M. Roberts' R4).
 STEPS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)
-OFF = 1e-4  # of a surface's distance, in units of length, at which rays start
-
-
-class Lobes(Protocol):
-    """What surfaces do with light that rays meet there."""
-
-    def reflected(self, wo: Any) -> tuple[Any, Any]:
-        """Return f cos(theta) for light from `wo`, world, and the density of `sampled`."""
-
-    def sampled(self, one: Any, two: Any) -> tuple[Any, Any, Any]:
-        """Draw directions from one of the lobes, weighted by the density of all.
-
-        Returns directions, world, f cos(theta) over density, and the density, which may be 0.
-        """
+OFF = 1e-4  # from a surface to the start of its rays, in the unit of length of the room
 
 
 class Meeting(NamedTuple):
@@ -41,6 +28,9 @@ class Meeting(NamedTuple):
     Attributes:
         p: position.
         flat: normal of the surface without bumps, on the side of the ray.
+        lobes: what the surface does with light. `reflected` returns f cos(theta) for light from a
+            direction, world, and the density of `sampled`. That draws directions by three random
+            numbers, and returns them, f cos(theta) over density, and density, which may be 0.
         color, normal: base colour and normal that a denoiser is told.
         shines: whether it gives light, and reflects none.
         radiance: of its light along the ray.
@@ -49,7 +39,7 @@ class Meeting(NamedTuple):
 
     p: Any
     flat: Any
-    lobes: Lobes
+    lobes: Any
     color: Any
     normal: Any
     shines: Any
@@ -77,7 +67,7 @@ class Room(Protocol):
         `direct` says which of them come from the camera.
         """
 
-    def sample_light(self, lobes: Lobes, p: Any, which: Any, place: Any) -> tuple[Any, ...]:
+    def sample_light(self, lobes: Any, p: Any, which: Any, place: Any) -> tuple[Any, ...]:
         """Draw directions to lights from points `p`.
 
         Args:

@@ -23,7 +23,7 @@ from scenegen.rendering.drjit_renderer import padded_rays, upload_scenes
 from scenegen.rendering.ground_truth import encode_image
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.pictures.assets import environment_of, materials_of
-from scenegen.rendering.pictures.closed_rooms import ClosedRoom
+from scenegen.rendering.pictures.closed_rooms import ClosedRoom, closed_room
 from scenegen.rendering.pictures.denoiser import denoised
 from scenegen.rendering.pictures.development import develop
 from scenegen.rendering.pictures.lights import Window, lights_of
@@ -31,7 +31,6 @@ from scenegen.rendering.pictures.matter import gather_matter
 from scenegen.rendering.pictures.paper_rooms import PaperRooms, with_intensities
 from scenegen.rendering.pictures.paths import Camera, Room, Samples, trace_paths
 from scenegen.rendering.pictures.sky import SUNLESS, Outside, outside, sun_height
-from scenegen.rendering.pictures.surfaces import Surfaces, lobes_at, meet, surfaces_of
 from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.tables import gather_row, upload
 
@@ -98,7 +97,7 @@ def _lit_room(batch: SceneBatch, b: int) -> tuple[ClosedRoom, float]:
     x, y, z = interior.size
     # Of walls that reflect half of the light, the mean radiance in all directions.
     mean = lights.flux / (2 * np.pi * (x * y + y * z + z * x))
-    return ClosedRoom(surfaces_of(matter, lights.by_area), lights), mean
+    return closed_room(matter, lights), mean
 
 
 def _trace_one(
@@ -125,7 +124,7 @@ def _trace_one(
     image, exposure = develop(radiance, albedo, hit[..., 0] > 0.5, spec.image_dtype, noise)
     found = {"image": image, "exposure": exposure}
     if "albedo" in names:
-        found["albedo"] = _albedo(spec, room.surfaces, camera)
+        found["albedo"] = _albedo(spec, room, camera)
     return found
 
 
@@ -161,12 +160,12 @@ def device_camera(batch: SceneBatch, b: int) -> Camera:
     return Camera(*(mi.Vector3f(*values[i : i + 3]) for i in (0, 3, 6, 9)), *values[12:])
 
 
-def _albedo(spec: InteriorSpec, surfaces: Surfaces, camera: Camera) -> Array:
+def _albedo(spec: InteriorSpec, room: Room, camera: Camera) -> Array:
     """Return the base colour where the ray through each pixel's centre hits; NaN for nothing."""
     index = dr.arange(mi.UInt32, spec.height * spec.width)
     d = camera.ray(mi.Float(index % spec.width) + 0.5, mi.Float(index // spec.width) + 0.5)
-    found, hit = meet(surfaces, mi.Point3f(camera.origin), d, True)
-    color = dr.select(found, lobes_at(surfaces, hit, d).color, dr.nan)
+    found, hit = room.meet(mi.Point3f(camera.origin), d, True)
+    color = dr.select(found, hit.color, dr.nan)
     values = np.stack([np.asarray(v, np.float32) for v in color], -1)
     return values.reshape(spec.height, spec.width, 3)
 

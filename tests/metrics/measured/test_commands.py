@@ -110,7 +110,7 @@ def test_pages_and_figures_are_drawn(here):
     assert made("--unit", "mm", "--invalid", "0", "--groups", "scenes.csv").exit_code == 0
     done(*WAY, *PICTURES)
     assert Path("a.html").read_text().count("data:image/webp") >= 4
-    assert Path("c.html").read_text().count("data:image/webp") >= 4
+    assert "better/worse/same" in Path("c.html").read_text()
     assert Path("grid.png").stat().st_size > 5000
     assert Path("all.svg").read_text().count("<g id") > 20
     assert not set(OBJECT_SCORES) & set(read_scores("a.json").metrics)
@@ -209,6 +209,29 @@ def test_what_is_no_depth_has_none(value, here):
         stored = np.load("gt/depth_0.npy")
         known = (stored > 0) & (stored < 1e38)
         assert np.array_equal(np.isfinite(truth.view(0).depth), known)
+
+
+def test_one_file_of_all_rows_with_masks_and_normals(here):
+    """Normals of OpenCV's axes become ours, and have length 1; a mask of 0 takes depth out."""
+    depth = np.stack([scene(i, 48, 64) for i in range(8)])
+    np.savez("all.npz", depth=depth[..., None])
+    np.save("normals.npy", np.broadcast_to(np.float32([0.0, 3.0, -4.0]), (8, 48, 64, 3)))
+    mask = np.ones((48, 64), np.uint8)
+    mask[:, :5] = 0
+    (here / "masks").mkdir()
+    for i in range(8):
+        Image.fromarray(mask).save(f"masks/frame_{i}.png")
+    more = ["--normals", "normals.npy", "--mask", "masks"]
+    done = made("--unit", "m", "--depth", "all.npz", *more)
+    assert done.exit_code == 0, done.output
+    with MeasuredFile("mine.h5") as truth:
+        view = truth.view(6)
+    np.testing.assert_allclose(view.depth[:, 5:], depth[6, :, 5:], rtol=1e-6)
+    assert np.isnan(view.depth[:, :5]).all()
+    np.testing.assert_allclose(view.normal[7, 9], [0.0, -0.6, 0.8], rtol=1e-6)
+    Image.fromarray(mask[1:]).save("masks/frame_3.png")
+    found = made("--unit", "m", "--depth", "all.npz", *more, "--overwrite")
+    assert (found.exit_code, found.stderr.count("\n")) == (2, 1)
 
 
 def linked(path):

@@ -165,7 +165,8 @@ def test_the_order_is_that_of_the_table():
 
 
 def test_the_docs_hold_the_table():
-    assert f"\n\n{markdown_table()}\n\n" in DOCS.read_text()
+    anew = "put what `python -m metrics.scoring.metric_names` prints into docs/scores.md"
+    assert f"\n\n{markdown_table()}\n\n" in DOCS.read_text(), anew
     assert all(row.count(" | ") == 5 for row in markdown_table().splitlines())
 
 

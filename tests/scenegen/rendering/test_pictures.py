@@ -144,11 +144,11 @@ def radiance_of_floor(lamp=None, sky=0.0, sun=(0.0, 0.0), windows=(), share=0.0,
     import drjit as dr
     import mitsuba as mi
 
+    from scenegen.rendering.pictures.closed_rooms import closed_room
     from scenegen.rendering.pictures.lights import lights_of
     from scenegen.rendering.pictures.matter import Matter, Soup, tables_of
     from scenegen.rendering.pictures.paths import Camera, trace_paths
     from scenegen.rendering.pictures.sky import Outside
-    from scenegen.rendering.pictures.surfaces import surfaces_of
 
     mi.set_variant("llvm_ad_rgb")
     corners = [[[-9, 0, -9], [-9, 0, 9], [9, 0, 9]], [[-9, 0, -9], [9, 0, 9], [9, 0, -9]]]
@@ -172,9 +172,9 @@ def radiance_of_floor(lamp=None, sky=0.0, sun=(0.0, 0.0), windows=(), share=0.0,
     camera = Camera(*axes, *map(mi.Float, (1e-4, 4, 4)))
     lanes, each = dr.arange(mi.UInt32, 256), spp // 256
     sums = trace_paths(
-        surfaces_of(matter, lights.by_area), lights, camera, mi.Float(lanes % 4), mi.Float(1),
+        closed_room(matter, lights), camera, mi.Float(lanes % 4), mi.Float(1),
         mi.Float(np.full(2 * spp, 0.5, np.float32)), dr.zeros(mi.UInt32, 256), mi.UInt32(each),
-        mi.UInt64(3), mi.Float(np.inf),
+        mi.PCG32(1, mi.UInt64(3), mi.UInt64(lanes)), mi.Float(np.inf),
     )  # fmt: skip
     return float(np.mean(np.asarray(sums.radiance.x))) / each
 

@@ -165,6 +165,13 @@ def test_rooms_have_shadows_and_light_in_them():
     assert (traced[lit] > 0.97 * hard.image[0][lit]).mean() > 0.95, "light only adds up"
 
 
+def test_walls_block_light_from_behind(variant):
+    behind = Light((-1.0, 0.5, 0.5), (1.0,) * 3)
+    room = replace(OPEN, objects=(), lights=(behind,), room_reflectance=(0.7,) * 3)
+    image = render(pack(replace(PATH, objects=(0, 1)), [room])).image
+    assert (image == 0).all()
+
+
 def test_a_glossy_room_scene_is_the_same_picture_as_the_papers(scenes_of):
     """The image is upright, and the lights are in their places.
 

@@ -25,7 +25,9 @@ from scenegen.rooms.render import render_items
 share_processors(2)
 root, cache = sys.argv[1:]
 source = object_source("interiors", objects_root=root or None, cache_dir=cache)
-spec = preset_spec("interiors", height=32, width=32, seed=5, **source.settings)
+small = {"height": 32, "width": 32, "min_visible_pixels": 1}
+few = {"objects": (12, 24)} if root else {}
+spec = preset_spec("interiors", seed=5, **small, **few, **source.settings)
 done = 0
 for items in render_items(spec, range(400), 16, "auto", source.objects, ("depth", "object_id")):
     for _ in items:
@@ -36,9 +38,10 @@ for items in render_items(spec, range(400), 16, "auto", source.objects, ("depth"
 
 
 def write_models(root, count, side):
-    """Chairs, tables and so on, each a sphere with a picture of its own, of side x side pixels."""
-    sphere = trimesh.creation.uv_sphere(count=(24, 24))
-    uv = sphere.vertices[:, :2] / 2 + 0.5
+    """Chairs, tables and so on, each a ball on a box with a picture of side x side pixels."""
+    ball, box = trimesh.creation.uv_sphere(0.5, count=(24, 24)), trimesh.creation.box((2, 2, 2))
+    model = trimesh.util.concatenate([ball.apply_translation((0, 1.5, 0)), box])
+    uv = model.vertices[:, :2] / 2 + 0.5
     rng = np.random.default_rng(0)
     for i in range(count):
         folder = root / CLASSES[i % len(CLASSES)]
@@ -46,8 +49,8 @@ def write_models(root, count, side):
         shades = rng.integers(0, 256, (side // 16, side // 16, 3), np.uint8)
         picture = Image.fromarray(shades).resize((side, side), Image.Resampling.NEAREST)
         material = trimesh.visual.material.SimpleMaterial(image=picture)
-        sphere.visual = trimesh.visual.TextureVisuals(uv, material=material)
-        scaled = sphere.copy().apply_scale([1.0, 1 + i / count, 1.0])
+        model.visual = trimesh.visual.TextureVisuals(uv, material=material)
+        scaled = model.copy().apply_scale([1.0, 1 + i / count, 1.0])
         (folder / f"{i}.glb").write_bytes(scaled.export(file_type="glb"))
 
 

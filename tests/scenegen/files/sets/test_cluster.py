@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -13,6 +12,7 @@ from pathlib import Path
 import pytest
 from audit_tables import audited
 from click.testing import CliRunner
+from cluster_tasks import crash, fail, shared, slow_square, version_by_process
 
 import cli
 from iqtt.files.make import make_split
@@ -21,7 +21,7 @@ from metrics.scoring.runs import scorer_versions
 from scenegen.common.errors import SceneGenError
 from scenegen.files.pool import LostWorkerError
 from scenegen.files.sets.cluster import LOCAL, connected
-from scenegen.files.sets.making import REQUEST, check_shared
+from scenegen.files.sets.making import REQUEST
 from scenegen.rendering.sameness import renderer_identity
 
 pytest.importorskip("distributed")
@@ -69,27 +69,12 @@ def test_whole_files_and_audits_are_those_of_one_process(cluster, tmp_path):
     assert json.dumps(records[0]) == json.dumps(records[1])
 
 
-def slow_square(folder, number):
-    """Return a square, and leave the number of the process that was asked."""
-    (folder / str(number)).write_text(str(os.getpid()))
-    time.sleep(0.1)
-    return number * number
-
-
 def test_tasks_of_workers_that_die_go_to_others(plain, tmp_path):
     """One of two is killed in the midst of it."""
     squares = plain.results(partial(slow_square, tmp_path), range(12))
     assert next(squares) == 0
     os.kill(int((tmp_path / "0").read_text()), signal.SIGKILL)
     assert [*squares] == [number * number for number in range(1, 12)]
-
-
-def crash(folder, always, number):
-    """Return the number; at 3 a signal ends the process, once or always."""
-    if number == 3 and (always or not (folder / "tried").exists()):
-        (folder / "tried").touch()
-        os.kill(os.getpid(), signal.SIGSEGV)
-    return number
 
 
 def test_a_crash_is_tried_again_and_named(plain, tmp_path):
@@ -101,23 +86,10 @@ def test_a_crash_is_tried_again_and_named(plain, tmp_path):
     assert lost.value.found == "signal 11, SIGSEGV"
 
 
-def fail(number):
-    raise SceneGenError("row 3", "a task that fails", "one that does not", "mend it")
-
-
 def test_errors_of_workers_are_raised_here(plain):
     with pytest.raises(SceneGenError) as raised:
         list(plain.results(fail, range(3)))
     assert raised.value.found == "a task that fails"
-
-
-def versions_of(release):
-    return {"mitsuba_version": release, "process": "any"}
-
-
-def version_by_process(main):
-    """Return another version in every process but one."""
-    return versions_of("3.9.1" if os.getpid() == main else "3.8.0")
 
 
 def test_workers_with_other_versions_are_refused(cluster):
@@ -126,10 +98,6 @@ def test_workers_with_other_versions_are_refused(cluster):
     with pytest.raises(SceneGenError) as refused, connected(address, 0, here) as other:
         list(other.results(len, ["a"]))
     assert "mitsuba_version 3.8.0, not 3.9.1" in refused.value.found
-
-
-def shared(task):
-    check_shared(*task)
 
 
 def test_a_folder_that_workers_do_not_see_is_named(plain, tmp_path):
