@@ -126,15 +126,6 @@ def test_provenance_names_the_libraries_that_compute(folder, questions):
         assert versions == {name: version(name) for name in ("numpy", "pykdtree", "scipy")}
 
 
-def test_the_seed_moves_intervals_only(folder):
-    first, second = (
-        score([folder / "empty-room.h5"], settings=Settings(seed=seed)).metrics["chamfer"]
-        for seed in (0, 1)
-    )
-    assert first.value == second.value
-    assert (first.low, first.high) != (second.low, second.high)
-
-
 def test_views_are_averaged_within_scenes_and_told_by_angle(folder, tmp_path):
     """Rows 0 to 3 become one scene seen from 0, 35, -35 and 80 degrees; the others stay."""
     truth = tmp_path / "rooms.h5"
