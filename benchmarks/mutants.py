@@ -28,6 +28,12 @@ COPIED = ("scenegen", "iqtt", "metrics", "baselines", "cli.py", "pyproject.toml"
 LONGEST = 600  # seconds of the tests of one mutant; one that hangs is killed, too
 
 
+def rows() -> list[dict[str, Any]]:
+    """Return the table."""
+    table: list[dict[str, Any]] = tomllib.loads(TABLE.read_text())["mutant"]
+    return table
+
+
 def copy_tree(folder: Path) -> Path:
     """Copy what the tests need to a folder, and return it."""
     skipped = shutil.ignore_patterns("__pycache__", "*.pyc")
@@ -81,8 +87,7 @@ def survives(mutant: dict[str, Any], tree: Path) -> bool:
 @click.option("--jobs", default=2, help="Mutants at a time.")
 def main(only: str, jobs: int) -> None:
     """Run the mutants; exit with 1 if more than one in twenty survives."""
-    rows = tomllib.loads(TABLE.read_text())["mutant"]
-    rows = [row for row in rows if only in " ".join([row["file"], row["new"], *row["tests"]])]
+    chosen = [r for r in rows() if only in " ".join([r["file"], r["new"], *r["tests"]])]
     started, survivors = time.perf_counter(), []
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(jobs) as pool:
         trees: SimpleQueue[Path] = SimpleQueue()
@@ -97,13 +102,13 @@ def main(only: str, jobs: int) -> None:
             finally:
                 trees.put(tree)
 
-        for row, alive in zip(rows, pool.map(run, rows), strict=True):
+        for row, alive in zip(chosen, pool.map(run, chosen), strict=True):
             print("survives" if alive else "killed  ", row["file"], "|", row["old"].strip(), "->",
                   row["new"].strip(), flush=True)  # fmt: skip
             survivors += [row] * alive
-    killed = len(rows) - len(survivors)
-    print(f"{killed} of {len(rows)} killed in {time.perf_counter() - started:.0f} s")
-    sys.exit(20 * len(survivors) > len(rows))
+    killed = len(chosen) - len(survivors)
+    print(f"{killed} of {len(chosen)} killed in {time.perf_counter() - started:.0f} s")
+    sys.exit(20 * len(survivors) > len(chosen))
 
 
 if __name__ == "__main__":

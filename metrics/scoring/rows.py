@@ -283,11 +283,12 @@ def _in_processes(job: Job, chunks: Sequence[Array], processes: int) -> Iterator
         yield from in_processes(functools.partial(_score_in_worker, job), chunks, processes, _told)
     except LostWorkerError as error:
         hint = error.hint.replace("--workers", "--processes")
-        raise ScoringError(f"{job[0][0][0]}: {error.where}", error.found, "", hint) from error
+        raise ScoringError(job[0][0][0], f"{error.where}: {error.found}", "", hint) from error
 
 
 def _told(rows: Array) -> str:
-    return f"scores of rows {rows[0]} to {rows[-1]}"
+    first, last = (int(np.ravel(row)[0]) for row in (rows[0], rows[-1]))  # of triples the first
+    return f"scores of rows {first} to {last}"
 
 
 def _told_of_several(chunks: Sequence[Array]) -> str:

@@ -52,6 +52,12 @@ def test_looking_straight_up_or_down_is_refused(height: float) -> None:
         _ = Camera((0.3, height, 0.3), (0.3, 0.3, 0.3), 30.0).world_from_camera
 
 
+def test_looking_nearly_straight_down_is_rigid() -> None:
+    rotation = Camera((0.3, 2.0, 0.3 + 1e-5), (0.3,) * 3, 30.0).world_from_camera[:3, :3]
+    np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
+    np.testing.assert_allclose(rotation[:, 0], [1, 0, 0], atol=1e-12)
+
+
 def test_a_camera_looks_elsewhere_and_not_all_around() -> None:
     with pytest.raises(SpecError, match="camera"):
         Camera((0.3, 0.3, 0.3), (0.3, 0.3, 0.3), 30.0)

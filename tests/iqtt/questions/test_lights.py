@@ -27,6 +27,8 @@ def test_lights_are_uniform_where_they_may_be():
     for some in (first, others):
         around = np.arctan2(some[:, 1], some[:, 0])
         assert stats.kstest(around, stats.uniform(-np.pi, 2 * np.pi).cdf).pvalue > 1e-3
+    beside = np.einsum("ni,nji->nj", direction[:, 0, :2], direction[:, 1:, :2])
+    assert (beside < 1e-12).all()  # on the other side of the camera
     level = color.max(axis=2) / 30.0**2
     np.testing.assert_allclose(level.sum(axis=1), spec.light_level)
     np.testing.assert_allclose(level[used], (spec.light_level / count)[np.nonzero(used)[0]])

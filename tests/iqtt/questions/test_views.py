@@ -93,6 +93,10 @@ def test_answers_of_one_shape_or_its_mirror_image_are_related():
     mirrored, related = relations([arrange(drawn, 1, RNG(0))])
     assert mirrored[0].tolist() == [[False, True, False], [True, False, True], [False, True, False]]
     assert (related[0] == ~np.eye(3, dtype=bool)).all()
+    rod = np.arange(3)[:, None] * np.array([1, 0, 0])  # its own mirror image
+    mirrored, related = relations([Shapes(np.stack([rod] * 4), None, 0)])
+    assert not mirrored.any()
+    assert (related[0] == ~np.eye(3, dtype=bool)).all()
 
 
 def test_no_outline_is_shown_twice_in_a_question():
@@ -217,6 +221,7 @@ def test_whether_crowded_shapes_are_asked_for_does_not_tell_which_is_right(monke
             shown.append(np.isfinite(turns).all(axis=(1, 2, 3)))
         return np.array(shown)
 
+    monkeypatch.setattr(module, "CROWDED", 12)  # these have just so many
     fair = came_about()
     assert (fair == fair[0]).all()
     assert 0 < fair[0].sum() < 24

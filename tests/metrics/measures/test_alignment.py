@@ -8,7 +8,12 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from metrics.measures import alignment
-from metrics.measures.alignment import align_points, l1_scale, l1_scale_shift
+from metrics.measures.alignment import (
+    align_points,
+    depth_of_disparity,
+    l1_scale,
+    l1_scale_shift,
+)
 from metrics.measures.checks import MeasureError
 
 DEPTHS = st.lists(
@@ -70,3 +75,21 @@ def test_a_line_through_many_points_is_found_from_few(noise, monkeypatch):
     assert scales[0] == scales[1]
     assert sums[1] == pytest.approx(sums[0], rel=1e-13, abs=1e-9)
     assert noise == 0.0 or alignment._l1_of_many(p, t, 1.0 / t) is not None
+
+
+def test_where_few_points_mislead_the_line_is_that_of_all(monkeypatch):
+    """Every 20th point, and so all that are looked at first, lies on another line."""
+    rng = np.random.default_rng(1)
+    p = rng.uniform(1.0, 5.0, 20_000)
+    t = np.where(np.arange(len(p)) % 20, 2.0 * p + 1.0 + rng.normal(0.0, 0.5, len(p)), p)
+    best = l1_scale_shift(p, t, 1.0 / t)
+    monkeypatch.setattr(alignment, "MANY", 10_000)
+    monkeypatch.setattr(alignment, "SOME", 1000)
+    assert l1_scale_shift(p, t, 1.0 / t) == pytest.approx(best, rel=1e-9)
+
+
+def test_no_depth_of_disparity_exceeds_its_cap():
+    true = np.array([1.0, 2.0, 4.0])
+    for cap, expected in ((None, [1, 2, 4]), (3.0, [1, 2, 3]), (9.0, [1, 2, 4])):
+        assert depth_of_disparity(5.0 / true + 1.0, true, cap) == pytest.approx(expected)
+    assert depth_of_disparity(np.array([4.0, 2.0, 0.0]), true).max() == pytest.approx(4.0)

@@ -7,13 +7,20 @@ from metrics.measures.answers import ABSTAINED, answers_from_scores
 from metrics.measures.behind import MARGIN, hidden_from
 from metrics.measures.boundaries import RATIOS, boundary_scores
 from metrics.measures.checks import MeasureError
+from metrics.measures.guesses import balls_and_blocks
 from metrics.measures.objects import LEAST_PIXELS, object_means, single_objects, size_range
 from metrics.measures.relief import depth_along, empty_room, relief_scores
 from metrics.measures.shape import inside_objects
 from metrics.measures.skill import skill_intervals
 from metrics.measures.statistics import pooled_means
 from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, f_score
-from scenegen.camera import Camera
+from metrics.views.compare.paired_tests import (
+    SIGN_FLIPS,
+    holm,
+    sign_flip_test,
+    smallest_detectable_difference,
+)
+from scenegen.camera import Camera, pixel_size
 from scenegen.rooms.reader import RoomsFile
 
 RNG = np.random.default_rng(5)
@@ -94,6 +101,10 @@ def test_points_farther_than_the_margin_behind_a_wall_are_hidden():
     assert MARGIN == 0.01
     assert hidden_from(points, toward, wall, np.eye(4), 40.0).tolist() == [False, True]
     assert hidden_from(points, -toward, wall, np.eye(4), 40.0).tolist() == [True, True]
+    aside = toward[:, [2, 0, 1]]  # edge-on from the middle of the picture
+    assert hidden_from(points, aside, wall, np.eye(4), 40.0).tolist() == [True, True]
+    wall[3, 3] = 3.0  # a neighbour through which the second is seen
+    assert hidden_from(points, toward, wall, np.eye(4), 40.0).tolist() == [False, False]
 
 
 def test_an_empty_room_is_the_truth_wherever_no_object_is(rooms_path):
@@ -164,3 +175,24 @@ def test_every_interval_of_a_skill_holds_the_skill():
         scores, floors = rng.gamma(0.5, 1.0, (2, 9, 1))
         low, high = skill_intervals(scores, floors, seed, 100, confidence=0.2)
         assert low <= (floors.mean() - scores.mean()) / floors.mean() <= high
+
+
+def test_a_guessed_ball_has_its_middle_two_thirds_of_its_radius_behind_what_is_seen():
+    """So that its surface has the seen depth on average; it takes as many pixels as its object."""
+    ids = (np.hypot(*(np.mgrid[:32, :32] - 15.5)) < 9).astype(int)
+    balls, blocks = balls_and_blocks(np.full((32, 32), 2.0), ids, np.eye(4), 40.0)
+    (x, y, z, radius) = balls[0]
+    assert -z - 2.0 == pytest.approx(radius * 2.0 / 3.0)
+    assert (x, y) == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert np.pi * radius**2 == pytest.approx(ids.sum() * (pixel_size(32, 40.0) * z) ** 2)
+    width = 17 * pixel_size(32, 40.0) * 2.0  # between the outer pixels' centres
+    assert np.ptp(blocks[0], axis=0)[[0, 2]] == pytest.approx([np.pi / 4.0 * width] * 2)
+
+
+def test_paired_differences():
+    """Of 40 equal ones, no random signs reach the sum; thresholds of Holm's method never fall."""
+    assert sign_flip_test(np.ones(40), seed=0) == 1.0 / (1.0 + SIGN_FLIPS)
+    assert holm([0.011, 0.01, 0.9]) == pytest.approx([0.03, 0.03, 0.9])
+    assert holm([0.5, 0.4]) == pytest.approx([0.8, 0.8])
+    # (z_.975 + z_.8) s / sqrt(2), where s is sqrt(2)
+    assert smallest_detectable_difference([0.0, 2.0]) == pytest.approx(1.9599640 + 0.8416212)

@@ -1,4 +1,4 @@
-"""Depth errors by hand, alignment against general solvers, and hostile depth."""
+"""Errors of depth by hand, and hostile depth; `test_axioms` has what holds for all measures."""
 
 from typing import get_args
 
@@ -24,22 +24,6 @@ def test_delta_limits_are_strict_and_symmetric():
     assert [delta(pair, power) for power in (1, 2, 3)] == [2 / 6, 4 / 6, 6 / 6]
 
 
-@pytest.mark.parametrize("scale", [1e-300, 1e-200, 1e90])
-def test_the_size_of_the_unit_does_not_matter(scale):
-    true = np.linspace(1.0, 3.0, 7)
-    for alignment in ALIGNMENTS[1:]:
-        aligned = align(compare_depth(scale * true, true), alignment)
-        assert aligned.predicted == pytest.approx(true, rel=1e-9)
-
-
-def test_disparity_is_not_depth_turned_round():
-    true = np.linspace(1.0, 3.0, 50)
-    scores = depth_scores(compare_depth(1.0 / true, true), "scale_shift")
-    assert scores["mse_depth_after_scale_shift"] == pytest.approx(np.var(true))
-    assert (align(compare_depth(-true, true), "scale").predicted == 0.0).all()
-    assert (align(compare_depth(-true, true), "median_scale").predicted == 0.0).all()
-
-
 @pytest.mark.parametrize("alignment", ALIGNMENTS)
 @pytest.mark.parametrize("value", [0.0, -1.0, 0.1, 2.5, 1e-300, 1e-30, 1e30, 1e100])
 def test_constants_have_finite_scores(alignment, value):
@@ -48,13 +32,6 @@ def test_constants_have_finite_scores(alignment, value):
     assert np.isfinite(list(depth_scores(pair, alignment).values())).all()
     if alignment == "scale_shift":
         assert align(pair, alignment).predicted == pytest.approx(np.full(50, 2.0))
-
-
-def test_depth_behind_the_camera_scores_badly():
-    true = np.full(4, 2.0)
-    scores = depth_scores(compare_depth([2.0, 2.0, 2.0, -2.0], true))
-    assert scores["delta_3"] == 0.75
-    assert scores["silog"] > 100.0
 
 
 @pytest.mark.parametrize("alignment", ["none", "median_scale", "scale"])
@@ -71,7 +48,7 @@ def test_pixels_behind_the_camera_find_no_scale():
     true = np.ones(4)
     expected = 100.0 * np.sqrt(np.log(1000.0) ** 2 / 2.0)
     for scale in (1.0, 7.0):
-        pair = compare_depth([scale, scale, -scale, 0.0], true)
+        pair = compare_depth([scale, scale, -scale, 1e-3], true)
         assert silog(pair) == pytest.approx(expected)
 
 

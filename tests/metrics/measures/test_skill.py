@@ -34,21 +34,6 @@ def test_a_multiple_of_the_floor_has_an_interval_of_no_width(factor):
         assert low == high == 1.0 - factor
 
 
-def test_the_interval_is_about_that_of_plain_percentiles():
-    scores = FLOORS * RNG.uniform(0.3, 0.9, 60)
-    drawn = np.random.default_rng(1).integers(0, 60, (4000, 60))
-    plain = np.quantile([1.0 - scores[d].sum() / FLOORS[d].sum() for d in drawn], [0.025, 0.975])
-    low, high = skill_interval(scores, FLOORS, 0)
-    assert (low, high) == (pytest.approx(plain[0], abs=0.02), pytest.approx(plain[1], abs=0.02))
-    assert low < 1.0 - scores.mean() / FLOORS.mean() < high
-    unpaired = 1.0 - np.mean(scores) / np.quantile(
-        [FLOORS[d].mean() for d in drawn], [0.025, 0.975]
-    )
-    assert high - low < 0.5 * np.ptp(unpaired)  # what pairing is for
-    assert skill_interval(scores, FLOORS, 0) == (low, high)
-    assert skill_interval(scores, FLOORS, 1) != (low, high)
-
-
 def test_the_interval_is_that_of_a_plain_loop():
     scores = FLOORS * RNG.uniform(0.0, 1.9, 60)
     ratio = scores.sum() / FLOORS.sum()

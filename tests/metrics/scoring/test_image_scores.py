@@ -70,14 +70,11 @@ def guess(path, truth, depth_of):
 @pytest.mark.parametrize(
     "depth_of",
     [
-        lambda depth: depth.astype(np.float16).astype(np.float64),
         lambda depth: depth + np.random.default_rng(0).normal(0.0, 1e-6, depth.shape),
         lambda depth: depth - 0.1,
-        lambda depth: 0.9 * depth,
         lambda depth: depth - np.linspace(0.0, 0.3, len(depth))[:, None],
-        lambda depth: np.full_like(depth, depth.mean()),
     ],
-    ids=["rounded", "noise", "lifted", "nearer", "ramp", "constant"],
+    ids=["noise", "lifted", "ramp"],
 )
 def test_guesses_without_a_look_at_the_picture_do_not_win(folder, tmp_path, depth_of):
     found = guess(tmp_path / "g.h5", folder / "rooms.h5", depth_of)
@@ -87,7 +84,10 @@ def test_guesses_without_a_look_at_the_picture_do_not_win(folder, tmp_path, dept
 
 
 def test_one_relief_for_all_pictures_has_no_skill_at_all(folder, tmp_path):
-    """The mean relief of this very test set, which wins error of depth and raw scores of relief."""
+    """The mean relief of this very test set, which wins error of depth and raw scores of relief.
+
+    Going against it scores below 0 with every scene, and a floor below 0 must not lift that.
+    """
     with RoomsFile(folder / "rooms.h5") as rooms:
         reliefs = [true_relief(r.depth, r.world_from_camera, r.fov_y_degrees) for r in rooms]
     mean = np.nan_to_num(reliefs).mean(axis=0)
@@ -96,16 +96,8 @@ def test_one_relief_for_all_pictures_has_no_skill_at_all(folder, tmp_path):
     assert found.metrics["relief_correlation"].value > 0.3
     for name in ("relief_correlation", "relief_iou"):
         assert found.skills[name].value == pytest.approx(0.0, abs=0.02)
-
-
-def test_going_against_the_mean_relief_wins_nothing(folder, tmp_path):
-    """It scores below 0 with every scene, and a floor below 0 must not lift that."""
-    with RoomsFile(folder / "rooms.h5") as rooms:
-        reliefs = [true_relief(r.depth, r.world_from_camera, r.fov_y_degrees) for r in rooms]
-    mean = np.nan_to_num(reliefs).mean(axis=0)
-    write_scores(
-        guess(tmp_path / "g.h5", folder / "rooms.h5", lambda depth: depth + mean), tmp_path / "s"
-    )
+    against = guess(tmp_path / "a.h5", folder / "rooms.h5", lambda depth: depth + mean)
+    write_scores(against, tmp_path / "s")
     found = read_scores(tmp_path / "s")
     skill, value = found.skills["relief_correlation"], found.metrics["relief_correlation"].value
     assert found.items["other_scene_relief_correlation"].mean() < -0.2
@@ -283,3 +275,11 @@ def test_true_points_of_a_closed_room_are_perfect_and_the_worst_are_as_far_as_it
         predicted = PredictedView("points", "none", value, None, None)
         scores = score_prediction(predicted, truth, reference_of(truth), None, "penalise").scores
         assert scores[name] == pytest.approx(expected, abs=1e-6), name
+
+
+def test_where_nothing_stands_out_in_another_scene_nothing_of_it_is_found(closed):
+    view, _ = closed
+    depth = PredictedView("depth", "none", np.nan_to_num(view.depth, nan=1.0), None)
+    scores = score_prediction(depth, view, reference_of(view), np.zeros_like(view.depth)).scores
+    assert scores["relief_iou"] == 1.0
+    assert scores["other_scene_relief_iou"] == scores["other_scene_relief_correlation"] == 0.0

@@ -9,7 +9,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from h5_edits import damaged_chunk, gone, put
+from h5_edits import damaged_chunk, put
 from refusals import refused
 from submissions import as_json, edited, good_answers, good_rooms
 
@@ -128,12 +128,6 @@ def test_a_refused_file_is_closed(truths, tmp_path):
         found.close()
     with h5py.File(path, "r+"):
         pass
-
-
-def test_the_first_of_many_problems_is_told(truths, tmp_path):
-    path = edited(gone("method", "depth"))(tmp_path, truths.rooms)
-    with refused(FileFormatError, f"{path}: method", hint="and 1 more problem"):
-        open_predictions(path)
 
 
 def test_reading_loads_little(truths, tmp_path):

@@ -94,7 +94,6 @@ def spoiled(value, at=(3, 4), base=DEPTH):
 # What is added after a good row 0; then the place of the error, and words of what was found there.
 REFUSED = {
     "row beyond": ((8, DEPTH), "row", "8"),
-    "negative row": ((-1, DEPTH), "row", "-1"),
     "row is a float": ((1.0, DEPTH), "row", "1.0"),
     "row given": ((0, DEPTH), "row 0", "twice"),
     "shape": ((1, noise(0, 16, 16)), "row 1: depth", "16, 16)"),
@@ -102,7 +101,6 @@ REFUSED = {
     "ragged": ((1, [[1.0, 2.0], [3.0]]), "row 1: depth", "no array"),
     "NaN": ((1, spoiled(np.nan)), "row 1: depth", "1 pixels, the first at (3, 4)"),
     "masked": ((1, np.ma.masked_array(DEPTH, DEPTH[3, 4] == DEPTH)), "row 1: depth", "(3, 4)"),
-    "infinite": ((1, spoiled(np.inf)), "row 1: depth", "(3, 4)"),
     "beyond float32": ((1, spoiled(1e39)), "row 1: depth", "(3, 4)"),
     "negative z": ((1, -DEPTH), "row 1: depth", "at or below 0"),
     "zeros": ((1, 0.0 * DEPTH), "row 1: depth", "at or below 0"),
@@ -304,13 +302,10 @@ EYE = np.eye(3)[[0, 1, 2, 0, 1, 2]]
         ({"answer": [0.0] * 6}, ": answer", "float64"),
         ({"answer": np.ma.masked_array([0, 1, 2] * 2, [1, 0] * 3)}, ": answer", "3 masked"),
         ({"scores": np.ma.masked_array(EYE, EYE == 1)}, ": scores", "6 NaN"),
-        ({"answer": [True] * 6}, ": answer", "bool"),
         ({"answer": [0, 1, 2, 3, 0, 1]}, ": answer", "such as 3 (ids 3)"),
         ({"answer": [1, 1, 2, 3, 2, 1]}, ": answer", "counted from 1"),
         ({"answer": [0, 1, 2, 0, -2, 1]}, ": answer", "such as -2 (ids 4)"),
-        ({"answer": np.array([0, 1, 2, 0, 255, 1], "u1")}, ": answer", "such as 255"),
         ({"scores": np.zeros((6, 4))}, ": scores", "(6, 4)"),
-        ({"scores": np.zeros((6, 3), int)}, ": scores", "int64"),
         ({"scores": EYE * [1, 1, np.nan]}, ": scores", "(ids 0, 1, 2"),
         ({"scores": EYE, "answer": [0, 1, 2, 0, 1, 1]}, ": answer", "(ids 5)"),
         ({"scores": 0 * EYE, "answer": [0] * 6}, ": answer", "6 other"),
@@ -321,7 +316,6 @@ EYE = np.eye(3)[[0, 1, 2, 0, 1, 2]]
         ({"answer": [0, 0], "rows": [1, 6]}, ": question", "(ids 6)"),
         ({"answer": [0, 0], "rows": [1, 1]}, ": question", "more than once (ids 1)"),
         ({"answer": [0, 0], "rows": [1, -1]}, ": question", "negative (ids -1)"),
-        ({"answer": [0], "rows": [1.0]}, ": question", "float64"),
         ({"answer": [], "rows": []}, ": question", ""),
     ],
 )

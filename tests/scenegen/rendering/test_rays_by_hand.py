@@ -61,6 +61,34 @@ def test_a_shadow_by_hand(z: float, shadow: bool) -> None:
         assert not changed.any()
 
 
+def glossy(objects: tuple[PlacedObject, ...], lamp: Any, shadows: bool) -> Any:
+    """Return what is rendered of objects before nothing, from (0, 0, 3) along -z."""
+    camera, light = Camera((0.0, 0.0, 3.0), (0.0, 0.0, 0.0), 20.0), Light(lamp, (1.0, 1.0, 1.0))
+    scene = SceneSpec(0, (camera,), objects, (light,), (0.1,) * 3, (0.5, 0.5), None)
+    spec = DatasetSpec(height=65, width=65, objects=(1, 2), lights=(1, 1), shadows=shadows,
+                       specular=(0.0, 1.0), image_dtype="float32", shapes=("sphere",))  # fmt: skip
+    return render(pack(spec, [scene]))
+
+
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+def test_a_ball_is_shaded_neither_by_itself_nor_where_another_one_hides_its_highlight() -> None:
+    """The lamp is half a right angle aside, so that the highlight is at half of that."""
+    lamp, aside = np.array([2.0, 0.0, 2.0]), np.pi / 8
+    ball = PlacedObject("sphere", (0.0,) * 3, UPRIGHT, 0.3, GREY, specular=1.0, shininess=20.0)
+    shown, alone = (glossy((ball,), tuple(lamp), shadows) for shadows in (False, True))
+    lit = (shown.normal[0] @ [1.0, 0.0, 1.0] > 0.1) & (shown.object_id[0] == 1)
+    np.testing.assert_array_equal(shown.image[0][lit], alone.image[0][lit])
+    pole = 0.3 * np.array([np.sin(aside), 0.0, np.cos(aside)])
+    between = tuple((pole + 0.4 * (lamp - pole)).tolist())
+    before = PlacedObject("sphere", between, UPRIGHT, 0.05, GREY)
+    dark = glossy((ball, before), tuple(lamp), True)
+    row, column = 32, 32 + round(pole[0] / (3.0 - pole[2]) / np.tan(np.radians(10.0)) * 32.5)
+    assert shown.image[0, row, column, 0] > 0.3
+    np.testing.assert_allclose(dark.image[0, row, column], 0.08, rtol=1e-5)
+
+
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
 def test_the_nearer_of_two_objects_is_seen_although_their_spheres_overlap(
     order: tuple[int, int],

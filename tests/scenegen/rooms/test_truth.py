@@ -3,6 +3,7 @@
 import json
 import shutil
 from dataclasses import replace
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -19,15 +20,16 @@ from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
 from scenegen.rooms.info import describe
 from scenegen.rooms.make import merge_rooms
+from scenegen.rooms.truth import View, truth_problems, visible_fraction
 
 COLUMNS = [column.name for columns in FURTHER.values() for column in columns]
 
 
 @pytest.fixture(scope="module")
 def full(make_rooms, tmp_path_factory):
-    """Six images in two shards, with everything; a wide view, in which some rays meet nothing."""
+    """Three views of each of three scenes, in shards, with everything; some rays meet nothing."""
     path = tmp_path_factory.mktemp("full") / "set.h5"
-    return make_rooms(path, 3, {"shard_size": 2}, height=48, width=40, views=(0.0, 40.0),
+    return make_rooms(path, 3, {"shard_size": 2}, height=48, width=40, views=(0.0, 20.0, 40.0),
                       objects=(2, 3), random_reflectance=True, truth=TRUTHS, seed=2,
                       fov_degrees=50.0, object_radius=(0.15, 0.25),
                       min_visible_pixels=5)  # fmt: skip
@@ -111,12 +113,18 @@ def test_it_changes_nothing_else(full, make_rooms, tmp_path):
         assert "truth" not in json.loads(plain.spec.to_json()), "as in files of version 1.0"
 
 
+def mask_of_no_object(file):
+    row = int((file["object/count"][()] == 2).argmax())
+    file["object/amodal_mask"][row, 2, 5, 5] = 1
+
+
 @pytest.mark.parametrize(
     ("edit", "check"),
     [
         (put("object/amodal_mask", (2, 0), 0), "amodal"),
         (put("object/amodal_mask", (2, 0, 0, 0), 1), "amodal"),
         (put("object/amodal_mask", (2, 0, 20, 20), 7), "amodal"),
+        (mask_of_no_object, "amodal"),
         (put("object/visible_fraction", (1, 0), 0.123), "amodal"),
         (values("object_coordinates", lambda stored: stored + 1e-4), "coordinates"),
         (values("flow", lambda stored: stored + 0.01), "flow"),
@@ -153,3 +161,21 @@ def test_refused(settings, where):
 
 def test_the_order_of_the_request_does_not_matter():
     assert DatasetSpec(truth=("albedo", "amodal")) == DatasetSpec(truth=("amodal", "albedo"))
+
+
+@pytest.mark.parametrize(("depth", "count"), [(1.9, 0), (2.05, 0), (2.2, 1)])
+def test_nothing_behind_an_object_shows_in_its_mask(depth, count):
+    """Its bounding sphere of radius 0.1 is 2 away; pixels of the mask show what is there."""
+    matrix = np.diag([0.1, 0.1, 0.1, 1.0])
+    matrix[2, 3] = -2.0
+    ids = np.zeros((9, 9), int)
+    masks = np.zeros((1, 9, 9), np.uint8)
+    masks[0, 3:6, 3:6] = 1
+    view = View(np.full((9, 9), depth), np.zeros((9, 9, 3)), ids, np.eye(4), 10.0)
+    stored = {
+        "object/amodal_mask": masks,
+        "object/visible_fraction": visible_fraction(ids, masks),
+        "object/world_from_object": matrix[None],
+    }
+    spec, scene = SimpleNamespace(truth=("amodal",)), SimpleNamespace(objects=[None])
+    assert len(list(truth_problems(spec, stored, view, view, scene))) == count

@@ -15,10 +15,12 @@ from verified import checks_of
 
 from scenegen.common.errors import FileFormatError
 from scenegen.description.presets import preset_spec
+from scenegen.description.specs import DatasetSpec
 from scenegen.files.content import datasets, seal
 from scenegen.files.verify import content_check, read_all
 from scenegen.rooms.make import make_dataset
 from scenegen.rooms.reader import RoomsFile
+from scenegen.rooms.verify import _within_tolerance
 
 ROWS = {"layout", "content", "description", "depth", "normal", "object_id", "image", "fingerprint"}
 ALL = ROWS | {"drawn again from the seed", "rendered again"}
@@ -437,3 +439,26 @@ def test_attributes_must_be_true_even_when_sealed_again(spoilt, name, key, value
         seal(file)
 
     assert set(spoilt(edit)) == {"layout"}
+
+
+@pytest.mark.parametrize(("factor", "within"), [(1.08, True), (0.92, True), (1.2, False)])
+def test_path_traced_images_agree_in_their_means(factor, within):
+    spec = DatasetSpec(shading="path", image_dtype="float32")
+    noise = 1.0 + np.random.default_rng(0).uniform(-0.5, 0.5, (64, 64, 3))
+    none = np.zeros((64, 64), bool)
+    again = np.full((64, 64, 3), 0.5)
+    assert (
+        _within_tolerance("image", factor * noise / noise.mean() / 2, again, none, spec) == within
+    )
+
+
+@pytest.mark.parametrize(("pixels", "within"), [(0, True), (2, True), (20, False)])
+def test_few_pixels_of_edges_may_show_their_neighbours(pixels, within):
+    """Of the columns at a step of depth, one in a thousand of all pixels."""
+    again = np.where(np.arange(64) < 32, 1.0, 2.0) * np.ones((64, 1))
+    edges = np.broadcast_to(abs(np.arange(64) - 31.5) < 1, (64, 64))
+    stored = again.copy()
+    stored[:pixels, 31] = 2.0
+    assert _within_tolerance("depth", stored, again, edges, DatasetSpec()) == within
+    stored[5, 9] = 2.0
+    assert not _within_tolerance("depth", stored, again, edges, DatasetSpec()), "not at an edge"

@@ -1,6 +1,7 @@
 """Rooms are furnished by rules: nothing floats, nothing cuts, cameras are free."""
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scenegen.common.errors import PlacementError
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.presets import preset_spec
 from scenegen.objects.catalogue import objects_of
+from scenegen.sampling.interiors.spaces import Box, Space, clear_of
 from scenegen.sampling.proposals import ProposalQueue
 from scenegen.sampling.scenes import sample_scenes
 
@@ -116,3 +118,28 @@ def test_rooms_that_cannot_hold_their_objects_are_refused(monkeypatch):
     spec = preset_spec("interiors", shapes=("bed",), objects=(30, 30))
     with pytest.raises(PlacementError):
         ProposalQueue(spec, range(1), objects_of(spec)).take(1, 1)
+
+
+def test_boxes_are_within_the_walls_and_below_the_ceiling():
+    space = Space((4.0, 2.5, 6.0), 9)
+    for x, z, top, inside in (
+        (2.0, 5.4, 2.4, True),
+        (2.0, 5.6, 2.4, False),
+        (3.6, 3.0, 2.4, False),
+        (2.0, 3.0, 2.49, False),
+    ):
+        assert space.within(Box(x, z, (0.5, 0.5), 0.0, top, 0.0)) == inside
+    assert not space.within(Box(2.0, 5.4, (0.5, 0.5), 0.0, 2.4, 0.125)), "turned by 45 degrees"
+    assert not space.within(Box(2.0, 3.0, (0.5, 0.5), -0.1, 2.4, 0.0))
+
+
+@pytest.mark.parametrize(("turns", "clear"), [(0.125, True), (-0.125, False)])
+def test_a_child_is_clear_of_its_parents_triangles_in_the_parents_frame(turns, clear):
+    """A long box between the two sides of a shelf that is turned by 45 degrees."""
+    sides = (
+        np.array([[-0.3, 0.0, -0.3], [-0.3, 0.0, 0.2]]),
+        np.array([[0.3, 1, -0.2], [0.3, 1, 0.3]]),
+    )
+    shelf = Box(1.0, 2.0, (0.3, 0.3), 0.0, 1.0, 0.125)
+    child = Box(1.0, 2.0, (0.25, 0.05), 0.1, 0.4, turns)
+    assert clear_of(SimpleNamespace(boxes=sides), shelf, child) == clear

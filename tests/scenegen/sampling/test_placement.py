@@ -57,6 +57,16 @@ def places_of_boxes(count, scale, cameras, placed, seed=0):
     return find_places(rows, reach, down, border, frustums(cameras), others, draws)
 
 
+@pytest.mark.parametrize("half", [(0.6, 0.1, 0.1), (0.1, 0.1, 0.6), (0.45, 0.1, 0.45)])
+def test_a_body_longer_than_the_room_has_no_place(half):
+    """Along either wall: boxes with these half sides."""
+    reach = (abs(SEPARATORS) @ np.array(half))[None]
+    draws = numbers(1, 2 * CANDIDATES).reshape(1, CANDIDATES, 2)
+    nothing = np.zeros((1, 0, 4)), frustums([]), np.zeros((1, 0, len(SEPARATORS)))
+    free, _ = find_places(np.zeros(1, int), reach, np.full(1, 0.1), *nothing, draws)
+    assert free.item() == (max(half) < 0.5)
+
+
 def test_separators_are_unit_directions_all_around():
     np.testing.assert_allclose(np.linalg.norm(SEPARATORS, axis=1), 1.0, atol=1e-7)
     upright = SEPARATORS[abs(SEPARATORS[:, 1]) < 1e-12]

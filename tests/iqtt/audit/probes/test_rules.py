@@ -200,3 +200,14 @@ def test_few_questions_or_none():
     untold = fair(0, cubes={name: np.full((300, 3), np.nan) for name in SHAPE_STATISTICS})
     found = {p.statistic for p in run_probes(untold)}
     assert not found & {*SHAPE_STATISTICS, "answers' cubes"}
+
+
+@pytest.mark.parametrize(
+    ("p_values", "beat"), [((0.009, 0.0045, 0.004), 0), ((0.009, 0.0045, 0.003), 3)]
+)
+def test_holms_method_stops_at_the_first_that_may_be_chance(p_values, beat):
+    """Of three, the least must be at most a third of ERROR_RATE, and the next a half."""
+    assert rules.ERROR_RATE == 0.01
+    probe = rules.Probe("s", "r", WITHOUT, 1, 2, 0.5, 0.0, 1.0, 0.0, beats_chance=False)
+    judged = rules._judged([replace(probe, p_value=p) for p in p_values])
+    assert sum(p.beats_chance for p in judged) == beat

@@ -20,19 +20,14 @@ def test_innocent_normals_get_no_hint(hints, room_arrays):
     made = {
         "the truth": normal,
         "long": 7 * normal,
-        "tilted by 10": tilted(normal, 10),
         "tilted by 30": tilted(normal, 30),
-        "tilted by 60": tilted(normal, 60),
         "tilted by 90": tilted(normal, 90),
-        "wavy": normal + smooth(1, normal.shape, 8, 0.3),
         "very wavy": normal + smooth(2, normal.shape, 15, 2.0),
         "blurred": ndimage.gaussian_filter(normal, (0, 6, 6, 0)),
         "the mean image": np.broadcast_to(normal.mean(axis=0), normal.shape),
         "towards the viewer": np.broadcast_to([0.0, 0.0, 1.0], normal.shape),
-        "to the side": np.broadcast_to([1.0, 0.0, 0.0], normal.shape),
         "a corner": np.broadcast_to([1.0, 1.0, 1.0], normal.shape),
         "of other rooms": normal[np.random.default_rng(3).permutation(len(normal))],
-        "random": rng.normal(size=normal.shape),
         "random from 0 to 1": rng.random(normal.shape),
         "without signs": np.abs(normal) + 1e-3,
         "cut off at 0": np.maximum(normal, 0) + 1e-3,
@@ -50,8 +45,6 @@ NORMALS = {
     "OpenCV": (lambda n, r: n * [1, -1, -1], "OpenCV"),
     "y": (lambda n, r: n * [1, -1, 1], "y axis flipped"),
     "z": (lambda n, r: n * [1, 1, -1], "z axis flipped"),
-    "x": (lambda n, r: n * [-1, 1, 1], "x axis flipped"),
-    "xy": (lambda n, r: n * [-1, -1, 1], "x and y flipped"),
     "xz": (lambda n, r: n * [-1, 1, -1], "x and z flipped"),
     "BGR": (lambda n, r: n[..., ::-1], "BGR"),
     "from 0 to 1": (lambda n, r: (n + 1) / 2, "0..1 for -1..1"),
@@ -61,11 +54,10 @@ NORMALS = {
 
 
 @pytest.mark.parametrize("kind", NORMALS)
-@pytest.mark.parametrize("noisy", [0.2, pytest.param(0.0, marks=pytest.mark.slow)])
-def test_mistakes_in_normals(hints, room_arrays, kind, noisy):
+def test_mistakes_in_normals(hints, room_arrays, kind):
     depth, normal, rotation, _ = room_arrays
     mistake, words = NORMALS[kind]
-    guess = normal + smooth(3, normal.shape, 8, noisy) if noisy else normal
+    guess = normal + smooth(3, normal.shape, 8, 0.2)
     guess = guess / np.linalg.norm(guess, axis=-1, keepdims=True)
     (line,) = hints(depth, mistake(guess, rotation))
     assert line.startswith("normal: looks ")

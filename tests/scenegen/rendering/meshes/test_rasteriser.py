@@ -162,3 +162,33 @@ def test_samples_of_a_pixel_average_to_the_covered_share() -> None:
     image = seen(scene, objects_of(a=mesh), spp=64).image[0]
     side = 0.6 / 4 / (2 * np.tan(np.radians(35.0) / 2) / 96)
     assert image[..., 0].sum() / 0.5 == pytest.approx(side**2, rel=0.01)
+
+
+def smooth_triangle(normals: Array) -> tuple[Array, Array, Array]:
+    """Return shares of corners, normals and rays, (P, 3), where a triangle of these is seen."""
+    corners = np.array([(-0.5, -0.5, 0.0), (0.5, -0.5, 0.0), (-0.5, 0.5, 0.0)])
+    mesh = Mesh(corners.astype(np.float32), np.arange(3)[None], normals.astype(np.float32))
+    shape = UnitShape("mug/a", lambda: mesh, *np.zeros((2, 1, 3)), 0.0, np.zeros((0, 3)))
+    truth = seen(scene_of("a", FAR), Objects({"mug": ["mug/a"]}, lambda _: shape, lambda _: ""))
+    rays, shown = pixel_directions(96, 128, 35.0), truth.object_id[0] == 1
+    place = 4.0 * rays[..., :2] + 0.5
+    shares = np.concatenate([1.0 - place.sum(axis=-1, keepdims=True), place], axis=-1)
+    assert shown.sum() > 300
+    return shares[shown], truth.normal[0][shown], rays[shown]
+
+
+def test_smooth_normals_are_those_of_the_corners_by_their_shares() -> None:
+    corners = np.array([(0.0, 0.0, 1.0), (0.6, 0.0, 0.8), (0.0, -0.8, 0.6)])
+    shares, normals, _ = smooth_triangle(corners)
+    expected = shares @ corners
+    expected /= np.linalg.norm(expected, axis=-1, keepdims=True)
+    np.testing.assert_allclose(normals, expected, atol=1e-4)
+
+
+def test_smooth_normals_that_lean_away_are_perpendicular_to_their_rays() -> None:
+    """And in one plane with them and what they were."""
+    away = np.array([0.96, 0.0, -0.28])
+    _, normals, rays = smooth_triangle(np.tile(away, (3, 1)))
+    assert abs((normals * rays).sum(axis=-1)).max() < 1e-6
+    assert abs((normals * np.cross(rays, away)).sum(axis=-1)).max() < 1e-6
+    assert (normals @ away > 0.9).all()
