@@ -83,6 +83,7 @@ def test_what_a_class_predicts_and_where(name, folders):
             np.testing.assert_allclose(values[inner], expected[inner], rtol=0.02)
 
 
+@pytest.mark.slow
 def test_a_run_is_the_import_of_the_same_arrays_and_says_what_it_was(folders, truths, tmp_path):
     folder, out = folders("depth-anything-metric"), tmp_path / "p.h5"
     with opened_model(f"hf:{folder}") as model:

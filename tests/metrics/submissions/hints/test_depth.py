@@ -67,7 +67,8 @@ def test_innocent_depth_gets_no_hint(hints, room_arrays):
     assert {name: found for name, values in made.items() if (found := hints(values[:8]))} == {}
 
 
-@pytest.mark.parametrize("count", [1, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [1, 4])
 def test_few_rows(hints, room_arrays, count):
     depth, normal, _, stretch = room_arrays
     for values in innocent(depth, stretch).values():

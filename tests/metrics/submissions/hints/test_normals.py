@@ -14,6 +14,7 @@ def tilted(normal, degrees, seed=0):
     return normal * np.cos(a) + np.cross(axis, normal) * np.sin(a) + axis * along * (1 - np.cos(a))
 
 
+@pytest.mark.slow
 def test_innocent_normals_get_no_hint(hints, room_arrays):
     depth, normal, _, _ = room_arrays
     rng = np.random.default_rng(6)

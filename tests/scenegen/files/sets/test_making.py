@@ -278,6 +278,7 @@ class DyingRooms(RoomsWork):
         return (yield from super().packed_rows(block, workers))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
 @pytest.mark.parametrize("made", ["views"], indirect=True)
 def test_no_scene_stops_a_run_for_ever(made, tmp_path, monkeypatch):
@@ -353,8 +354,9 @@ cli.scenegen()
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
-@pytest.mark.parametrize("workers", ["1", pytest.param("2", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("workers", ["1", "2"])
 def test_the_same_command_goes_on(run, tmp_path, monkeypatch, workers):
     """After SIGKILL, and then after SIGTERM, which is answered with how to go on."""
     command = [*RENDER.split(), "--workers", workers]
