@@ -41,7 +41,7 @@ def test_at_the_middle_of_a_pixel_of_the_map_is_its_radiance(lights):
 
 
 def test_points_of_lamps_are_uniform_by_area(lights):
-    """The mean of a triangle's points is that of its corners, and density is that by solid angle."""
+    """The mean of a triangle's points is that of its corners; density is by solid angle."""
     import mitsuba as mi
 
     from scenegen.rendering.pictures.lights import sample_light
