@@ -143,6 +143,7 @@ def test_identity(scores, said, true):
             best = float(metric(name).higher_is_better)
             assert value == pytest.approx(best, abs=2e-6), name
         assert not worse(name, value, other[name]), name
+        assert metric(name).smallest <= other[name] <= metric(name).largest, name
     assert any(worse(name, other[name], perfect[name]) for name in perfect)
 
 

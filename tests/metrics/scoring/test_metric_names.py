@@ -1,30 +1,16 @@
-"""The table of names against the functions that make the scores, and against the docs."""
+"""The table of names against the docs; `measures/test_axioms` holds it against the functions."""
 
 import re
 from pathlib import Path
-from typing import get_args
 
-import numpy as np
 import pytest
 from refusals import refused
-from scipy.spatial import cKDTree
 
-from metrics.measures.alignment import Alignment
-from metrics.measures.behind import behind_scores
-from metrics.measures.boundaries import boundary_scores
-from metrics.measures.depth import compare_depth, depth_scores
-from metrics.measures.objects import object_means, single_objects
-from metrics.measures.relief import relief_scores
-from metrics.measures.shape import shape_scores
-from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, paper_scores, point_scores
-from metrics.measures.surfaces.normals import normal_scores
-from metrics.measures.surfaces.points import local_point_scores, point_map_scores
 from metrics.scoring.metric_names import (
     ALL,
     BASELINES,
     HEADLINE,
     PRINTED,
-    SKILLED,
     TABLE,
     UnknownMetricError,
     in_order,
@@ -33,62 +19,6 @@ from metrics.scoring.metric_names import (
 )
 
 DOCS = Path(__file__).parents[3] / "docs" / "scores.md"
-ALIGNMENTS = get_args(Alignment)
-
-
-def all_scores(noise):
-    """Every score that the plain functions make, for a prediction this far off."""
-    rng = np.random.default_rng(0)
-    true = rng.uniform(0.2, 3.0, (8, 8))
-    wrong = true * (1.0 + noise * rng.standard_normal((8, 8)))
-    points, moved = rng.random((50, 3)), rng.random((50, 3)) * noise
-    forward = cKDTree(points).query(points + moved)[0]
-    reverse = cKDTree(points + moved).query(points)[0]
-    found = point_scores(NearestDistances(forward, reverse), (0.01, 0.05, 0.1))
-    for alignment in ALIGNMENTS:
-        found |= depth_scores(compare_depth(wrong, true), alignment)
-    normals = normal_scores(50.0 * noise * rng.random(200))
-    ids, relief = rng.integers(0, 3, 200), rng.random(200)
-    objects = object_means(single_objects(ids, noise * relief, noise * relief))
-    angle = normals["normal_mean_degrees"]
-    objects |= {f"{way}object_normal_mean_degrees": angle for way in ("", "derived_")}
-    inside = rng.integers(1, 3, 200)
-    cloud = rng.random((200, 3)) + 1.0
-    said = cloud + noise * rng.standard_normal((200, 3))
-    found |= paper_scores(NearestDistances(forward, reverse))
-    found |= shape_scores(said - cloud, said, cloud, inside)
-    found |= behind_scores(noise * relief, noise * relief)
-    jumps = np.cumsum([[1.0, 2.0] * 4] * 8, axis=0) % 3.1 + 0.5  # in all directions
-    found |= boundary_scores(jumps + (wrong - true), jumps, np.ones_like(true, bool))
-    found |= point_map_scores(said, cloud) | local_point_scores(said, cloud, inside)
-    for alignment in ("scale", "scale_shift"):
-        found |= point_map_scores(said, cloud, alignment)
-    objects |= {f"{way}shape_normal_degrees": angle for way in ("", "derived_")}
-    found |= {"fov_error_degrees": 9.0 * noise}
-    found |= relief_scores(relief + 9.0 * noise * rng.standard_normal(200), relief) | objects
-    return found | normals | {f"derived_{name}": value for name, value in normals.items()}
-
-
-def test_every_score_that_is_made_is_in_the_table_and_none_beside():
-    made = set(all_scores(0.2))
-    thresholds = {name for name in made if name.startswith("f_score_")}
-    assert len(thresholds) == 3
-    floors = {begin + name for name, begins in SKILLED.items() for begin in begins}
-    others = {"f_score_<threshold>", "iqtt_accuracy"}
-    assert (made - thresholds) | floors | others == set(ALL)
-
-
-def test_directions_and_limits_hold_for_scores_that_are_made():
-    good, bad = all_scores(0.0), all_scores(1.0)
-    for name, value in good.items():
-        known = metric(name)
-        assert "rooms" in known.tasks
-        if known.higher_is_better:
-            assert value == pytest.approx(known.largest, abs=1e-12)
-            assert known.largest == 1.0 > bad[name] >= known.smallest
-            assert known.unit == ("fraction" if known.smallest == 0.0 else "correlation")
-        else:
-            assert 0.0 <= value < 1e-12 < bad[name] <= known.largest
 
 
 def test_names_that_are_derived():
