@@ -31,7 +31,7 @@ def test_the_programs_read_every_row_and_what_they_write_can_be_scored(tmp_path)
     for words, lines in BATCHES.items():
         assert [text for code, text in printed.items() if words in code] == [lines]
     (scored,) = [text for code, text in printed.items() if "bench validate" in code]
-    assert scored.startswith("mine.h5: valid\nmine: 8 images of 8 scenes of rooms.h5\n")
+    assert scored.startswith("mine.h5: valid\nmine on rooms.h5: 8 images, 8 scenes ")
     ((code, reached),) = [pair for pair in printed.items() if "RoomStream" in pair[0]]
     assert len(code.splitlines()) <= 35
     assert 0 <= float(reached) < 1

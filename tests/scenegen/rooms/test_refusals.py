@@ -20,7 +20,7 @@ READERS = {
     "preview": ("--out", "sheet.png"),
     "verify": ("--items", "2"),
     "export": ("--items", "5", "--format", "exr"),
-    "card": ("--creator", "A", "--date", "2026-01-31", "--out", "card"),
+    "card": ("--creator", "A", "--out", "card"),
 }
 
 
