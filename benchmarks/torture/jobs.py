@@ -47,7 +47,7 @@ JOBS = {
         [
             f"scenegen render --n 20000 {SMALL}",
             "bench baseline oracle --data rooms.h5 --out scored.h5",
-            "bench score scored.h5 --truth rooms.h5 --json scores.json --workers 1",
+            "bench score scored.h5 --truth rooms.h5 --json scores.json --processes 1",
         ],
         700,
     ),

@@ -9,8 +9,6 @@ from typing import Any
 
 from scenegen.common.errors import SceneGenError
 
-TASK = "pix2shape_bench/questions"
-
 
 class AskError(SceneGenError):
     """A model that Inspect could not ask."""
@@ -36,6 +34,10 @@ def ask(
     from inspect_ai._util.error import PrerequisiteError
     from inspect_ai.model import get_model
 
+    from pix2shape_bench import (
+        questions,  # the object: its name is found only where it is installed
+    )
+
     given = dict(settings)
     try:
         asked = get_model(model, base_url=given.pop("model_base_url", None))
@@ -45,11 +47,10 @@ def ask(
     try:
         with redirect_stdout(sys.stderr):
             _, logs = eval_set(
-                TASK,
+                questions(**task),
                 log_dir=str(log_dir),
                 log_dir_allow_dirty=True,  # logs of other models and questions stay
                 model=asked,
-                task_args=dict(task),
                 # A row that fails ends nothing, but the next run asks it again.
                 fail_on_error=True,
                 continue_on_fail=True,

@@ -81,4 +81,4 @@ def test_the_second_half_of_a_run_takes_no_more_memory(models, tmp_path):
         [sys.executable, "-c", RENDER, root, tmp_path], capture_output=True, text=True, check=True
     )
     half, end = map(float, done.stdout.split())
-    assert end < 1.05 * half
+    assert end < 1.08 * half  # of 200 rooms; by 2 MB a room it would be 1.4 and more
