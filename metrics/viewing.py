@@ -23,7 +23,9 @@ from scenegen.viewing import MOST_ROWS, SCENE, RecordedScene, Surfaces, View, ro
 
 Array = NDArray[Any]
 Scenes = Sequence[Sequence[int]]  # of each scene the rows of its images
-SORTED_BY = (*HEADLINE["rooms"], "rmse", "normal_mean_degrees", *HEADLINE["measured"])
+SORTED_BY = tuple(
+    dict.fromkeys((*HEADLINE["rooms"], *HEADLINE["interiors"], *HEADLINE["measured"], "rmse"))
+)
 
 
 def require_rooms(predictions: Predictions) -> RoomPredictions:

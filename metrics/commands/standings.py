@@ -2,15 +2,24 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import click
 
 from metrics.commands.options import MARKDOWN, SEED
+from metrics.measures.alignment import Alignment
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import OVERWRITE
 from scenegen.command_line.output import line_width, print_line
 from scenegen.command_line.paths import InputPath, OutputPath
+
+
+ALIGN = click.option(
+    "--align",
+    type=click.Choice([name for name in get_args(Alignment) if name != "none"]),
+    help="Score depth and points of all methods after this alignment to the truth of each image"
+    " [default: the loosest one that a method declares].",
+)
 
 
 @click.command(epilog=EXAMPLE + "bench compare baseline.json mine.json --metric chamfer")
@@ -25,6 +34,7 @@ from scenegen.command_line.paths import InputPath, OutputPath
 @click.option("--html", "html_path", type=OutputPath(), help="Write a page: verdicts and charts.")
 @MARKDOWN
 @SEED
+@ALIGN
 @click.option(
     "--allow-incomparable",
     is_flag=True,
@@ -40,12 +50,13 @@ def compare(
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Compare methods with the first one, item by item.
+    """Compare methods with the first one, item by item, all after one alignment.
 
     Prints the differences, their confidence intervals and significance tests, and the smallest
     difference that the test set could show.
     """
     from metrics.score_file import read_scores
+    from metrics.scoring.aligned import aligned
     from metrics.views.compare.compare import compare as compare_files
     from metrics.views.compare.report import html_report, text_report, to_json
     from scenegen.files.new_file import check_writable, write_text
@@ -55,6 +66,7 @@ def compare(
             check_writable(Path(path), overwrite)
     files = [read_scores(path) for path in scores]
     comparison = compare_files(files, metrics or None, **settings)
+    files = aligned(files, comparison.alignment)
     if json_path:
         write_text(json_path, to_json(comparison), overwrite)
     if html_path:
@@ -87,6 +99,7 @@ def compare(
     help=r"Of the first LaTeX table, for \ref; a number follows it for each other one.",
 )
 @click.option("--out", type=OutputPath(), help="Write to this file instead of printing.")
+@ALIGN
 @click.option("--no-paper", is_flag=True, help="Leave out what the paper reports.")
 @OVERWRITE
 def leaderboard(
@@ -97,13 +110,14 @@ def leaderboard(
     caption: str,
     label: str,
     out: str | None,
+    align: Any,
     no_paper: bool,
     overwrite: bool,
 ) -> None:
-    """Rank score files in one table for each test set.
+    """Rank score files in one table for each test set, all methods after one alignment.
 
-    The headline ranks: shape for rooms, or what is behind for methods that see the first view
-    alone, and skill for questions. Baselines, and what the paper reported on its own data, stand
+    The headline ranks: shape for the paper's rooms, or what is behind for methods that see the
+    first view alone, the relative error of depth for interiors, and skill for questions. Baselines, and what the paper reported on its own data, stand
     below the methods, without a rank.
     """
     from metrics.score_file import read_scores
@@ -117,7 +131,7 @@ def leaderboard(
     if out is not None:
         check_writable(Path(out), overwrite)
     files = [read_scores(path) for path in scores]
-    tables = list(rank(files, metrics or None, paper=not no_paper))
+    tables = list(rank(files, metrics or None, paper=not no_paper, align=align))
     if no_intervals:
         tables = [without_rests(table) for table in tables]
     if caption and tables:

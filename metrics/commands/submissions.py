@@ -1,11 +1,12 @@
 """The `bench` commands on submissions: check, score and show them, and tell their format."""
 
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, cast, get_args
 
 import click
 
 from metrics.commands.options import MARKDOWN, SEED
+from metrics.measures.alignment import Alignment
 from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
 from scenegen.command_line.output import line_width, on_scheduler, print_line, progress_bar
@@ -83,6 +84,12 @@ TRUTH = click.option(
     metavar="NAME",
     help="Of measured truth: a protocol of docs/real-data.md, or `all` for a table of all that suit"
     " [default: declared].",
+)
+@click.option(
+    "--align",
+    type=click.Choice([name for name in get_args(Alignment) if name != "none"]),
+    help="Score images after this alignment to the truth of each, as loose as the declared one or"
+    " looser [default: the declared one].",
 )
 @click.option(
     "--figure", "figure_path", type=OutputPath(), help="Draw --protocol all here: .pdf, .svg, .png."

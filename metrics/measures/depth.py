@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 # Scene units. Smaller depths are raised to this before a logarithm or an inverse is taken.
 SMALLEST_LOG_DEPTH = 1e-3
 DELTA_BASE = 1.25
+NEAR = 1.03
+SMALLEST_RATIO = 2.0**-10
 
 
 @dataclass(frozen=True)
@@ -133,13 +135,38 @@ def delta(pair: DepthPair, power: int) -> float:
     return float(np.count_nonzero((p < limit * t) & (t < limit * p)) / len(p))
 
 
+def delta_near(pair: DepthPair) -> float:
+    """Return the fraction of pixels with max(p / t, t / p) < NEAR, in [0, 1], as `delta`."""
+    p, t = pair.predicted, pair.true
+    return float(np.count_nonzero((p < NEAR * t) & (t < NEAR * p)) / len(p))
+
+
+def within_eighth(pair: DepthPair, alignment: Alignment) -> float:
+    """Return the fraction of pixels within a factor 1.25^(1/8) after an alignment.
+
+    Depth after it is at least 1e-4. Source: Wu et al. 2025 (SAWA-H), as published.
+    """
+    cap = 1e4 if alignment == "disparity_scale_shift" else None
+    p = np.maximum(alignments.align(pair.predicted, pair.true, alignment, cap), 1e-4)
+    limit = DELTA_BASE**0.125
+    return float(np.count_nonzero((p < limit * pair.true) & (pair.true < limit * p)) / len(p))
+
+
+def scale_log2(pair: DepthPair) -> float:
+    """Return log2 of the median of p / t: 0 is the true scale, 1 twice as far, -1 half as far.
+
+    Ratios up to SMALLEST_RATIO, such as those of depth behind the camera, count as that.
+    """
+    return float(np.log2(max(float(np.median(pair.predicted / pair.true)), SMALLEST_RATIO)))
+
+
 def depth_scores(
     pair: DepthPair, alignment: Alignment = "none", aligned: bool = False
 ) -> dict[str, float]:
     """Return every score of this module by name, after alignment.
 
-    The names are `mse_depth`, `rmse`, `abs_rel`, `silog`, `delta_1`, `delta_2` and `delta_3`, and
-    without alignment `sq_rel`, `rmse_log`, `log10` and `irmse`; with one they end in `_after_` and
+    The names are `mse_depth`, `rmse`, `abs_rel`, `silog`, `delta_1`, `delta_1.03`, `delta_2` and
+    `delta_3`, and without alignment `sq_rel`, `rmse_log`, `log10` and `irmse`; with one they end in `_after_` and
     its name. `aligned` says that the alignment was made already.
     """
     fitted = pair if aligned else align(pair, alignment)
@@ -147,6 +174,7 @@ def depth_scores(
     named = {"mse_depth": squared, "rmse": float(np.sqrt(squared))}
     named |= {score.__name__: score(fitted) for score in (abs_rel, silog)}
     named |= {f"delta_{power}": delta(fitted, power) for power in (1, 2, 3)}
+    named["delta_1.03"] = delta_near(fitted)
     if alignment == "none":
         return named | {score.__name__: score(pair) for score in (sq_rel, rmse_log, log10, irmse)}
     return {f"{name}_after_{alignment}": value for name, value in named.items()}

@@ -7,6 +7,8 @@ from typing import TypeVar
 
 from metrics.measured.protocols import ProtocolError
 from metrics.measured.reader import MeasuredFile, open_images
+from metrics.measures.alignment import Alignment
+from metrics.scoring.geometry import alignments_scored
 from metrics.scoring.measured import score_measured
 from metrics.scoring.questions import score_questions
 from metrics.scoring.records import ScoreFile
@@ -93,6 +95,7 @@ def _runs(files: Sequence[Predictions], truth: Path, given: bool) -> Runs:
 
 def score_runs(runs: Runs, settings: Settings, progress: Progress) -> ScoreFile:
     """Score open submissions. Raises as `score`, and ProtocolError."""
+    _align(runs.files, settings.align)
     if settings.protocol or isinstance(runs, MeasuredRuns):
         (scores,) = score_measured(_measured(runs), settings, progress)
     elif isinstance(runs, RoomRuns):
@@ -105,7 +108,24 @@ def score_runs(runs: Runs, settings: Settings, progress: Progress) -> ScoreFile:
 
 def score_protocols(runs: Runs, settings: Settings, progress: Progress) -> list[ScoreFile]:
     """Score open submissions under all protocols that suit them. Raises as `score_runs`."""
+    _align(runs.files, settings.align)
     return _unchanged(runs, score_measured(_measured(runs), settings, progress, all_protocols=True))
+
+
+def _align(files: Sequence[Predictions], alignment: Alignment | None) -> None:
+    """Score files under an alignment that is as loose as theirs. Raises ScoringError for others."""
+    for file in files if alignment is not None else ():
+        if not isinstance(file, RoomPredictions):
+            raise ScoringError(file.path, f"answers under --align {alignment}", "depth or points")
+        allowed = {file.alignment, *alignments_scored(file.kind, file.alignment)}
+        if file.kind == "points":
+            allowed &= {file.alignment, "scale", "scale_shift"}
+        if file.kind == "disparity":
+            allowed = {"disparity_scale_shift"}
+        if alignment not in allowed:
+            found = f"{file.kind} under {file.alignment}, scored under {alignment}"
+            raise ScoringError(file.path, found, f"one of {', '.join(sorted(allowed))}")
+        file.scored_as = alignment if file.kind != "disparity" else None
 
 
 def _unchanged(runs: Runs, scores: Result) -> Result:

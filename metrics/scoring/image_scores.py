@@ -10,12 +10,23 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.alignment import Alignment
+from metrics.measures.alignment import Alignment, align
 from metrics.measures.behind import behind_scores, hidden_from
 from metrics.measures.boundaries import boundary_scores
-from metrics.measures.depth import DepthPair, compare_depth, depth_scores, mse_depth
+from metrics.measures.confidence import confidence_scores
+from metrics.measures.depth import DepthPair, depth_scores, scale_log2, within_eighth
+from metrics.measures.flying import at_half_resolution, flying_points, other_surface
 from metrics.measures.guesses import balls_and_blocks, depth_of_balls, depth_of_blocks
 from metrics.measures.objects import counted_objects, object_means, single_objects
+from metrics.measures.pairs import (
+    Order,
+    Triangles,
+    ordered_pairs,
+    ordinal_scores,
+    relative_normal_scores,
+    sawa_h,
+    triangle_pairs,
+)
 from metrics.measures.relief import depth_along, empty_room, relief_scores
 from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores
 from metrics.measures.surfaces.chamfer_hausdorff import (
@@ -33,7 +44,12 @@ from metrics.measures.surfaces.normals import (
     normals_from_points,
 )
 from metrics.measures.surfaces.patches import Surface, surface_distances, surface_of
-from metrics.measures.surfaces.points import departures, local_point_scores, point_map_scores
+from metrics.measures.surfaces.points import (
+    departures,
+    local_point_scores,
+    point_map_scores,
+    ray_error_degrees,
+)
 from metrics.scoring.geometry import (
     Geometry,
     alignments_scored,
@@ -45,10 +61,15 @@ from metrics.scoring.metric_names import (
     BEHIND,
     BLOCKS,
     CUT_OUT,
+    EDGE_DISTANCE,
     EMPTY_ROOM,
+    FLAT,
+    HALF,
     LEANING,
     OBJECT_SCORES,
     OTHER_SCENE,
+    RAMP,
+    RANDOM_ORDER,
     SKILLED,
     metric,
 )
@@ -67,6 +88,7 @@ from scenegen.camera import (
 Array = NDArray[Any]
 NonFinite = Literal["error", "penalise"]
 F_SCORE_THRESHOLDS = (0.01, 0.02, 0.05)  # scene units: edges of the room
+_BLIND = [name for name, begins in SKILLED.items() if {EMPTY_ROOM, RAMP} <= {*begins}]
 
 
 @dataclass(frozen=True)
@@ -102,6 +124,8 @@ class Reference:
         counted: pixels of objects that count, (H, W).
         inside: the object of each pixel inside one, (H, W), as `shape.inside_objects`.
         hidden: pixels of objects that count and that the first view does not see, (H, W).
+        pairs, order: which pixels are compared with each other, as `measures.pairs`.
+        other: depth across the nearest occlusion edge, (H, W), as `flying.other_surface`.
         floors: scores of the empty room, of cut-outs and of guesses, by name; those of OF_TRUTH.
     """
 
@@ -112,51 +136,104 @@ class Reference:
     counted: Array
     inside: Array
     hidden: Array
+    pairs: list[Triangles]
+    order: Order
+    other: Array
     floors: dict[str, float]
 
 
-def reference_of(truth: TrueView, first: FirstView | None = None) -> Reference:
-    """Return the reference of a true view; `first` is None where it is the first one itself."""
+def reference_of(
+    truth: TrueView,
+    first: FirstView | None = None,
+    row: int = 0,
+    floors: dict[str, float] | None = None,
+) -> Reference:
+    """Return the reference of a true view, `row` of its file.
+
+    Args:
+        first: the first view of its scene; None where it is the first one itself.
+        floors: those of the reference, where they are known.
+    """
     mask, fov = truth.mask, truth.fov_y_degrees
     height, width = truth.depth.shape
     empty, facing = empty_room(truth.world_from_camera, fov, height, width, truth.room_size)
-    pitch = pixel_size(len(mask), fov)
-    points = back_project(truth.depth, fov)[mask]
-    surface = surface_of(points, truth.normal[mask].astype(np.float64), pitch, mask)
-    room = Geometry(empty, back_project(empty, fov)[mask], True)
-    walls, _ = normals_from_points(_image(room.points, mask), fov, mask)
-    seen = surface_of(room.points, walls[mask], pitch, mask)
-    nearest = surface_distances(seen, surface, _nearest(room, truth, surface), True)
-    scores = {"chamfer": chamfer(nearest), "hausdorff": hausdorff(nearest)}
-    scores["mse_depth"] = mse_depth(compare_depth(empty, truth.depth, mask))
-    scores |= object_means(_single_objects(empty, truth, nearest))
+    points = _image(back_project(truth.depth, fov)[mask], mask)
+    true_normals = truth.normal[mask].astype(np.float64)
+    surface = surface_of(points[mask], true_normals, pixel_size(len(mask), fov), mask)
     counted = counted_objects(truth.object_id)
     hidden = _hidden(truth, counted, first)
-    guesses = _guesses(truth, empty, hidden, first)
-    behind = {
-        guess + BEHIND: behind_scores(np.abs(depth - truth.depth)[hidden])[BEHIND]
-        for guess, depth in guesses.items()
-    }
-    normals, smooth = normals_from_points(_image(points, mask), fov, mask)
-    inside = inside_objects(truth.object_id)
-    at, derived_at = inside > 0, _smooth_pixels(inside, smooth)
+    reference = Reference(
+        empty,
+        surface,
+        *normals_from_points(points, fov, mask),
+        counted,
+        inside_objects(truth.object_id),
+        hidden,
+        triangle_pairs(points, mask, row, truth.object_id),
+        ordered_pairs(truth.depth, mask, row, truth.object_id),
+        other_surface(truth.depth, truth.object_id, mask),
+        floors or {},
+    )
+    if floors is None:
+        guesses = _guesses(truth, empty, hidden, first)
+        reference.floors.update(_floors(truth, reference, facing, guesses))
+    return reference
+
+
+def _floors(
+    truth: TrueView, reference: Reference, facing: Array, guesses: dict[str, Array]
+) -> dict[str, float]:
+    """Return the scores of guesses that follow from the truth; normals of the walls are `facing`."""
+    mask, fov, empty = truth.mask, truth.fov_y_degrees, reference.empty
+    room = Geometry(empty, back_project(empty, fov)[mask], True)
+    walls, _ = normals_from_points(_image(room.points, mask), fov, mask)
+    surface, true = reference.surface, truth.depth[mask].astype(np.float64)
+    seen = surface_of(room.points, walls[mask], surface.pitch, mask)
+    nearest = surface_distances(seen, surface, _nearest(room, truth, surface), True)
+    inside = reference.inside
+    at, derived_at = inside > 0, _smooth_pixels(inside, reference.smooth)
+    scores = {"chamfer": chamfer(nearest), "hausdorff": hausdorff(nearest)}
+    scores |= depth_scores(DepthPair(empty[mask], true))
+    scores |= object_means(_single_objects(empty, truth, nearest))
+    scores |= boundary_scores(empty, truth.depth, mask)
+    scores |= point_map_scores(room.points, surface.points)
     scores |= {
         "shape_error": flat_error((empty - truth.depth)[at], inside[at]),
         "shape_normal_degrees": _mean_angle(facing, truth.normal, at),
-        "derived_shape_normal_degrees": _mean_angle(walls, normals, derived_at),
+        "derived_shape_normal_degrees": _mean_angle(walls, reference.normals, derived_at),
     }
     of_empty = [name for name in scores if EMPTY_ROOM in SKILLED.get(name, ())]
-    floors = {EMPTY_ROOM + name: scores[name] for name in of_empty} | behind
+    floors = {EMPTY_ROOM + name: scores[name] for name in of_empty}
+    for guess, depth in guesses.items():
+        errors = np.abs(depth - truth.depth)[reference.hidden]
+        floors[guess + BEHIND] = behind_scores(errors)[BEHIND]
+    flat = np.where(truth.object_id == 0, truth.depth, empty).astype(np.float64)
+    for number in np.unique(truth.object_id[truth.object_id > 0]).tolist():
+        own = truth.object_id == number
+        flat[own] = np.median(truth.depth[own])
+    pairs = relative_normal_scores(_image(surface.points, mask), reference.pairs)
     floors |= {
         f"{CUT_OUT}shape_error": flat_error(truth.depth[at].astype(np.float64), inside[at]),
         f"{CUT_OUT}shape_normal_degrees": one_normal_degrees(truth.normal[at], inside[at]),
         f"{CUT_OUT}derived_shape_normal_degrees": one_normal_degrees(
-            normals[derived_at], inside[derived_at]
+            reference.normals[derived_at], inside[derived_at]
+        ),
+        f"{CUT_OUT}boundary_f1": boundary_scores(flat, truth.depth, mask)["boundary_f1"],
+        f"{CUT_OUT}relative_normal_degrees": pairs["flat"],
+        f"{HALF}flying_points": flying_points(
+            at_half_resolution(truth.depth, mask), truth.depth, reference.other
         ),
     }
     if truth.room_size is not None:  # of a leaning cut-out, but for each object's shift
         floors[f"{LEANING}shape_error"] = flat_error((empty / 2.0 - truth.depth)[at], inside[at])
-    return Reference(empty, surface, normals, smooth, counted, inside, hidden, floors)
+    rays = pixel_directions(*mask.shape, fov)[mask]
+    down = (np.nonzero(mask)[0] + 0.5) / len(mask)
+    for guess, values in ((FLAT, np.ones_like(down)), (RAMP, 2.0 - down)):
+        fitted = align(values, true, "scale_shift")
+        scores = depth_scores(DepthPair(fitted, true))
+        scores |= point_map_scores(rays * fitted[:, None], surface.points)
+        floors |= {guess + name: value for name, value in scores.items() if name in _BLIND}
+    return floors
 
 
 def _guesses(
@@ -241,6 +318,7 @@ def score_prediction(
     reference: Reference,
     other_relief: Array | None = None,
     non_finite: NonFinite = "error",
+    edge_distance: Array | None = None,
 ) -> ImageScores:
     """Return every score of what is predicted for one image, by the names of `metric_names`.
 
@@ -254,13 +332,15 @@ def score_prediction(
             where there is no other scene, and the scores against it are NaN.
         non_finite: what to do with an image in which a scored pixel breaks `submissions.rules`.
             "penalise" gives it the worst value of every score, `metric_names.Metric.worst`.
+        edge_distance: of the image, (H, W), as `confidence.distance_from_edges`, for methods that
+            state their confidence.
 
     Raises PredictionError with the count and the first pixel, unless they are penalised, and
     ValueError on other shapes than the truth's.
     """
     if non_finite == "penalise" and _breaks_rules(predicted, truth):
-        return _worst(predicted, truth, reference, other_relief)
-    for name, values in (predicted.kind, predicted.geometry), ("normal", predicted.normal):
+        return _worst(predicted, truth, reference, other_relief, edge_distance)
+    for name, values in predicted.columns:
         if values is not None:
             refuse_pixels(PredictionError, f"predicted {name}", name, values, truth.mask)
     mask, fov = truth.mask, truth.fov_y_degrees
@@ -282,25 +362,68 @@ def score_prediction(
     scores |= _scores_of_relief(geometry, truth, reference, other_relief)
     scores |= boundary_scores(geometry.depth, truth.depth, mask)
     scores |= _scores_of_points(geometry, truth, reference, nearest, alignments)
+    image = _image(geometry.points, mask)
+    scores |= scores_of_pairs(
+        pair, scores["boundary_f1"], geometry.depth, image, reference.pairs, reference.order
+    )
+    scores["flying_points"] = flying_points(geometry.depth, truth.depth, reference.other)
+    scores["scale_log2"] = scale_log2(pair)
     if predicted.fov_y_degrees is not None:
-        scores["fov_error_degrees"] = abs(predicted.fov_y_degrees - fov)
+        scores["fov_bias_degrees"] = predicted.fov_y_degrees - fov
+        scores["fov_error_degrees"] = abs(scores["fov_bias_degrees"])
+    if predicted.confidence is not None:
+        scores |= scores_of_confidence(pair, predicted.confidence[mask], edge_distance, mask)
     scores |= _scores_of_normals(derived, predicted.normal, truth, reference)
     return ImageScores(scores, objects)
 
 
+def scores_of_pairs(
+    pair: DepthPair,
+    boundary_f1: float,
+    depth: Array,
+    points: Array,
+    pairs: list[Triangles],
+    order: Order,
+) -> dict[str, float]:
+    """Return the scores of pairs of pixels, and SAWA-H, of aligned depth (H, W) and its points."""
+    normals, ordinal = relative_normal_scores(points, pairs), ordinal_scores(depth, order)
+    fits: tuple[Alignment, ...] = ("disparity_scale_shift", "scale_shift")
+    within = [within_eighth(pair, fit) for fit in fits]
+    unordered = 1.0 - ordinal["anywhere"]
+    scores = {"relative_normal_degrees": normals["relative_normal_degrees"]}
+    scores |= {name: value for name, value in ordinal.items() if name != "anywhere"}
+    return scores | {"sawa_h": sawa_h(unordered, *within, boundary_f1, normals["anywhere"])}
+
+
+def scores_of_confidence(
+    pair: DepthPair, confidence: Array, edge_distance: Array | None, mask: Array
+) -> dict[str, float]:
+    """Return the scores of confidences (N,), and those of a random order and of `edge_distance`."""
+    errors = np.abs(pair.predicted - pair.true) / pair.true
+    scores = confidence_scores(errors, confidence)
+    scores[f"{RANDOM_ORDER}ause_abs_rel"] = scores["ause_abs_rel"] + scores["aurg_abs_rel"]
+    if edge_distance is not None:
+        by_edges = confidence_scores(errors, edge_distance[mask])["ause_abs_rel"]
+        scores[f"{EDGE_DISTANCE}ause_abs_rel"] = by_edges
+    return scores
+
+
 def _breaks_rules(predicted: PredictedView, truth: TrueView) -> bool:
     against = Against(surface=truth.mask)
-    columns = ((predicted.kind, predicted.geometry), ("normal", predicted.normal))
     return any(
         True
-        for name, values in columns
+        for name, values in predicted.columns
         if values is not None
         for _ in broken_rules(name, values, against)
     )
 
 
 def _worst(
-    predicted: PredictedView, truth: TrueView, reference: Reference, other_relief: Array | None
+    predicted: PredictedView,
+    truth: TrueView,
+    reference: Reference,
+    other_relief: Array | None,
+    edge_distance: Array | None,
 ) -> ImageScores:
     """Return the worst value of each score that the truth would have in this submission."""
     perfect: Array = np.where(truth.mask, truth.depth, 1.0)
@@ -309,8 +432,9 @@ def _worst(
     elif predicted.kind == "disparity":
         perfect = 1.0 / perfect
     normal = None if predicted.normal is None else truth.normal
-    instead = replace(predicted, geometry=perfect, normal=normal)
-    best = score_prediction(instead, truth, reference, other_relief)
+    sure = None if predicted.confidence is None else np.zeros(truth.mask.shape)
+    instead = replace(predicted, geometry=perfect, normal=normal, confidence=sure)
+    best = score_prediction(instead, truth, reference, other_relief, "error", edge_distance)
     farthest = float(truth.depth[truth.mask].max(initial=0.0))
     scores = {
         name: value if np.isnan(value) else metric(name).worst(farthest)
@@ -385,6 +509,9 @@ def _scores_of_points(
     """Return the scores of points of the same pixels: over the image, inside objects, behind."""
     mask, points, true = truth.mask, geometry.points, reference.surface.points
     scores = point_map_scores(points, true)
+    if not geometry.on_rays:
+        rays = pixel_directions(*mask.shape, truth.fov_y_degrees)[mask]
+        scores["ray_error_degrees"] = ray_error_degrees(points, rays)
     for after in ("scale", "scale_shift"):
         if after in alignments:
             scores |= point_map_scores(points, true, after)

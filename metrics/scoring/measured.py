@@ -35,7 +35,7 @@ def score_measured(
     files, truth = runs.files, runs.truth
     rows = matched_rows(runs, settings.allow_partial)
     require_one_kind(files)
-    kind, declared = files[0].kind, files[0].alignment
+    kind, declared = files[0].kind, files[0].fitted
     if all_protocols:
         protocols = [protocol for protocol in PROTOCOLS if suits(protocol, kind, declared)]
     else:

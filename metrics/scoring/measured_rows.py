@@ -17,18 +17,26 @@ from metrics.measured.protocols import (
 from metrics.measured.reader import MeasuredView
 from metrics.measures.alignment import Alignment, align_points
 from metrics.measures.boundaries import boundary_scores
-from metrics.measures.depth import DepthPair, depth_scores
+from metrics.measures.depth import DepthPair, depth_scores, scale_log2
+from metrics.measures.pairs import (
+    ordered_pairs,
+    ordinal_scores,
+    relative_normal_scores,
+    triangle_pairs,
+)
 from metrics.measures.surfaces.normals import angular_errors_degrees, normal_scores
 from metrics.measures.surfaces.points import point_map_scores
 from metrics.scoring.geometry import alignments_scored, scored_alignment
-from metrics.scoring.metric_names import FLAT, HEADLINE, RAMP, metric
+from metrics.scoring.image_scores import scores_of_confidence, scores_of_pairs
+from metrics.scoring.metric_names import FLAT, RAMP, SKILLED, metric
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import Against, broken_rules, refuse_pixels
 
 Array = NDArray[Any]
 _DEPTH_SCORES = tuple(depth_scores(DepthPair(np.ones(1), np.ones(1))))
-_OF_GUESSES = [guess + name for guess in (FLAT, RAMP) for name in HEADLINE["measured"]]
+_GUESSED = [name for name in _DEPTH_SCORES if FLAT in SKILLED.get(name, ())]
+_OF_GUESSES = [guess + name for guess in (FLAT, RAMP) for name in _GUESSED]
 PIXELS = "pixels"  # how many pixels of an image a protocol scores
 
 
@@ -54,6 +62,8 @@ def scores_of_view(
     protocols: Sequence[Protocol],
     dense: bool,
     penalise: bool = False,
+    row: int = 0,
+    edge_distance: Array | None = None,
 ) -> dict[tuple[str, str], float]:
     """Return the scores of an image by name of protocol and of score, and its PIXELS.
 
@@ -62,6 +72,8 @@ def scores_of_view(
         dense: whether boundaries are scored.
         penalise: give an image with a scored pixel that breaks `submissions.rules` the worst value
             of every score.
+        row: of the truth.
+        edge_distance: as for `image_scores.score_prediction`.
 
     Raises PredictionError for such a pixel, and ProtocolError where a single protocol scores none;
     of several, its scores are NaN there.
@@ -79,24 +91,36 @@ def scores_of_view(
             found[protocol.name, PIXELS] = 0
             continue
         true = truth.depth[mask].astype(np.float64)
-        if protocol is DECLARED and predicted.kind == "points" and truth.rays is not None:
-            rays = truth.rays[mask] * true[:, None]
-            points = align_points(geometry[mask].astype(np.float64), rays, predicted.alignment)
+        of_points = protocol is DECLARED and truth.rays is not None
+        rays = truth.rays[mask] if of_points and truth.rays is not None else None
+        points = None
+        if rays is not None and predicted.kind == "points":
+            points = align_points(
+                geometry[mask].astype(np.float64), rays * true[:, None], predicted.alignment
+            )
             pair = DepthPair(-points[:, 2], true)
-            scores = depth_scores(pair) | point_map_scores(points, rays)
-            for after in ("scale", "scale_shift"):
-                if after in alignments_scored("points", predicted.alignment):
-                    scores |= point_map_scores(points, rays, after)
         else:
             pair = depth_under(protocol, predicted.kind, predicted.alignment, depth[mask], true)
-            scores = depth_scores(pair)
+            points = None if rays is None else rays * pair.predicted[:, None]
+        scores = depth_scores(pair) | {"scale_log2": scale_log2(pair)}
+        if rays is not None and points is not None:
+            scores |= point_map_scores(points, rays * true[:, None])
+            for after in ("scale", "scale_shift"):
+                if after in alignments_scored(predicted.kind, predicted.alignment):
+                    scores |= point_map_scores(points, rays * true[:, None], after)
         if protocol is DECLARED:
-            scores |= _further(predicted, normal, truth, pair, dense)
+            scores |= _further(predicted, normal, truth, pair, points, dense, row)
+        if predicted.confidence is not None:
+            height, width = mask.shape
+            sure = predicted.confidence[:height, :width][mask]
+            scores |= scores_of_confidence(pair, sure, edge_distance, mask)
         if broken:
             farthest = float(true.max(initial=0.0))
             scores = {name: metric(name).worst(farthest) for name in scores}
         alignment = protocol.alignment or scored_alignment(predicted.kind, predicted.alignment)
         scores |= _guesses(replace(protocol, alignment=alignment), mask, true)
+        if "flat" in scores:
+            scores[f"{FLAT}relative_normal_degrees"] = scores.pop("flat")
         found |= {(protocol.name, name): value for name, value in scores.items()}
         found[protocol.name, PIXELS] = len(true)
     return found
@@ -121,7 +145,7 @@ def _guesses(protocol: Protocol, mask: Array, true: Array) -> dict[str, float]:
     for guess, values in ((FLAT, np.ones_like(down)), (RAMP, ramp)):
         kind = "disparity" if disparity else "depth"
         fitted = depth_scores(depth_under(protocol, kind, "none", values, true))
-        scores |= {guess + name: fitted[name] for name in HEADLINE["measured"]}
+        scores |= {guess + name: fitted[name] for name in _GUESSED}
     return scores
 
 
@@ -158,7 +182,8 @@ def _usable(
     geometry = predicted.geometry[:height, :width]
     normal = None if predicted.normal is None else predicted.normal[:height, :width]
     broken = False
-    for name, values in ((predicted.kind, geometry), ("normal", normal)):
+    sure = None if predicted.confidence is None else predicted.confidence[:height, :width]
+    for name, values in ((predicted.kind, geometry), ("normal", normal), ("confidence", sure)):
         if values is not None and penalise:
             against = Against(surface=truth.mask)
             broken |= next(broken_rules(name, values, against), None) is not None
@@ -175,9 +200,11 @@ def _further(
     normal: Array | None,
     truth: MeasuredView,
     pair: DepthPair,
+    points: Array | None,
     dense: bool,
+    row: int,
 ) -> dict[str, float]:
-    """Return what is scored beside depth: other alignments, boundaries and normals."""
+    """Return what is scored beside depth: other alignments, boundaries, pairs and normals."""
     scores, mask = dict[str, float](), truth.mask
     own = scored_alignment(predicted.kind, predicted.alignment)
     for after in alignments_scored(predicted.kind, predicted.alignment):
@@ -187,6 +214,16 @@ def _further(
         fitted = np.full(truth.depth.shape, np.nan)
         fitted[mask] = pair.predicted
         scores |= boundary_scores(fitted, truth.depth, mask)
+        order = ordered_pairs(truth.depth, mask, row)
+        if points is not None and truth.rays is not None:
+            image = np.full(truth.rays.shape, np.nan)
+            image[mask] = truth.rays[mask] * truth.depth[mask, None].astype(np.float64)
+            pairs = triangle_pairs(image, mask, row)
+            scores["flat"] = relative_normal_scores(image, pairs)["flat"]
+            image[mask] = points
+            scores |= scores_of_pairs(pair, scores["boundary_f1"], fitted, image, pairs, order)
+        else:
+            scores["ordinal_accuracy"] = ordinal_scores(fitted, order)["ordinal_accuracy"]
     if normal is not None and truth.normal is not None:
         shown = mask & truth.normal.any(axis=-1)
         angles = np.zeros(0)

@@ -46,7 +46,8 @@ class Baseline:
 # By what begins the names of their scores, which stand in the items of score files.
 EMPTY_ROOM, CUT_OUT, LEANING = "empty_room_", "cut_out_", "leaning_"
 BALLS, BLOCKS, FLAT, RAMP = "balls_", "blocks_", "flat_", "ramp_"
-OTHER_SCENE = "other_scene_"
+OTHER_SCENE, HALF = "other_scene_", "half_resolution_"
+RANDOM_ORDER, EDGE_DISTANCE = "random_order_", "edge_distance_"
 _BLIND = (
     " that sees no picture, fitted as predictions are, in least squares for L1, and by scale and"
     " shift where nothing is."
@@ -81,18 +82,33 @@ BASELINES = {
         "blocks", "a block for each object of the first view",
         "blocks in place of the first view's objects.", needs="first_view",
     ),
+    HALF: Baseline(
+        "half resolution", "the true depth at half the resolution, enlarged again",
+        "the true depth, halved by means of 2 x 2 pixels and doubled again, bilinear.",
+    ),
     OTHER_SCENE: Baseline(
         "shuffled", "this prediction against another scene",
         "the same prediction with the relief of another scene, seen in the same view.",
         of_truth=False,
+    ),
+    RANDOM_ORDER: Baseline(
+        "random order", "confidence in a random order",
+        "a confidence that says nothing.", of_truth=False,
+    ),
+    EDGE_DISTANCE: Baseline(
+        "edge distance", "distance to the nearest edge of the image's brightness as confidence",
+        "the distance from the nearest edge of brightness as confidence.", of_truth=False,
     ),
 }  # fmt: skip
 OF_TRUTH = tuple(begins for begins, baseline in BASELINES.items() if baseline.of_truth)
 _SEEN: Sequence[Shown] = ("no_view", "first_view", "scored_view")  # ever more
 
 Lacking = Literal[
-    "", "objects", "relief", "inside", "bends", "behind", "boundary", "planes", "partner"
-]
+    "", "objects", "relief", "inside", "bends", "behind", "boundary", "planes", "partner", "edges",
+    "pairs", "order", "order within", "order between",
+]  # fmt: skip
+# The kinds of test sets, which differ in their headline: `ScoreFile.kind`.
+KINDS = ("rooms", "interiors", "measured", "iqtt")
 
 
 @dataclass(frozen=True)
@@ -108,7 +124,7 @@ class Metric:
         higher_is_better: its direction.
         largest, smallest: the limits of its values.
         tasks: whose items have it. A scene unit is 1 m of measured truth.
-        headline: its place among the main metrics of a task, by task. The first one ranks.
+        headline: its place among the main metrics, by the kind of the test set. The first ranks.
         printed: its place in what `bench score` prints of rooms; 0 where it is not.
         baselines: keys of BASELINES; the best one is the 0 of its skill.
         forms: key of FORMS: which further metrics are made of it.
@@ -121,15 +137,18 @@ class Metric:
             without pixels inside objects (`shape.inside_objects`), and "bends", also those whose
             objects are flat; "behind", those that show little that the first view does not;
             "boundary", those whose true depth nowhere jumps; "planes", those in which no pixel has
-            a reliable normal from its depth; "partner", those whose view no other scene has; else
-            "".
+            a reliable normal from its depth; "partner", those whose view no other scene has;
+            "edges", those without an occlusion edge; "pairs" and "order", those without the pairs
+            of pixels that `measures.pairs` compares; else "".
+        unchanged_by: what may be fitted to the truth without a change of the value.
+        signed: whether the value is a bias, which is best at 0 and ranks nothing.
     """
 
     name: str
     title: str
     unit: str
     definition: str
-    of: Literal["points", "depth", "normals", "field of view", "answers"] = "depth"
+    of: Literal["points", "depth", "normals", "field of view", "answers", "confidence"] = "depth"
     higher_is_better: bool = False
     largest: float = math.inf
     smallest: float = 0.0
@@ -142,6 +161,8 @@ class Metric:
     is_root: bool = False
     redefined: bool = False
     lacking: Lacking = ""
+    unchanged_by: Literal["", "scale", "scale_shift"] = ""
+    signed: bool = False
 
     @property
     def direction(self) -> str:
@@ -151,6 +172,8 @@ class Metric:
     @property
     def better(self) -> str:
         """The better direction in a word."""
+        if self.signed:
+            return "nearer 0"
         return "higher" if self.higher_is_better else "lower"
 
     def baselines_shown(self, shown: Shown) -> list[str]:
@@ -170,7 +193,7 @@ class Metric:
             farthest: true depth of the image, scene units.
         """
         if self.higher_is_better:
-            return self.smallest
+            return max(self.smallest, -_WORST["ratio"])
         if math.isfinite(self.largest):
             return self.largest
         length = max(_LENGTH, farthest)
@@ -180,7 +203,11 @@ class Metric:
 
 # Of errors without a limit: 4 scene units, or the farthest depth, and depth at the camera.
 _LENGTH = 4.0
-_WORST = {"ratio": 4.0, "100 ln": 1000.0, "ln": 10.0, "log10": 4.0, "1 / scene unit": 1000.0}
+_WORST = {"ratio": 4.0, "100 ln": 1000.0, "ln": 10.0, "log10": 4.0, "1 / scene unit": 1000.0,
+          "log2": 10.0}  # fmt: skip
+
+
+SAWA_H_WORST = 3.65 + 0.18 + 0.01 + 0.20 + 1.94 * math.pi  # everything wrong
 
 
 def _error(name: str, title: str, definition: str, unit: str = "scene unit", **more: Any) -> Metric:
@@ -197,7 +224,7 @@ def _correlation(name: str, title: str, definition: str, **more: Any) -> Metric:
 
 
 def _angle(name: str, title: str, definition: str, **more: Any) -> Metric:
-    return Metric(name, title, "degree", definition, largest=180.0, **more)
+    return Metric(name, title, "degree", definition, **{"largest": 180.0, **more})
 
 
 # What several rows share.
@@ -206,6 +233,8 @@ _PAPER: dict[str, Any] = {"of": "points"}
 _ANYWHERE: dict[str, Any] = {"tasks": ("rooms", "measured")}
 _DEPTH = _ANYWHERE | {"forms": "depth"}
 _BLINDLY: dict[str, Any] = {"baselines": (FLAT, RAMP)}
+_BLIND_OR_EMPTY = (EMPTY_ROOM, FLAT, RAMP)
+_ORDER: dict[str, Any] = _ANYWHERE | {"unchanged_by": "scale_shift"}
 _POINT_MAP = _ANYWHERE | _SURFACE | {"forms": "points"}
 _NORMAL = _ANYWHERE | {"of": "normals", "forms": "normals"}
 _INSIDE: dict[str, Any] = {"lacking": "inside", "redefined": True}
@@ -252,14 +281,19 @@ TABLE: Sequence[Metric] = (
     _error("rmse", "RMSE", "square root of `mse_depth` of the image.", headline={"measured": 3},
            is_root=True, **_BLINDLY, **_DEPTH),
     _error("abs_rel", "AbsRel", "mean of absolute difference of depth divided by true depth.",
-           "ratio", headline={"measured": 1}, printed=1, **_BLINDLY, **_DEPTH),
+           "ratio", headline={"measured": 1, "interiors": 1}, printed=1, baselines=_BLIND_OR_EMPTY,
+           **_DEPTH),
     _error("silog", "SILog",
            "standard deviation of ln predicted - ln true depth, times 100; predicted depths up to"
            " 0.001 count as 0.001 and are left out of the mean it subtracts.", "100 ln",
            headline={"measured": 4}, **_BLINDLY, **_DEPTH),
     _share("delta_1", "delta 1",
            "fraction of pixels whose predicted and true depth differ by a factor below 1.25.",
-           headline={"measured": 2}, printed=2, **_BLINDLY, **_DEPTH),
+           headline={"measured": 2, "interiors": 2}, printed=2, baselines=_BLIND_OR_EMPTY,
+           **_DEPTH),
+    _share("delta_1.03", "delta 1.03",
+           "fraction of pixels whose predicted and true depth differ by a factor below 1.03.",
+           **_DEPTH),
     *(_share(f"delta_{power}", f"delta {power}",
              "fraction of pixels whose predicted and true depth differ by a factor below"
              f" 1.25^{power}.", **_DEPTH)
@@ -276,14 +310,42 @@ TABLE: Sequence[Metric] = (
     _share("boundary_f1", "Boundary F1",
            "harmonic mean of precision and recall of pairs of neighbours whose depths differ by a"
            " ratio above a threshold, each the mean over four directions, 0 where there is none;"
-           " weighted mean over ten thresholds from 1.05 to 1.25.", redefined=True, **_ANYWHERE),
+           " weighted mean over ten thresholds from 1.05 to 1.25.", redefined=True,
+           headline={"measured": 6, "interiors": 4}, baselines=(EMPTY_ROOM, CUT_OUT),
+           unchanged_by="scale", **_ANYWHERE),
     _share("boundary_recall", "Boundary recall",
            "fraction of these pairs of the truth, in all directions together, that the prediction"
            " has as well; the same mean, over thresholds where the truth has any.",
-           lacking="boundary", redefined=True, **_ANYWHERE),
+           lacking="boundary", redefined=True, unchanged_by="scale", **_ANYWHERE),
+    _error("flying_points", "Flying points",
+           "fraction of the pixels within 2 pixels of an occlusion edge whose predicted depth lies"
+           " between the two surfaces, farther from either than 5% of their gap.", "fraction",
+           largest=1.0, lacking="edges", baselines=(HALF,)),
+    _angle("relative_normal_degrees", "Relative normals",
+           "mean absolute difference of predicted and true angle between the normals of two pixels"
+           " of one object, or without an edge of depth between them where objects are not known;"
+           " over pairs up to 32 pixels apart, the mean over four scales.", of="points",
+           lacking="pairs", headline={"measured": 7, "interiors": 5}, baselines=(CUT_OUT, FLAT),
+           unchanged_by="scale", **_ANYWHERE),
+    _share("ordinal_accuracy", "Ordinal accuracy",
+           "fraction of pairs of pixels, whose true depths differ by a factor above 1.02, that the"
+           " predicted depth orders rightly.", lacking="order", **_ORDER),
+    _share("ordinal_accuracy_within", "Ordinal accuracy within objects",
+           "the same of pairs on one object.", lacking="order within", unchanged_by="scale_shift"),
+    _share("ordinal_accuracy_between", "Ordinal accuracy between objects",
+           "the same of pairs on two objects, or on one and the room.", lacking="order between",
+           unchanged_by="scale_shift"),
+    _error("sawa_h", "SAWA-H",
+           "weighted sum of errors of order, of depth after two alignments, of boundaries and of"
+           " relative normals (arXiv 2510.19814), over the pairs of this benchmark.", "weighted sum",
+           largest=SAWA_H_WORST, of="points", unchanged_by="scale", **_ANYWHERE),
+    _error("scale_log2", "Scale",
+           "log2 of the median over pixels of predicted divided by true depth.", "log2",
+           smallest=-math.inf, signed=True, **_ANYWHERE),
     _error("points_rel", "Points, relative error",
            "mean distance of each predicted point from the true one of its pixel, divided by the"
-           " true distance from the camera.", "ratio", **_POINT_MAP),
+           " true distance from the camera.", "ratio", headline={"measured": 5, "interiors": 3},
+           baselines=_BLIND_OR_EMPTY, **_POINT_MAP),
     _share("points_delta_1", "Points, delta 1",
            "fraction of the pixels where that distance is below a quarter of the smaller distance"
            " from the camera.", **_POINT_MAP),
@@ -296,6 +358,20 @@ TABLE: Sequence[Metric] = (
     _angle("fov_error_degrees", "Field of view, error",
            "absolute difference of predicted and true vertical field of view.",
            of="field of view"),
+    _angle("fov_bias_degrees", "Field of view, bias",
+           "predicted minus true vertical field of view.", of="field of view", smallest=-180.0,
+           signed=True),
+    _angle("ray_error_degrees", "Rays, error",
+           "mean angle between the line from the camera to a predicted point and its pixel's ray;"
+           " of point maps.", of="points"),
+    _error("ause_abs_rel", "AUSE of AbsRel",
+           "area between the mean absolute relative error of the most confident pixels and that of"
+           " the pixels with the least error, over the fraction left out.", "ratio",
+           of="confidence", baselines=(RANDOM_ORDER, EDGE_DISTANCE)),
+    _error("aurg_abs_rel", "AURG of AbsRel",
+           "area between the mean absolute relative error and that of the most confident pixels,"
+           " over the fraction left out; 0 for a random order.", "ratio", of="confidence",
+           smallest=-math.inf, higher_is_better=True),
     _angle("normal_mean_degrees", "Normals, mean",
            "mean angle between predicted and true normals.", **_NORMAL),
     _angle("normal_median_degrees", "Normals, median", "median of these angles in the image.",
@@ -307,7 +383,8 @@ TABLE: Sequence[Metric] = (
       for limit in ("5", "7.5", "11.25", "22.5", "30")),
     _error("shape_error", "Shape error",
            "mean error inside objects, after each object's median error is taken off.", of="points",
-           headline={"rooms": 1}, printed=8, baselines=(*_FLAT_OR_EMPTY, LEANING), **_INSIDE),
+           headline={"rooms": 1, "interiors": 6}, printed=8,
+           baselines=(*_FLAT_OR_EMPTY, LEANING), **_INSIDE),
     _correlation("shape_correlation", "Shape correlation",
                  "correlation inside objects of what predicted and true depth have left after the"
                  " least-squares plane of each object.", lacking="bends", **_SURFACE),
@@ -428,8 +505,8 @@ def _forms(rows: Iterable[Metric]) -> Iterator[Metric]:
 
 def _scores_of_baselines() -> Iterator[Metric]:
     for begins, baseline in BASELINES.items():
-        task = "measured" if begins in (FLAT, RAMP) else "rooms"
-        changes: dict[str, Any] = {"redefined": False, "tasks": (task,)}
+        tasks = ("rooms", "measured") if begins in (FLAT, RAMP) else ("rooms",)
+        changes: dict[str, Any] = {"redefined": False, "tasks": tasks}
         changes |= {"lacking": "partner"} if begins == OTHER_SCENE else {}
         form = Form(f"{begins}*", baseline.name, f"that of {baseline.definition}", changes)
         yield from (form.of(metric) for metric in TABLE if begins in metric.baselines)
@@ -440,12 +517,12 @@ ALL: Mapping[str, Metric] = {
 }
 _PLACES = {name: place for place, name in enumerate(ALL)}
 HEADLINE: dict[str, tuple[str, ...]] = {
-    task: tuple(
+    kind: tuple(
         metric.name
-        for metric in sorted(TABLE, key=lambda metric: metric.headline.get(task, 0))
-        if task in metric.headline
+        for metric in sorted(TABLE, key=lambda metric: metric.headline.get(kind, 0))
+        if kind in metric.headline
     )
-    for task in ("rooms", "iqtt", "measured")
+    for kind in KINDS
 }
 PRINTED = HEADLINE | {
     "rooms": tuple(

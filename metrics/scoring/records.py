@@ -202,6 +202,7 @@ class ScoreFile:
         length: the unit of lengths, "metre" in closed rooms.
         older: whether it was read from a file of an older format, in which scores of CHANGED have
             other definitions.
+        declared: the alignment that it was scored under, where `aligned` put it under another one.
     """
 
     task: Task
@@ -216,6 +217,12 @@ class ScoreFile:
     older: bool = False
     protocol: str = ""
     length: Length = "scene unit"
+    declared: Alignment | None = None
+
+    @property
+    def kind(self) -> str:
+        """The kind of the test set, by which its headline goes: one of `metric_names.KINDS`."""
+        return "interiors" if self.task == "rooms" and self.length == "metre" else self.task
 
     @property
     def runs(self) -> int:
@@ -273,7 +280,7 @@ class ScoreFile:
     @property
     def headline(self) -> tuple[str, ...]:
         """The main scores that there are. Who sees a view is not asked what is behind."""
-        names = [name for name in HEADLINE[self.task] if name in self.metrics]
+        names = [name for name in HEADLINE[self.kind] if name in self.metrics]
         return tuple(name for name in names if name != BEHIND or self.shown != "scored_view")
 
     def floor_of(self, name: str) -> str | None:

@@ -65,7 +65,7 @@ def score_rooms(
     }
     objects = {name: scored.objects[name] for name in (*OBJECT_COLUMNS, *OBJECT_SCORES)}
     meta = meta_of(runs, truth.fingerprint, digest, settings, counts)
-    alignment = scored_alignment(files[0].kind, files[0].alignment)
+    alignment = scored_alignment(files[0].kind, files[0].fitted)
     objects[SHAPE_COLUMN] = shape
     more: dict[str, Any] = {"shown": files[0].shown}
     more |= {"length": "metre"} if truth.spec.interior else {}
@@ -73,7 +73,7 @@ def score_rooms(
 
 
 def require_one_kind(files: Sequence[RoomPredictions]) -> None:
-    """Raise ScoringError unless all submissions have one kind of geometry, all normals or none."""
+    """Raise ScoringError unless all submissions are alike in kind and columns."""
     for file in files:
         if file.kind != files[0].kind:
             expected = f"{files[0].kind} as in {files[0].path}"
@@ -81,6 +81,10 @@ def require_one_kind(files: Sequence[RoomPredictions]) -> None:
         if file.has_normals != files[0].has_normals:
             found, expected = ("normals", "none") if file.has_normals else ("none", "normals")
             raise ScoringError(f"{file.path}: normal", found, f"{expected} as in {files[0].path}")
+        if file.has_confidence != files[0].has_confidence:
+            found, expected = ("one", "none") if file.has_confidence else ("none", "one")
+            expected = f"{expected} as in {files[0].path}"
+            raise ScoringError(f"{file.path}: confidence", found, expected)
 
 
 def require_scored(bad: Mapping[int, ScoringError], settings: Settings) -> None:

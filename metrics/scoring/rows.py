@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 
 from metrics.measured.protocols import BY_NAME, ProtocolError
 from metrics.measured.reader import Images, MeasuredFile, open_images
+from metrics.measures.alignment import Alignment
+from metrics.measures.confidence import distance_from_edges
 from metrics.scoring.image_scores import (
     FirstView,
     reference_of,
     score_prediction,
     true_relief,
 )
+from metrics.scoring.kept_baselines import KeptBaselines, key_of
 from metrics.scoring.measured_rows import scores_of_view
 from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE
 from metrics.scoring.runs import Progress, ScoringError, Settings
@@ -35,9 +38,9 @@ from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 # What another process must know to score rows, small, as it is sent along with each chunk: the
-# paths and identities of the submissions, and the path of the truth.
-# The names are those of protocols, for truth that was measured.
-Job = tuple[tuple[tuple[Path, Identity], ...], Path, tuple[str, ...]]
+# paths and identities of the submissions, the path of the truth, the names of protocols, for truth
+# that was measured, and the alignment that takes the place of the declared one.
+Job = tuple[tuple[tuple[Path, Identity], ...], Path, tuple[str, ...], Alignment | None]
 CHUNK = 8  # rows scored between two reports of progress
 CHUNKS = 8  # of them that a worker of a cluster scores in one go
 FEW = 32  # rows that are not worth starting processes for
@@ -102,7 +105,7 @@ def _scored(
     """Score rows, or triples of them, by the processes or cluster of the settings."""
     chunks = [rows[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
     submissions = tuple((file.path.absolute(), file.identity) for file in files)
-    job = submissions, truth.path.absolute(), protocols
+    job = submissions, truth.path.absolute(), protocols, settings.align
     processes = min(settings.processes or processors(), len(chunks))
     few = settings.processes is None and len(rows) <= FEW
     parts: Iterable[ScoredRows]
@@ -171,7 +174,7 @@ class RowScorer:
 
     def __init__(self, files: Sequence[RoomPredictions], truth: RoomsFile) -> None:
         """Take files that stay open as long as rows are scored."""
-        self._files, self._truth = files, truth
+        self._files, self._truth, self._kept = files, truth, KeptBaselines()
         self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in files]
 
     def score(self, triples: Array) -> ScoredRows:
@@ -182,6 +185,7 @@ class RowScorer:
         bad: dict[int, ScoringError] = {}
         digests: dict[int, RowDigests] = {}
         images, floors = [], []
+        confident = any(file.has_confidence for file in self._files)
         for row, other, first in triples.tolist():
             view = read_true_view(self._truth, row)
             seen = ("depth", "camera/world_from_camera", "camera/fov_y_degrees")
@@ -192,12 +196,19 @@ class RowScorer:
             if first not in (row, -1):
                 seen = ("depth", "object_id", "camera/world_from_camera")
                 first_view = FirstView(*(self._truth.read(name, first) for name in seen))
-            reference = reference_of(view, first_view)
+            digests[row] = view_digests(view)
+            key = key_of(view, digests[row], first_view, row)
+            reference = reference_of(view, first_view, row, kept := self._kept.read(key))
+            if kept is None:
+                self._kept.write(key, reference.floors)
+            edges = distance_from_edges(self._truth.read("image", row)) if confident else None
             scores = []
             for file, entries in zip(self._files, self._entries, strict=True):
                 i = entries[row]
                 predicted = file.view(i)
-                score = functools.partial(score_prediction, predicted, view, reference, relief)
+                score = functools.partial(
+                    score_prediction, predicted, view, reference, relief, edge_distance=edges
+                )
                 try:
                     scores.append(score())
                 except PredictionError as error:
@@ -205,7 +216,6 @@ class RowScorer:
                     scores.append(score(non_finite="penalise"))
             images.append(scores)
             floors.append(reference.floors)
-            digests[row] = view_digests(view)
         names = images[0][0].scores
         counts = [len(scores[0].objects["object"]) for scores in images]
         objects = {"row": np.repeat(triples[:, 0], counts)}
@@ -243,11 +253,15 @@ class MeasuredScorer:
         images = []
         for row in rows.tolist():
             view, runs = self._truth.view(row), []
+            edges = None
+            if any(file.has_confidence for file in self._files):
+                edges = distance_from_edges(self._truth.picture(row))
             for file, entries in zip(self._files, self._entries, strict=True):
                 predicted = file.view(entries[row])
                 score = functools.partial(
-                    scores_of_view, predicted, view, self._protocols, self._truth.dense
-                )
+                    scores_of_view, predicted, view, self._protocols, self._truth.dense,
+                    row=row, edge_distance=edges,
+                )  # fmt: skip
                 try:
                     runs.append(score())
                 except PredictionError as error:
@@ -320,6 +334,8 @@ def _opened(job: Job, opening: ExitStack) -> RowScorer | MeasuredScorer:
     for file in files:
         opening.enter_context(file)
     rooms = [file for file in files if isinstance(file, RoomPredictions)]
+    for file in rooms:
+        file.scored_as = job[3]
     return _scorer(rooms, truth, job[2])
 
 

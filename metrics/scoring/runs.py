@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from iqtt.floors import Floor
 from metrics.measured.reader import Images, MeasuredFile
+from metrics.measures.alignment import Alignment
 from metrics.measures.statistics import RESAMPLES
 from metrics.scoring.image_scores import NonFinite
 from metrics.scoring.records import Meta, Submission
@@ -49,6 +50,8 @@ class Settings:
         floors: a file of floors of questions, as `iqtt floors` writes it; None for those of the
             package.
         protocol: of measured truth, one of `metrics.measured.protocols`; "" for "declared".
+        align: the alignment of images to score under, at least as loose as the declared one; None
+            for that.
     """
 
     seed: int = 0
@@ -59,6 +62,7 @@ class Settings:
     cluster: Cluster | None = None
     floors: str | Path | None = None
     protocol: str = ""
+    align: Alignment | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,6 +79,9 @@ COLUMNS = {
         Column("normal", (), "float32", "1", "camera",
                "surface normal, x right, y up, z towards the viewer; faces the viewer; of any"
                " length but 0", ("y", "x", "xyz"), own_chunk=True),
+        Column("confidence", (), "float32", meaning="how sure the method is of each pixel's depth:"
+               " larger is surer; only the order within an image counts", axes=("y", "x"),
+               own_chunk=True),
         Column("fov_y_degrees", (), "float64", "degree",
                meaning="vertical field of view, where the method estimates the camera"),
     ),

@@ -134,6 +134,7 @@ class PredictedView:
         geometry: planar depth or disparity (H, W), or points (H, W, 3), camera frame, as stored.
         normal: (H, W, 3), camera frame, as stored; None where there are none.
         fov_y_degrees: vertical field of view; None where the method does not estimate it.
+        confidence: of each pixel's depth, (H, W), larger is surer; None where there is none.
     """
 
     kind: str
@@ -141,6 +142,13 @@ class PredictedView:
     geometry: Array
     normal: Array | None = None
     fov_y_degrees: float | None = None
+    confidence: Array | None = None
+
+    @property
+    def columns(self) -> tuple[tuple[str, Array | None], ...]:
+        """What is predicted of each pixel, by the name of the column."""
+        columns = (self.geometry, self.normal, self.confidence)
+        return tuple(zip((self.kind, "normal", "confidence"), columns, strict=True))
 
 
 class RoomPredictions(Predictions):
@@ -150,6 +158,12 @@ class RoomPredictions(Predictions):
     """
 
     task = "rooms"
+    scored_as: Alignment | None = None  # an alignment that takes the place of the declared one
+
+    @property
+    def fitted(self) -> Alignment:
+        """The alignment under which it is scored."""
+        return self.scored_as or self.alignment
 
     @property
     def height(self) -> int:
@@ -166,11 +180,17 @@ class RoomPredictions(Predictions):
         """Whether there are normals."""
         return "normal" in self._arrays
 
+    @property
+    def has_confidence(self) -> bool:
+        """Whether there is a confidence of each pixel."""
+        return "confidence" in self._arrays
+
     def view(self, index: int) -> PredictedView:
         """Everything that is predicted in entry `index`. Raises FileFormatError."""
         normal = self.normal(index) if self.has_normals else None
         fov = float(self._arrays["fov_y_degrees"][index]) if self.has_fov else None
-        return PredictedView(self.kind, self.alignment, self.geometry(index), normal, fov)
+        sure = self._read("confidence", index) if "confidence" in self._arrays else None
+        return PredictedView(self.kind, self.fitted, self.geometry(index), normal, fov, sure)
 
     @property
     def has_fov(self) -> bool:

@@ -64,7 +64,7 @@ def examples_of(scores: ScoreFile, truth: "Images | AnswersFile", submission: Pr
 
 def _ordering_score(scores: ScoreFile) -> str:
     """Return the score that orders scenes: the first that any image has a number for; else ""."""
-    for name in (AS_SEEN, *HEADLINE[scores.task], *scores.metrics):
+    for name in (AS_SEEN, *HEADLINE[scores.kind], *scores.metrics):
         if name in scores.items and np.isfinite(np.asarray(scores.items[name], float)).any():
             return name
     return ""
@@ -148,7 +148,7 @@ def _name(scores: ScoreFile, entry: int) -> str:
 def _entry_scores(scores: ScoreFile, entry: int) -> str:
     return ", ".join(
         f"{metric(name).title} {number(float(scores.items[name][entry]))}"
-        for name in (AS_SEEN, *HEADLINE[scores.task])
+        for name in (AS_SEEN, *HEADLINE[scores.kind])
         if name in scores.items and np.isfinite(scores.items[name][entry])
     )
 

@@ -272,7 +272,7 @@ def _common(files: Sequence[ScoreFile], name: str) -> str:
     tasks = {file.task for file in files}
     if len(tasks) > 1:
         raise FigureError(files[-1].place, "scores of rooms and of questions", "one kind")
-    names = [name] if name else HEADLINE[files[0].task]
+    names = [name] if name else HEADLINE[files[0].kind]
     for candidate in names:
         if all(candidate in file.metrics for file in files):
             return candidate

@@ -8,12 +8,14 @@ has a rank.
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from metrics.score_file import SCORE_AGAIN
+from metrics.measures.alignment import Alignment
+from metrics.scoring.aligned import aligned, left_out
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
     BASELINES,
@@ -21,7 +23,6 @@ from metrics.scoring.metric_names import (
     EMPTY_ROOM,
     HEADLINE,
     OBJECT_SCORES,
-    OTHER_SCENE,
     SKILLED,
     metric,
 )
@@ -65,6 +66,14 @@ VIEWS_SEEN = {
     "first_view": "the first view alone",
     "no_view": "no view",
 }
+GIVEN: Mapping[str, str] = {
+    "median_scale": "scale, by the median",
+    "scale": "scale",
+    "scale_l1": "scale",
+    "scale_shift": "scale and shift",
+    "scale_shift_l1": "scale and shift",
+    "disparity_scale_shift": "scale and shift of disparity",
+}
 Cells = Mapping[str, Mapping[str, Cell]]  # by the label of the row, then by the key of the column
 
 
@@ -99,16 +108,24 @@ def to_html(tables: Sequence[Table]) -> str:
 
 
 def leaderboard(
-    files: Sequence[ScoreFile], metrics: Sequence[str] | None = None, *, paper: bool = True
+    files: Sequence[ScoreFile],
+    metrics: Sequence[str] | None = None,
+    *,
+    paper: bool = True,
+    align: Alignment | None = None,
 ) -> tuple[Table, ...]:
     """Return the table of each test set; see `rankings`."""
-    return tuple(ranking.table for ranking in rankings(files, metrics, paper=paper))
+    return tuple(ranking.table for ranking in rankings(files, metrics, paper=paper, align=align))
 
 
 def rankings(
-    files: Sequence[ScoreFile], metrics: Sequence[str] | None = None, *, paper: bool = True
+    files: Sequence[ScoreFile],
+    metrics: Sequence[str] | None = None,
+    *,
+    paper: bool = True,
+    align: Alignment | None = None,
 ) -> list[Ranking]:
-    """Return what is shown of each test set, in the order of the files.
+    """Return what is shown of each test set, in the order of the files, under one alignment each.
 
     The digest of its truth tells a test set, wherever its file lay and whatever made it. Methods
     that were shown different views of a scene have rankings of their own.
@@ -118,30 +135,39 @@ def rankings(
         metrics: the scores to show; the first one ranks. A task that has none of them, or any task
             if they are None, shows `metric_names.HEADLINE`, skills before the scores themselves.
         paper: whether the paper's figures of the shown scores stand below each ranking.
+        align: the alignment of all; None for the loosest one that a method of a test set declares.
 
-    Raises LeaderboardError where a file is given twice or files that claim to score all of one test
+    Raises AlignmentError, and LeaderboardError where a file is given twice or files that claim to score all of one test
     set score different rows of it, FloorError where they state different baselines of it,
     ComparisonError where they disagree about its scenes, and UnknownMetricError.
     """
     _require_once(files)
     wanted = {name: metric(name) for name in metrics or ()}
+    for name, score in wanted.items():
+        if score.signed:
+            found = f"{name}, a bias, of which neither direction is better"
+            raise LeaderboardError("metric", found, "a metric with a better direction")
     groups: dict[tuple[tuple[Task, str, str], Shown | None, bool], list[ScoreFile]] = {}
     for file in files:
         key = ((*file.truth, file.protocol), file.shown_of_several, file.older)
         groups.setdefault(key, []).append(file)
     ranked = []
-    for (truth, seen, older), members in groups.items():
-        task = truth[0]
+    for (truth, seen, older), group in groups.items():
+        task, members = truth[0], aligned(group, align if truth[0] != "iqtt" else None)
         together = [f for f in files if (*f.truth, f.protocol, f.older) == (*truth, older)]
         _require_same_rows(together)
         _require_same_baselines(together)
         names = [name for name, score in wanted.items() if task in score.tasks]
         # Methods that see a scene's first view alone are ranked by what is behind.
-        behind_first = sorted(HEADLINE[task], key=lambda name: name != BEHIND)
+        behind_first = sorted(HEADLINE[members[0].kind], key=lambda name: name != BEHIND)
         headline = [n for n in behind_first if n != BEHIND or seen in ("first_view", "no_view")]
         there = [n for n in headline if any(n in file.metrics for file in members)]
-        keys = _keys(members, names or there or HEADLINE[task][:1], headline=not names)
-        ranked.append(_ranking(members, files, keys, paper))
+        if any(file.declared is not None for file in members):
+            there = [n for n in there if all(n in file.metrics for file in members)]
+        keys = _keys(members, names or there or HEADLINE[members[0].kind][:1], headline=not names)
+        ranking = _ranking(members, files, keys, paper)
+        notes = (*ranking.table.notes, *(left_out(group, there) if not names else ()))
+        ranked.append(replace(ranking, table=replace(ranking.table, notes=notes)))
     return ranked
 
 
@@ -192,7 +218,7 @@ def _require_same_baselines(files: Sequence[ScoreFile]) -> None:
 
 def _is_shared(name: str) -> bool:
     """Return whether all files of one test set have the same baseline of this score."""
-    return SKILLED.get(name) != (OTHER_SCENE,)
+    return all(BASELINES[begins].of_truth for begins in SKILLED.get(name, ()))
 
 
 def _keys(files: Sequence[ScoreFile], names: Sequence[str], headline: bool) -> list[str]:
@@ -407,7 +433,8 @@ def _why_none_is_told_apart(file: ScoreFile, key: str) -> str:
 
 
 def _title(file: ScoreFile) -> str:
-    """Return the test set in words: how much of what, and its name."""
+    """Return the test set in words: how much of what, its name, and what was fitted."""
+    fitted = f", all after {file.alignment}" if file.alignment != "none" else ""
     test = known_test(file.meta.truth_digest)
     name = plain(test.name if test else Path(file.meta.truth_path).name)
     if file.task == "iqtt":
@@ -415,7 +442,7 @@ def _title(file: ScoreFile) -> str:
         return f"Mental rotation: {len(file.ids):,} questions{kind}, {name}"
     if file.task == "measured":
         groups = f" of {len(np.unique(file.clusters)):,} groups" if file.grouped else ""
-        return f"Measured depth: {len(file.ids):,} images{groups}, {name}, protocol {file.protocol}"
+        return f"Measured depth: {len(file.ids):,} images{groups}, {name}, protocol {file.protocol}{fitted}"
     task = {"first_view": "Rooms from the first view", "no_view": "Rooms from no view"}.get(
         file.shown_of_several or "", "Rooms"
     )
@@ -424,15 +451,14 @@ def _title(file: ScoreFile) -> str:
     widest = np.abs(angles[np.isfinite(angles)]).max(initial=0)
     span = f" from 0° to {widest:g}°" if widest > 0 else ""
     each = f" in {views} views{span}" if views > 1 else ""
-    return f"{task}: {scenes:,} scenes{each}, {name}"
+    return f"{task}: {scenes:,} scenes{each}, {name}{fitted}"
 
 
 def _label(file: ScoreFile, name: str) -> str:
     """Return a method's name with what has to be known about it."""
     texts = [f"{file.runs} runs"] * (file.runs > 1)
-    if file.alignment != "none":
-        claim = metric(f"rmse_after_{file.alignment}").title.partition(", ")[2]
-        texts.append(f"scored {claim}")
+    if file.task != "iqtt" and (file.declared or file.alignment) != "none":
+        texts.append(f"given the {GIVEN[file.declared or file.alignment]}")
     if file.unread is not None:
         texts.append(f"{file.unread:.0%} of replies unread")
     mark = "" if file.comparable else f" {INCOMPARABLE_MARK}"

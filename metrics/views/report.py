@@ -94,7 +94,7 @@ def group_charts(files: Sequence[ScoreFile]) -> list[Section]:
     grouping, groups = by.get(files[0].task, ("", {}))
     names = [
         name
-        for name in HEADLINE[files[0].task]
+        for name in HEADLINE[files[0].kind]
         if sum(all(name in _group(file, grouping, key) for file in files) for key in groups) > 1
     ]
     charts = [(metric(n).title, svg_url(draw_groups, files, grouping, n)) for n in names]
@@ -124,7 +124,7 @@ def read_beside(paths: Sequence[str | Path], truth: "Images | AnswersFile") -> l
 def _distributions(scores: ScoreFile) -> Iterator[tuple[str, str]]:
     if scores.task == "iqtt":
         return
-    for name in (*HEADLINE[scores.task], "normal_mean_degrees", "derived_normal_mean_degrees"):
+    for name in (*HEADLINE[scores.kind], "normal_mean_degrees", "derived_normal_mean_degrees"):
         if name in scores.items and np.isfinite(np.asarray(scores.items[name], float)).any():
             yield metric(name).title, svg_url(draw_histogram, scores, name)
 

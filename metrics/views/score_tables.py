@@ -87,7 +87,7 @@ def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> N
 
 def main_names(scores: ScoreFile) -> list[str]:
     """Return the metrics that are shown first: those of the headline, or others without any."""
-    names = [name for name in PRINTED[scores.task] if name in scores.metrics]
+    names = [name for name in PRINTED[scores.kind] if name in scores.metrics]
     names = [name for name in names if name != BEHIND or name in scores.headline]
     return names or in_order(scores.metrics)[:5]
 
@@ -172,7 +172,7 @@ def group_tables(scores: ScoreFile) -> Iterator[Table]:
         if not groups:
             continue
         held = {name for group in groups.values() for name in group}
-        names = [name for name in HEADLINE[scores.task] if name in held] or in_order(held)
+        names = [name for name in HEADLINE[scores.kind] if name in held] or in_order(held)
         with_skills = grouping == "by_distractor"
         rows: list[Sequence[Cell | str]] = []
         for key in by_number(groups):
@@ -234,7 +234,7 @@ def side_by_side(files: Sequence[ScoreFile]) -> Table:
     """
     rows: list[Sequence[Cell | str]] = []
     names = {name for file in files for name in file.headline}
-    for name in (n for n in HEADLINE[files[0].task] if n in names and n in files[0].metrics):
+    for name in (n for n in HEADLINE[files[0].kind] if n in names and n in files[0].metrics):
         has_skill = name in files[0].skills
         cells = [(file.skills if has_skill else file.metrics).get(name) for file in files]
         label = f"skill of {name}" if has_skill else name
@@ -319,7 +319,7 @@ def skill_notes(scores: ScoreFile) -> list[str]:
         return [SKILL, f"baseline: best method without 3D on such questions, by kind; {chance}"]
     if not scores.skills:
         return []
-    names = [name for name in HEADLINE[scores.task] if name in scores.skills] or [*scores.skills]
+    names = [name for name in HEADLINE[scores.kind] if name in scores.skills] or [*scores.skills]
     begins = dict.fromkeys(scores.skills[name].floor_name[: -len(name)] for name in names)
     used = [BASELINES[begin] for begin in BASELINES if begin in begins]
     return [SKILL, f"baselines: {'; '.join(f'{base.name} = {base.gloss}' for base in used)}"]

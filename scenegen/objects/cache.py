@@ -23,8 +23,8 @@ ENDING = ".arrays"
 _LENGTH_AND_CHECK = struct.Struct("<2I")  # of the header
 
 
-def default_cache_dir() -> Path | None:
-    """Return `pix2shape-bench/meshes` in XDG_CACHE_HOME or, if that is not set, in ~/.cache.
+def default_cache_dir(name: str = "meshes") -> Path | None:
+    """Return `pix2shape-bench/<name>` in XDG_CACHE_HOME or, if that is not set, in ~/.cache.
 
     None where the user has no home folder, as in containers that run as a foreign user.
     """
@@ -34,7 +34,7 @@ def default_cache_dir() -> Path | None:
             base = Path("~/.cache").expanduser()
         except RuntimeError:
             return None
-    return base / "pix2shape-bench" / "meshes"
+    return base / "pix2shape-bench" / name
 
 
 class DiskCache:
@@ -49,12 +49,16 @@ class DiskCache:
 
     Attributes:
         folder: where the entries lie; None to keep none.
+        most: bytes of the entries in the folder.
     """
 
-    def __init__(self, folder: str | Path | None = None) -> None:
+    def __init__(
+        self, folder: str | Path | None = None, most: int = MOST_BYTES, warns: bool = True
+    ) -> None:
         self.folder = None if folder is None else Path(folder)
+        self.most, self._warns = most, warns
         self._writes = self.folder is not None
-        self._unseen = MOST_BYTES  # bytes written since the size of the folder was last seen
+        self._unseen = most  # bytes written since the size of the folder was last seen
         self._lock = threading.Lock()
 
     def read(self, key: str, names: Sequence[str]) -> dict[str, Array] | None:
@@ -68,7 +72,7 @@ class DiskCache:
             return None
 
     def write(self, key: str, arrays: dict[str, Array]) -> None:
-        """Keep arrays under a key; a folder above MOST_BYTES loses the entries written first."""
+        """Keep arrays under a key; a folder above `most` loses the entries written first."""
         if self.folder is None or not self._writes:
             return
         # What a killed process leaves of the first name is an entry that nobody asks for.
@@ -105,7 +109,7 @@ class DiskCache:
         assert self.folder is not None
         with self._lock:
             self._unseen += written
-            if self._unseen < MOST_BYTES // 16:
+            if self._unseen < self.most // 16:
                 return
             self._unseen = 0
         entries = []
@@ -114,7 +118,7 @@ class DiskCache:
                 if entry.name.endswith(ENDING):
                     about = entry.stat()
                     entries.append((about.st_mtime_ns, about.st_size, entry.path))
-        excess = sum(size for _, size, _ in entries) - MOST_BYTES
+        excess = sum(size for _, size, _ in entries) - self.most
         for _, size, path in sorted(entries):
             if excess <= 0:
                 break
@@ -124,7 +128,7 @@ class DiskCache:
     def _give_up(self, error: OSError) -> None:
         with self._lock:
             wrote, self._writes = self._writes, False
-        if wrote:
+        if wrote and self._warns:
             reason = os.strerror(error.errno or errno.EIO)
             warnings.warn(
                 f"{self.folder}: cannot be written to ({reason}). Shapes that are not there are"

@@ -69,6 +69,20 @@ def pixels_off_rays(points: Array, rays: Array, pitch: float) -> Array:
     return np.asarray(np.where(ahead, off, np.inf))
 
 
+def ray_error_degrees(points: Array, rays: Array) -> float:
+    """Return the mean angle, degrees, between points (N, 3) and the rays (N, 3) of their pixels.
+
+    A point at the camera has no direction and counts as 180 degrees.
+    """
+    size = _lengths(points)
+    cosine = (points * rays).sum(axis=1) / np.maximum(size * _lengths(rays), np.finfo(float).tiny)
+    sine = _lengths(np.cross(points, rays)) / np.maximum(
+        size * _lengths(rays), np.finfo(float).tiny
+    )
+    angle = np.degrees(np.arctan2(sine, cosine))
+    return float(np.where(size > 0.0, angle, 180.0).mean())
+
+
 def local_point_scores(points: Array, true_points: Array, object_id: Array) -> dict[str, float]:
     """Return `local_points_rel` and `local_points_delta_1`: means over objects, each fitted alone.
 

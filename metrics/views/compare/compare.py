@@ -20,6 +20,8 @@ from metrics.measures.statistics import (
     cluster_means,
     linearised_means,
 )
+from metrics.measures.alignment import Alignment
+from metrics.scoring.aligned import aligned, left_out
 from metrics.scoring.estimates import pooled_means_of
 from metrics.scoring.metric_names import metric
 from metrics.scoring.records import ScoreFile
@@ -92,6 +94,7 @@ class Comparison:
             number.
         differences: one for each score and method, ordered by score, then by method.
         comparable: False where a file says that it is not, and was compared all the same.
+        alignment: after which all methods are scored.
         seed, resamples: of the bootstrap; the seed is that of random sign flips, too.
     """
 
@@ -105,6 +108,7 @@ class Comparison:
     differences: tuple[Difference, ...]
     comparable: bool
     notes: tuple[str, ...]
+    alignment: Alignment
     seed: int
     resamples: int
 
@@ -116,8 +120,9 @@ def compare(
     seed: int = 0,
     resamples: int = RESAMPLES,
     allow_incomparable: bool = False,
+    align: Alignment | None = None,
 ) -> Comparison:
-    """Compare the scores of each file with those of the first.
+    """Compare the scores of each file with those of the first, all under one alignment.
 
     Args:
         files: two or more, of one test set.
@@ -126,10 +131,13 @@ def compare(
         seed, resamples: of the bootstrap; the seed is that of random sign flips, too.
         allow_incomparable: compare files that say that they are not comparable, over the rows that
             all of them hold.
+        align: the alignment of all; None for the loosest one that a method declares.
 
-    Raises OtherTruthError and ComparisonError where the files do not belong together, and
-    UnknownMetricError.
+    Raises OtherTruthError and ComparisonError where the files do not belong together,
+    AlignmentError where no alignment brings them together, and UnknownMetricError.
     """
+    require_same_test(files, metrics, allow_incomparable)
+    as_scored, files = files, aligned(files, align)
     names = require_same_test(files, metrics, allow_incomparable)
     orders = common_rows(files)
     clusters = files[0].clusters[orders[0]]
@@ -174,7 +182,8 @@ def compare(
         clusters=count,
         differences=tuple(replace(d, p_holm=p) for d, p in zip(differences, adjusted, strict=True)),
         comparable=all(file.comparable for file in files),
-        notes=tuple(_notes(files, labels, len(clusters), count)),
+        notes=tuple([*left_out(as_scored, names), *_notes(files, labels, len(clusters), count)]),
+        alignment=files[0].alignment,
         seed=seed,
         resamples=resamples,
     )
@@ -273,9 +282,8 @@ def _notes(
                 f"{label}: means over {file.runs} training runs; the tests ask whether these runs"
                 " differ, not whether other runs would"
             )
-        if file.alignment != "none":
-            how = metric(f"rmse_after_{file.alignment}").title.partition(", ")[2]
-            yield f"{label} is scored {how}, fitted to the truth of each image"
+        if file.declared is not None:
+            yield f"{label} declares {file.declared}, and is scored after {file.alignment}"
         for submission in file.meta.submissions:
             if seen.setdefault(submission.sha256, label) != label:
                 yield f"{label} and {seen[submission.sha256]} were scored from the same submission"

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.checks import LARGEST_MAGNITUDE
+from metrics.scoring.aligned import again
 from metrics.scoring.metric_names import EMPTY_ROOM, HEADLINE, OF_TRUTH, metric
 from metrics.scoring.records import ID_COLUMNS, ScoreFile
 from metrics.scoring.truth_digests import require_truth
@@ -42,12 +43,15 @@ def require_same_test(
             )
 
     def shown() -> list[str]:  # a test set of single views, say, has nothing behind
-        return [n for n in HEADLINE[first.task] if all(n in file.headline for file in files)]
+        return [n for n in HEADLINE[first.kind] if all(n in file.headline for file in files)]
 
-    names = tuple(dict.fromkeys(metrics or shown() or HEADLINE[first.task]))
+    names = tuple(dict.fromkeys(metrics or shown() or HEADLINE[first.kind]))
     for name in names:
         if first.task not in metric(name).tasks:
             raise ComparisonError("metric", name, f"a score of task {first.task!r}")
+        if metric(name).signed:
+            found = f"{name}, a bias, of which neither direction is better"
+            raise ComparisonError("metric", found, "a metric with a better direction")
     older = [file for file in files if file.older]
     others = [name for name in names if metric(name).redefined]
     if 0 < len(older) < len(files) and others:
@@ -123,7 +127,10 @@ def column(file: ScoreFile, name: str, order: NDArray[np.int64]) -> Array:
     where = f"{file.place}: items.{name}"
     if name not in file.items:
         held = ", ".join(n for n in file.items if n in file.metrics)
-        raise ComparisonError(where, "none", "the scores of all items", f"the file has {held}")
+        hint = f"the file has {held}"
+        if file.declared is not None:
+            where, hint = f"{where} after {file.alignment}", again(file.alignment)
+        raise ComparisonError(where, "none", "the scores of all items", hint)
     values: Array = file.items[name][order]
     lacking = np.isnan(values) if metric(name).lacking else np.zeros(len(values), bool)
     bad = ~(np.abs(values) <= LARGEST_MAGNITUDE) & ~lacking

@@ -120,7 +120,11 @@ def _title(comparison: Comparison) -> str:
         size += groups * (comparison.clusters < comparison.items)
     test = known_test(comparison.truth_digest)
     truth = test.name if test else comparison.truth_digest[:12]
-    return f"Against {comparison.reference}, over {size} (truth {truth})"
+    title = f"Against {comparison.reference}, over {size} (truth {truth})"
+    if comparison.task == "iqtt":
+        return title
+    how = "as predicted" if comparison.alignment == "none" else f"after {comparison.alignment}"
+    return f"{title}, all methods scored {how}"
 
 
 def _units(comparison: Comparison) -> tuple[str, str]:
