@@ -13,7 +13,6 @@ from scenegen.command_line.options import OVERWRITE
 from scenegen.command_line.output import line_width, print_line
 from scenegen.command_line.paths import InputPath, OutputPath
 
-
 ALIGN = click.option(
     "--align",
     type=click.Choice([name for name in get_args(Alignment) if name != "none"]),
@@ -117,8 +116,8 @@ def leaderboard(
     """Rank score files in one table for each test set, all methods after one alignment.
 
     The headline ranks: shape for the paper's rooms, or what is behind for methods that see the
-    first view alone, the relative error of depth for interiors, and skill for questions. Baselines, and what the paper reported on its own data, stand
-    below the methods, without a rank.
+    first view alone, the relative error of depth for interiors, and skill for questions. Baselines,
+    and what the paper reported on its own data, stand below the methods, without a rank.
     """
     from metrics.score_file import read_scores
     from metrics.views.leaderboard import leaderboard as rank

@@ -39,7 +39,7 @@ SMALLEST_SHARE = 1e-4  # of the largest depth: less is raised to this before it 
 STEPS = 200  # of the search of `l1_scale_shift`, which takes about ten
 MANY = 2**16  # points, of which a line is fitted to SOME first
 SOME = 8192
-NEAR = 0.15  # fraction of them near that line, on whose sides the line of all may run
+NEAR = 0.05, 0.2  # fractions of them near that line, on whose sides the line of all may run
 
 
 def align(p: Array, t: Array, alignment: Alignment, cap: float | None = None) -> Array:
@@ -188,10 +188,18 @@ def _l1_of_many(p: Array, t: Array, weights: Array) -> tuple[float, float] | Non
     an optimum that leaves them there is one of all points.
     """
     some = slice(None, None, len(p) // SOME)
-    scale, shift = l1_scale_shift(p[some], t[some], weights[some])
+    line = l1_scale_shift(p[some], t[some], weights[some])
+    found = (_l1_from_near(p, t, weights, line, fraction) for fraction in NEAR)
+    return next((line for line in found if line is not None), None)
+
+
+def _l1_from_near(
+    p: Array, t: Array, weights: Array, line: tuple[float, float], fraction: float
+) -> tuple[float, float] | None:
+    scale, shift = line
     rest = scale * p + shift - t
     size = np.abs(rest)
-    count = int(NEAR * len(p))
+    count = int(fraction * len(p))
     near = size <= np.partition(size, count)[count]
     sides = ~near & (rest > 0.0), ~near & (rest < 0.0)
     points = [values[near] for values in (p, t, weights)]

@@ -166,8 +166,8 @@ def depth_scores(
     """Return every score of this module by name, after alignment.
 
     The names are `mse_depth`, `rmse`, `abs_rel`, `silog`, `delta_1`, `delta_1.03`, `delta_2` and
-    `delta_3`, and without alignment `sq_rel`, `rmse_log`, `log10` and `irmse`; with one they end in `_after_` and
-    its name. `aligned` says that the alignment was made already.
+    `delta_3`, and without alignment `sq_rel`, `rmse_log`, `log10` and `irmse`; with one they end in
+    `_after_` and its name. `aligned` says that the alignment was made already.
     """
     fitted = pair if aligned else align(pair, alignment)
     squared = mse_depth(fitted)

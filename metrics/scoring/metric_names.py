@@ -337,8 +337,8 @@ TABLE: Sequence[Metric] = (
            unchanged_by="scale_shift"),
     _error("sawa_h", "SAWA-H",
            "weighted sum of errors of order, of depth after two alignments, of boundaries and of"
-           " relative normals (arXiv 2510.19814), over the pairs of this benchmark.", "weighted sum",
-           largest=SAWA_H_WORST, of="points", unchanged_by="scale", **_ANYWHERE),
+           " relative normals (arXiv 2510.19814), over the pairs of this benchmark.",
+           "weighted sum", largest=SAWA_H_WORST, of="points", unchanged_by="scale", **_ANYWHERE),
     _error("scale_log2", "Scale",
            "log2 of the median over pixels of predicted divided by true depth.", "log2",
            smallest=-math.inf, signed=True, **_ANYWHERE),

@@ -114,7 +114,8 @@ RULES = (
     Rule(IDS, "unique", "each once", "given more than once", lambda ids, _: _repeated(ids)),
     Rule(IDS, "known", "rows of the truth", "that the truth does not have", _unknown),
     Rule(
-        ("depth", "disparity", "confidence"), "finite", f"finite numbers {SURFACE}", "NaN, infinite or huge",
+        ("depth", "disparity", "confidence"), "finite", f"finite numbers {SURFACE}",
+        "NaN, infinite or huge",
         lambda values, against: _on_surface(~_finite(values), against),
     ),
     Rule(

@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from metrics.score_file import SCORE_AGAIN
 from metrics.measures.alignment import Alignment
+from metrics.score_file import SCORE_AGAIN
 from metrics.scoring.aligned import aligned, left_out
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import (
@@ -137,9 +137,9 @@ def rankings(
         paper: whether the paper's figures of the shown scores stand below each ranking.
         align: the alignment of all; None for the loosest one that a method of a test set declares.
 
-    Raises AlignmentError, and LeaderboardError where a file is given twice or files that claim to score all of one test
+    Raises LeaderboardError where a file is given twice or files that claim to score all of one test
     set score different rows of it, FloorError where they state different baselines of it,
-    ComparisonError where they disagree about its scenes, and UnknownMetricError.
+    ComparisonError where they disagree about its scenes, AlignmentError and UnknownMetricError.
     """
     _require_once(files)
     wanted = {name: metric(name) for name in metrics or ()}
@@ -442,7 +442,8 @@ def _title(file: ScoreFile) -> str:
         return f"Mental rotation: {len(file.ids):,} questions{kind}, {name}"
     if file.task == "measured":
         groups = f" of {len(np.unique(file.clusters)):,} groups" if file.grouped else ""
-        return f"Measured depth: {len(file.ids):,} images{groups}, {name}, protocol {file.protocol}{fitted}"
+        size = f"{len(file.ids):,} images{groups}"
+        return f"Measured depth: {size}, {name}, protocol {file.protocol}{fitted}"
     task = {"first_view": "Rooms from the first view", "no_view": "Rooms from no view"}.get(
         file.shown_of_several or "", "Rooms"
     )

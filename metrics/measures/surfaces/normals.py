@@ -30,6 +30,7 @@ GRAZING_DEGREES = 10.0
 # middle variance may then be rounding in single precision.
 _THINNEST = 1e-6
 _EDGE_ON = 1e-4  # cosine of normal and ray; the closed form below is off by up to 1e-5
+_STRIP = 8192  # pixels handled at a time, so that what is computed fits into a core's cache
 _NEIGHBOURS = [(i, j) for i in range(3) for j in range(3) if (i, j) != (1, 1)]
 
 
@@ -139,7 +140,19 @@ def normals_from_points(points: ArrayLike, fov_y_degrees: float, mask: Mask) -> 
     rays = np.ascontiguousarray(np.moveaxis(pixel_directions(height, width, fov_y_degrees), -1, 0))
     rays /= _length(rays)
     parts = np.ascontiguousarray(np.moveaxis(image, -1, 0))
-    steps, counted, near = _neighbours(parts, rays, inside)
+    normals, reliable = np.empty((3, height, width)), np.empty((height, width), np.bool_)
+    tall = max(_STRIP // width, 1)
+    for top in range(0, height, tall):  # with a row above and below, as neighbours
+        low, high = max(top - 1, 0), min(top + tall + 1, height)
+        found, good = _fitted(parts[:, low:high], rays[:, low:high], inside[low:high])
+        here, kept = slice(top, top + tall), slice(top - low, top - low + tall)
+        normals[:, here], reliable[here] = found[:, kept], good[kept]
+    return np.moveaxis(normals, 0, -1), reliable
+
+
+def _fitted(points: Array, rays: Array, inside: Mask) -> tuple[Array, Mask]:
+    """Return normals (3, H, W) of points (3, H, W) with unit rays, and where they are reliable."""
+    steps, counted, near = _neighbours(points, rays, inside)
     normals, on_surface = _fit_planes(steps, near, rays)
     on_surface &= inside
     rest = inside & ~on_surface
@@ -147,14 +160,11 @@ def normals_from_points(points: ArrayLike, fov_y_degrees: float, mask: Mask) -> 
         loose, spanned = _fit_planes(steps[:, :, rest], counted[:, rest], rays[:, rest])
         normals[:, rest] = np.where(spanned, loose, -rays[:, rest])
     normals *= np.where(inside, -np.copysign(1.0, _dot(normals, rays)), 0.0)
-    return np.moveaxis(normals, 0, -1), on_surface
+    return normals, on_surface
 
 
 def _neighbours(points: Array, rays: Array, inside: Mask) -> tuple[Array, Mask, Mask]:
-    """Steps (8, 3, H, W) to the neighbours; which are in the mask; which are near as well.
-
-    One neighbour after another, in buffers: arrays of all eight do not fit into a core's cache.
-    """
+    """Steps (8, 3, H, W) to the neighbours; which are in the mask; which are near as well."""
     height, width = inside.shape
     padded, padded_inside = np.zeros((3, height + 2, width + 2)), np.pad(inside, 1)
     padded[:, 1:-1, 1:-1] = points

@@ -37,6 +37,7 @@ Mask = NDArray[np.bool_]
 REACH = 1.5  # pixels
 # A patch seen more from the side reaches no farther: outlines of round objects would be endless.
 LEAST_COSINE = 0.3
+STRIP = 8192  # pixels handled at a time, so that buffers fit into a core's cache
 NOWHERE = 1e100  # coordinates of missing points; their squares are finite
 
 
@@ -121,11 +122,15 @@ def _squared_to_patches(points: Array, patches: Array, buffers: Array | None = N
 def _to_neighbours(surface: Surface, other: Surface) -> Array:
     """Return the distance (N,) of each point to the nearest patch of its pixel and the 8 around."""
     height, width = surface.mask.shape
-    image = surface.patches[:3, 1:-1, 1:-1]
-    least, buffers = np.full((height, width), np.inf), np.empty((5, height, width))
-    for i, j in np.ndindex(3, 3):
-        window = other.patches[:, i : i + height, j : j + width]
-        np.minimum(least, _squared_to_patches(image, window, buffers), out=least)
+    image, least = surface.patches[:3, 1:-1, 1:-1], np.full((height, width), np.inf)
+    tall = max(STRIP // width, 1)
+    buffers = np.empty((5, min(tall, height), width))
+    for top in range(0, height, tall):
+        points, nearest = image[:, top : top + tall], least[top : top + tall]
+        for i, j in np.ndindex(3, 3):
+            window = other.patches[:, top + i : top + i + len(nearest), j : j + width]
+            squared = _squared_to_patches(points, window, buffers[:, : len(nearest)])
+            np.minimum(nearest, squared, out=nearest)
     return np.asarray(np.sqrt(least[surface.mask]))
 
 

@@ -95,8 +95,10 @@ def local_point_scores(points: Array, true_points: Array, object_id: Array) -> d
         object_id: of each; above 0 where an object that counts is seen, (N,).
     """
     errors = []
-    for number in np.unique(object_id[object_id > 0]).tolist():
-        own = object_id == number
+    order = np.argsort(object_id, kind="stable")
+    order = order[np.searchsorted(object_id[order], 1) :]
+    ends = np.flatnonzero(np.diff(object_id[order])) + 1
+    for own in np.split(order, ends) if len(order) else ():
         t = true_points[own]
         diameter = float(np.ptp(t, axis=0).max())
         apart = _lengths(align_points(points[own], t, "scale_shift") - t)

@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measures.alignment import Alignment
 from metrics.measures.statistics import (
     RESAMPLES,
     bootstrap_interval,
     cluster_means,
     linearised_means,
 )
-from metrics.measures.alignment import Alignment
 from metrics.scoring.aligned import aligned, left_out
 from metrics.scoring.estimates import pooled_means_of
 from metrics.scoring.metric_names import metric
@@ -182,7 +182,7 @@ def compare(
         clusters=count,
         differences=tuple(replace(d, p_holm=p) for d, p in zip(differences, adjusted, strict=True)),
         comparable=all(file.comparable for file in files),
-        notes=tuple([*left_out(as_scored, names), *_notes(files, labels, len(clusters), count)]),
+        notes=(*left_out(as_scored, names), *_notes(files, labels, len(clusters), count)),
         alignment=files[0].alignment,
         seed=seed,
         resamples=resamples,
