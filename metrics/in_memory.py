@@ -75,6 +75,7 @@ def evaluate_room(
         as_doubles(values[geometry.kind]),
         as_doubles(values["normal"]) if "normal" in values else None,
         geometry.fov_y_degrees,
+        as_doubles(values["confidence"]) if "confidence" in values else None,
     )
     view = TrueView(
         truth.depth,

@@ -18,6 +18,7 @@ FORMAT_NAME = "pix2shape-bench/rooms"
 FORMAT_VERSION = "1.0"
 TRUTH_DIGEST = "truth_digest"
 WITHHELD = "withheld"  # "truth" in files of images and cameras alone
+CORRUPTION = "corruption"  # what `bench corrupt` did to the images
 CONVENTIONS = (
     "world: right-handed, y up, room = unit box with floor y = 0 and walls x = 0, z = 0; camera:"
     " x right, y up, looks along -z; pixels: row 0 on top, centres at +0.5; see docs/conventions.md"
@@ -46,8 +47,9 @@ FORMAT = Format(
         TRUTH_DIGEST: DIGEST,
         CONTENT_DIGEST: DIGEST,
         WITHHELD: "truth",
+        CORRUPTION: ".+",
     },
-    optional=frozenset((WITHHELD,)),
+    optional=frozenset((WITHHELD, CORRUPTION)),
 )
 OTHER_PROPERTY = 40  # of the list of labels of NYU40, what has no label of its own
 NYU40 = {  # Gupta et al., "Perceptual organization and recognition of indoor scenes" (2013)

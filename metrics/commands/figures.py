@@ -47,6 +47,7 @@ def figure(
     predictions: rows are drawn as pictures with depth and error.
     """
     from metrics.score_file import read_scores
+    from metrics.scoring.aligned import aligned
     from metrics.views import figures
     from scenegen.files.new_file import check_writable
 
@@ -60,7 +61,7 @@ def figure(
     elif items is not None:
         raise click.UsageError("--items needs --truth")
     else:
-        scores = [read_scores(path) for path in files]
+        scores = aligned([read_scores(path) for path in files])
         if by:
             figures.draw_groups(out, scores, by, score, wide, overwrite)
         else:

@@ -74,7 +74,8 @@ def reading_options(*kinds: str) -> Callable[[Command], Command]:
             " truth), distance along the ray, or points x, y, z."),
         click.option("--unit", type=click.Choice(["m", "cm", "mm"]),
                      help="Unit of the numbers; the edge of a room is 1 m."),
-        click.option("--scale", type=Factor(), help="Metres for each step, such as 1/256."),
+        click.option("--scale", type=Factor(),
+                     help="Metres for each step, such as 1/256; of disparity 1 / metres."),
         click.option("--invalid", type=float, multiple=True,
                      help="Stored number that stands for no value, such as 0; may be repeated."),
         click.option("--normals", metavar="FILES",
@@ -110,6 +111,11 @@ def read_as(
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
               help="What the method cannot know [default: none; scale_shift of disparity]."
               " Disparity with none or scale is 1 / depth.")
+@click.option("--confidence", metavar="FILES",
+              help="Images of how sure the method is of each pixel, as --depth; any scale.")
+@click.option("--confidence-is", type=click.Choice(["confidence", "error"]), default="confidence",
+              show_default=True, help="Whether these are larger where the method is surer, or where"
+              " it expects a larger error.")
 @MISSING
 @click.option("--shown", type=click.Choice(["scored_view", "first_view", "no_view"]),
               default="scored_view", show_default=True, help="Image of the scene that the method"
@@ -131,7 +137,8 @@ def read_as(
 def import_(
     pattern: str | None, alignment: Any, missing: Any, normals: str | None, shown: Any,
     answers: str | None, people: str | None, truth: str, out: str, method: str | None,
-    run_name: str, notes: str, overwrite: bool, expanded: tuple[str, ...], **numbers: Any,
+    run_name: str, notes: str, overwrite: bool, expanded: tuple[str, ...],
+    confidence: str | None, confidence_is: str, **numbers: Any,
 ) -> None:
     """Make a submission of predictions that lie in files.
 
@@ -166,12 +173,13 @@ def import_(
     from metrics.intake.importing import import_rooms
     from metrics.measured.reader import open_images
 
+    numbers["surer"] = "less" if confidence_is == "error" else "more"
     reading = read_as(alignment=alignment, missing=missing, **numbers)
     with open_images(truth) as rooms:
         with progress_bar(len(rooms), "image") as bar:
             how = import_rooms(
                 pattern, rooms, out, method=method or _name_of(pattern), reading=reading,
-                normals=normals, shown=shown, progress=bar.update, **texts,
+                normals=normals, confidence=confidence, shown=shown, progress=bar.update, **texts,
             )
         print_line(f"{out}: {how}")
         _print_hints(out, rooms)
@@ -217,8 +225,9 @@ def _print_hints(out: str, data: Any) -> None:
 
     with open_predictions(out) as opened:
         if isinstance(opened, RoomPredictions):
-            normals = ", with normals" if opened.has_normals else ""
-            print_line(f"{out}: {opened.kind}, alignment {opened.alignment}{normals}")
+            more = ", with normals" if opened.has_normals else ""
+            more += ", with confidence" if opened.has_confidence else ""
+            print_line(f"{out}: {opened.kind}, alignment {opened.alignment}{more}")
             for hint in hints(opened, data):
                 print_line(f"hint: {out}: {hint}", err=True)
     print_line(f"now: {shlex.join(['bench', 'score', out, '--truth', str(data.path)])}")

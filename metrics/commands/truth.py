@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from metrics.commands.intake import DEPTH_KINDS, read_as, reading_options
+from metrics.commands.intake import DEPTH_KINDS, Factor, read_as, reading_options
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import OVERWRITE
 from scenegen.command_line.output import print_line, progress_bar
@@ -22,6 +22,11 @@ LAYOUTS = ("moge", "nyu", "nyu-raw", "kitti", "diode", "hypersim", "sintel")
 @click.option("--depth", metavar="FILES",
               help="Their depth: PNG, TIFF, EXR, PFM, NPY or NPZ, in the size of the picture.")
 @reading_options(*DEPTH_KINDS)
+@click.option("--focal-baseline", type=Factor(), metavar="N",
+              help="Of disparity in pixels: focal length in pixels x baseline in metres; depth is"
+              " N / disparity.")
+@click.option("--disparity-offset", type=float, default=0.0, metavar="PIXELS",
+              help="Added to disparity first, such as the difference of the principal points.")
 @click.option("--intrinsics", type=InputPath(), metavar="K.json",
               help="Pinhole matrix in pixels, whose first pixel has its centre at 0.5; or an object"
               " of them by picture.")
@@ -38,7 +43,8 @@ LAYOUTS = ("moge", "nyu", "nyu-raw", "kitti", "diode", "hypersim", "sintel")
 def truth(
     images: str | None, depth: str | None, normals: str | None, intrinsics: str | None,
     groups: str | None, mask: str | None, layout: str | None, data: str | None, split: str | None,
-    source: str, licence: str, out: str, overwrite: bool, **numbers: Any,
+    source: str, licence: str, focal_baseline: float | None, disparity_offset: float, out: str,
+    overwrite: bool, **numbers: Any,
 ) -> None:
     """Make a file of truth that others measured, from files or from a public set.
 
@@ -62,14 +68,22 @@ def truth(
         raise click.UsageError("give --images and --depth, or --layout and --data")
     if layout and data:
         told = [numbers[name] for name in ("unit", "scale", "invalid", "array")]
-        if any((*told, intrinsics, groups, normals, mask)):
+        if any((*told, focal_baseline, disparity_offset, intrinsics, groups, normals, mask)):
             raise click.UsageError("--layout knows its units, cameras and groups")
         source, licence = source or SETS[layout].source, licence or SETS[layout].licence
         rows = read_layout(layout, Path(data), Path(split) if split else None)
     else:
         assert images, "the options were checked"
         assert depth, "the options were checked"
-        reading = read_as(**numbers)
+        disparity = numbers["kind"] == "disparity"
+        if not disparity and (focal_baseline or disparity_offset):
+            raise click.UsageError("--focal-baseline and --disparity-offset need --kind disparity")
+        if disparity and (numbers["unit"] or (numbers["scale"] and focal_baseline)):
+            raise click.UsageError("disparity has no unit of length: say --focal-baseline, or"
+                                   " --scale for 1 / metres of each step")
+        if focal_baseline is not None:
+            numbers["scale"] = 1.0 / focal_baseline
+        reading = read_as(**numbers, offset=disparity_offset)
         if numbers["unit"] is None and numbers["scale"] is None:
             raise unknown_unit(depth, reading)
         beside = Beside(
@@ -94,5 +108,37 @@ def info(file: str) -> None:
     click.echo(describe(file))
 
 
+@click.command(epilog=f"{EXAMPLE}bench corrupt rooms.h5 --kind jpeg --severity 3 --out jpeg-3.h5")
+@click.argument("data", type=InputPath(), metavar="ROOMS.h5")
+@click.option("--kind", required=True, metavar="NAME",
+              help="noise, shot, impulse, blur, motion, fog, brightness, dark, contrast, pixelate,"
+              " jpeg or quantize.")
+@click.option("--severity", type=click.IntRange(1, 5), required=True, help="1 to 5.")
+@click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True,
+              help="Seed of random corruptions.")
+@click.option("--out", type=NewHdf5(), required=True, metavar="FILE.h5", help="File to write.")
+@OVERWRITE
+def corrupt(data: str, kind: str, severity: int, seed: int, out: str, overwrite: bool) -> None:
+    """Write a file with corrupted images and the same truth.
+
+    Predict both files, score both against the clean one, and compare the two score files: the
+    difference is the drop, paired by image.
+    """
+    from metrics.corruptions import write_corrupted
+    from metrics.measured.reader import open_images
+    from scenegen.command_line.paths import refuse_inputs
+
+    refuse_inputs([Path(out)], [Path(data)])
+    with open_images(data) as images:
+        count = len(images)
+    with progress_bar(count, "image") as bar:
+        write_corrupted(data, out, kind, severity, seed=seed, overwrite=overwrite,
+                        progress=bar.update)
+    print_line(f"{out}: {count} images, {kind} of severity {severity}")
+    command = ["bench", "run", "MODEL", "--data", out, "--out", f"{Path(out).stem}-predictions.h5"]
+    print_line(f"now: {shlex.join(command)}")
+    print_line(f"then: bench score {Path(out).stem}-predictions.h5 --truth {shlex.quote(data)}")
+
+
 # fmt: on
-COMMANDS = (truth, info)
+COMMANDS = (truth, info, corrupt)

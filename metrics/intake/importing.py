@@ -24,6 +24,7 @@ def import_rooms(
     method: str,
     reading: Reading,
     normals: str | None = None,
+    confidence: str | None = None,
     shown: Shown = "scored_view",
     run: str = "",
     notes: str = "",
@@ -33,8 +34,8 @@ def import_rooms(
     """Write a submission from files of images, and return in words how they were matched.
 
     Args:
-        pattern, normals: a pattern such as `out/*.png`, a folder, or a single NPY or NPZ file with
-            an image for each row.
+        pattern, normals, confidence: a pattern such as `out/*.png`, a folder, or a single NPY or
+            NPZ file with an image for each row.
         truth: the file that is predicted, which may be open.
         shown: which image of a scene the method was shown, as `layout.Shown`.
         progress: called with 1 after every row.
@@ -46,7 +47,7 @@ def import_rooms(
         if not isinstance(rooms, Images):
             raise SpecError(rooms.path, "questions", "rooms, or measured truth", "see --answers")
         names, keys = _names(rooms), partial(_keys, rooms)
-        read, how = geometry_reader(reading, pattern, names, keys, normals)
+        read, how = geometry_reader(reading, pattern, names, keys, normals, confidence=confidence)
         default: Alignment = "scale_shift" if reading.kind == "disparity" else "none"
         with RoomPredictionWriter(
             out, rooms, method=method, run=run, alignment=reading.alignment or default,

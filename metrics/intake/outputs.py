@@ -57,6 +57,7 @@ class Geometry:
         normal: (h, w, 3), camera frame; None where there are none.
         fov_y_degrees: vertical field of view; None where it is not estimated.
         key: the name that the model gave to the geometry.
+        confidence: of each pixel, (h, w), larger is surer; None where there is none.
     """
 
     kind: str
@@ -65,6 +66,7 @@ class Geometry:
     normal: Array | None = None
     fov_y_degrees: float | None = None
     key: str = ""
+    confidence: Array | None = None
 
     def within(self, mask: Array, name: str = "mask") -> "Geometry":
         """Return the geometry without values where a mask (h, w) is False. Raises OutputError."""
@@ -79,6 +81,7 @@ class Geometry:
         """The arguments of `RoomPredictionWriter.add`, beside the row."""
         values = {self.kind: self.geometry}
         values |= {} if self.normal is None else {"normal": self.normal}
+        values |= {} if self.confidence is None else {"confidence": self.confidence}
         return values | (
             {} if self.fov_y_degrees is None else {"fov_y_degrees": self.fov_y_degrees}
         )
@@ -108,8 +111,9 @@ def read_output(
 
     Args:
         output: a mapping with one of `KEYS`, and maybe `normal` (h, w, 3), `mask` (h, w; what is
-            False has no value) and `intrinsics` (3, 3), normalised by the image's size or in its
-            pixels. Arrays, or tensors of torch; axes of size 1 around them are dropped.
+            False has no value), `intrinsics` (3, 3), normalised by the image's size or in its
+            pixels, and `confidence` or `uncertainty` (h, w). Arrays, or tensors of torch; axes of
+            size 1 around them are dropped.
         frame: of points and normals: "opencv" has x right, y down, z forward; "opengl" is ours.
         key: which of `KEYS` to take; by default the first that is there.
         missing: "nearest" fills pixels without a value from the nearest that has one.
@@ -134,10 +138,19 @@ def read_output(
         None if normal is None else image_of(normal, "normal", vectors=True),
         _fov(output.get("intrinsics"), height),
         chosen,
+        _confidence(output),
     )
     if mask is not None:
         geometry = geometry.within(image_of(mask, "mask") > 0.5)
     return fitted_to(geometry, height, width, frame=frame, missing=missing)
+
+
+def _confidence(output: Mapping[str, Any]) -> Array | None:
+    """Return how sure a model is of each pixel, which may be told by how unsure it is."""
+    if output.get("uncertainty") is not None:
+        return -image_of(output["uncertainty"], "uncertainty")
+    found = output.get("confidence")
+    return None if found is None else image_of(found, "confidence")
 
 
 def fitted_to(
@@ -157,12 +170,17 @@ def fitted_to(
     if normal is not None:
         _refuse_shape(normal, "normal", height, width)
         normal = nearest(normal * FRAMES[frame], height, width)
+    sure = geometry.confidence
+    if sure is not None:
+        _refuse_shape(sure, "confidence", height, width)
+        sure = nearest(sure, height, width)
     if missing == "nearest":
         image = filled(image, valid)
+        sure = None if sure is None else filled(sure, np.isfinite(sure))
         if normal is not None:
             sensible = np.isfinite(normal) & normal.any(axis=-1, keepdims=True)
             normal = filled(normal, np.asarray(sensible.all(axis=-1)))
-    return replace(geometry, geometry=image, normal=normal)
+    return replace(geometry, geometry=image, normal=normal, confidence=sure)
 
 
 def image_of(values: Any, name: str, vectors: bool = False) -> Array:

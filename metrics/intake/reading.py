@@ -1,7 +1,7 @@
 """How the numbers of files are taken: kind, unit, frame, and what stands for no value."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -36,24 +36,28 @@ class Reading:
     Attributes:
         kind: "depth" is planar, "distance" goes along the ray, "disparity" is large where near,
             "points" are x, y, z.
-        scale: scene units for each step; 1 of disparity.
+        scale: scene units for each step; of disparity, 1 / scene units.
+        offset: of disparity: what is added to it before it is scaled, in its own steps.
         alignment: what the method does not know; None for "none", or "scale_shift" of disparity.
             Disparity under another alignment is 1 / depth, and becomes depth.
         invalid: stored values that stand for no value.
         frame: of points and normals.
         missing: what to do with pixels without a value.
         array: name of the array in NPZ files, or of the channel in EXR files.
+        surer: whether confidence is larger where the method is surer, or smaller, as an error is.
         match: whether files belong to rows by number, or in the order of their names.
     """
 
     kind: Kind = "depth"
     scale: float = 1.0
+    offset: float = 0.0
     alignment: Alignment | None = None
     invalid: tuple[float, ...] = ()
     frame: Frame = "opencv"
     missing: Missing = "refuse"
     array: str | None = None
     match: By = "number"
+    surer: Literal["more", "less"] = "more"
 
     def __post_init__(self) -> None:
         """Raise SpecError where settings contradict each other."""
@@ -64,6 +68,8 @@ class Reading:
             raise SpecError("alignment", repr(self.alignment), expected)
         if not 0.0 < self.scale < np.inf:
             raise SpecError("scale", self.scale, "a number above 0")
+        if not np.isfinite(self.offset) or (self.offset and self.kind != "disparity"):
+            raise SpecError("disparity offset", self.offset, "a number, for disparity")
 
     def geometry(self, stored: Array, normal: Array | None, rays: Rays) -> Geometry:
         """Return the geometry of the numbers of a file, (h, w) or (h, w, 3). Raises OutputError.
@@ -75,7 +81,7 @@ class Reading:
         values = np.where(
             invalid.all(axis=-1, keepdims=True) if values.ndim == 3 else invalid,
             np.nan,
-            values * self.scale,
+            (values + self.offset) * self.scale,
         )
         kind, alignment = self.kind, self.alignment or "none"
         if kind == "distance":
@@ -96,6 +102,7 @@ def geometry_reader(
     keys: Keys,
     normals: str | None = None,
     masks: str | None = None,
+    confidence: str | None = None,
 ) -> tuple[GeometryReader, str]:
     """Return what reads the geometry of each row from files, and in words how rows have them.
 
@@ -103,8 +110,8 @@ def geometry_reader(
     Normals are as stored, in the frame of the files.
 
     Args:
-        depth, normals, masks: patterns of files, as `folders.row_reader`; a mask is 0 where the
-            geometry has no value.
+        depth, normals, masks, confidence: patterns of files, as `folders.row_reader`; a mask is 0
+            where the geometry has no value.
         names, keys: of the rows, as `folders.match_files`.
 
     Raises as `row_reader`; the reader ArrayFileError and OutputError.
@@ -113,6 +120,7 @@ def geometry_reader(
     read, how = rows(depth, array=reading.array, vectors=reading.kind == "points")
     read_normal = rows(normals, vectors=True)[0] if normals is not None else None
     read_mask = rows(masks)[0] if masks is not None else None
+    read_sure = rows(confidence)[0] if confidence is not None else None
 
     def geometry(row: int, rays: Rays) -> tuple[Geometry, str]:
         where, stored = read(row)
@@ -122,6 +130,10 @@ def geometry_reader(
                 place, vectors = read_normal(row)
                 normal = _unit_vectors(vectors, place)
             geometry = reading.geometry(stored, normal, rays)
+            if read_sure is not None:
+                place, values = read_sure(row)
+                sure = image_of(values, "confidence")
+                geometry = replace(geometry, confidence=sure if reading.surer == "more" else -sure)
             if read_mask is not None:
                 place, values = read_mask(row)
                 geometry = geometry.within(image_of(values, "mask") > 0.0, place)

@@ -232,7 +232,9 @@ def _picture(rooms: Images, row: int, call: Call) -> Array:
 def _arrays(geometry: Geometry) -> Arrays:
     arrays = {"geometry": geometry.geometry.astype(np.float32), "key": geometry.key}
     arrays |= {"kind": geometry.kind, "alignment": geometry.alignment}
-    arrays |= {} if geometry.normal is None else {"normal": geometry.normal.astype(np.float32)}
+    for name in ("normal", "confidence"):
+        values = getattr(geometry, name)
+        arrays |= {} if values is None else {name: values.astype(np.float32)}
     return arrays | ({} if geometry.fov_y_degrees is None else {"fov": geometry.fov_y_degrees})
 
 
@@ -241,7 +243,8 @@ def _geometry(arrays: Mapping[str, Any]) -> Geometry:
     alignment: Any = str(arrays["alignment"])
     fov = float(arrays["fov"]) if "fov" in arrays else None
     kind, key = str(arrays["kind"]), str(arrays["key"])
-    return Geometry(kind, alignment, arrays["geometry"], arrays.get("normal"), fov, key)
+    normal, sure = arrays.get("normal"), arrays.get("confidence")
+    return Geometry(kind, alignment, arrays["geometry"], normal, fov, key, sure)
 
 
 # ---- questions ----

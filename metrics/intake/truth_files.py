@@ -132,11 +132,19 @@ def read_groups(path: str | Path) -> dict[str, str]:
 
 
 def unknown_unit(depth: str, reading: Reading) -> SceneGenError:
-    """Return an error that guesses the unit of depth in files, and says why."""
+    """Return an error that guesses the unit of depth in files, and says why.
+
+    Of disparity no unit can be guessed.
+    """
     path = files_of(depth)[0]
     values = image_of(read_array(path, reading.array), "depth")
     known = values[np.isfinite(values) & (values > 0.0) & ~np.isin(values, reading.invalid)]
     middle = float(np.median(known)) if len(known) else 0.0
+    if reading.kind == "disparity":
+        found = f"disparity with a median of {middle:g}, and no focal length or baseline"
+        wanted = "depth = focal length in pixels x baseline in metres / disparity"
+        hint = "say --focal-baseline N, their product; and --disparity-offset, if there is one"
+        return TruthError(path, found, wanted, hint)
     guesses = (says for factor, says in GUESSES if USUAL[0] <= middle / factor <= USUAL[1])
     guess = next(guesses, "--unit m, cm or mm, or --scale")
     found = f"a median of {middle:g}, and no unit" if len(known) else "no depth above 0"

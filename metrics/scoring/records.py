@@ -279,9 +279,9 @@ class ScoreFile:
 
     @property
     def headline(self) -> tuple[str, ...]:
-        """The main scores that there are. Who sees a view is not asked what is behind."""
+        """The main scores that there are. What is behind is asked of who sees the first view."""
         names = [name for name in HEADLINE[self.kind] if name in self.metrics]
-        return tuple(name for name in names if name != BEHIND or self.shown != "scored_view")
+        return tuple(name for name in names if name != BEHIND or self.shown == "first_view")
 
     def floor_of(self, name: str) -> str | None:
         """Return what begins the name of the column of items that is a score's floor; or None."""

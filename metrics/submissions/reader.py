@@ -189,7 +189,7 @@ class RoomPredictions(Predictions):
         """Everything that is predicted in entry `index`. Raises FileFormatError."""
         normal = self.normal(index) if self.has_normals else None
         fov = float(self._arrays["fov_y_degrees"][index]) if self.has_fov else None
-        sure = self._read("confidence", index) if "confidence" in self._arrays else None
+        sure = self.confidence(index) if self.has_confidence else None
         return PredictedView(self.kind, self.fitted, self.geometry(index), normal, fov, sure)
 
     @property
@@ -219,6 +219,13 @@ class RoomPredictions(Predictions):
         Raises FileFormatError where there are none, or they are damaged.
         """
         return self._read("normal", index)
+
+    def confidence(self, index: int) -> Array:
+        """How sure the method is of each pixel of entry `index`, (H, W): larger is surer.
+
+        Raises FileFormatError where there is none, or it is damaged.
+        """
+        return self._read("confidence", index)
 
     def _read(self, name: str, index: int) -> Array:
         if name not in self._arrays:

@@ -109,6 +109,8 @@ def _row_problems(
     readers = {predictions.kind: predictions.geometry}
     if predictions.has_normals:
         readers["normal"] = predictions.normal
+    if predictions.has_confidence:
+        readers["confidence"] = predictions.confidence
     for name, read in readers.items():
         try:
             values = read(i)[:height, :width]

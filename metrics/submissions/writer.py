@@ -94,6 +94,7 @@ class RoomPredictionWriter:
         disparity: ArrayLike | None = None,
         points: ArrayLike | None = None,
         fov_y_degrees: float | None = None,
+        confidence: ArrayLike | None = None,
     ) -> None:
         """Write the prediction for one row of the truth; rows may come in any order.
 
@@ -109,6 +110,8 @@ class RoomPredictionWriter:
             points: (H, W, 3) floats: camera frame (x right, y up, z towards the viewer), scene
                 units.
             fov_y_degrees: vertical field of view that the method estimates. For all rows or none.
+            confidence: (H, W) floats: larger where the method is surer of its depth; only their
+                order within the image counts. For all rows or none.
 
         Raises PredictionError, naming the row, what was found and what was expected.
         """
@@ -121,7 +124,8 @@ class RoomPredictionWriter:
         if self._truth.has_truth:
             surface = np.isfinite(self._truth.read("depth", row)[:height, :width])
         sizes = dict(zip(("y", "x"), ((size,) for size in surface.shape), strict=True))
-        images = {"depth": depth, "disparity": disparity, "points": points, "normal": normal}
+        images = {"depth": depth, "disparity": disparity, "points": points}
+        images |= {"normal": normal, "confidence": confidence}
         values = {}
         for column in layout.COLUMNS["rooms"]:
             image = images.get(column.name)

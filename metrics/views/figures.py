@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measured.reader import Images, MeasuredFile, open_images
+from metrics.measures.confidence import REMOVED
 from metrics.measures.statistics import cluster_means
 from metrics.scoring.geometry import depth_as_scored
 from metrics.scoring.measured_rows import depth_as_declared
@@ -153,6 +154,17 @@ def draw_histogram(path: Target, file: ScoreFile, name: str, width: float = COLU
             axes.axvline(at, color=color, linestyle=style, label=f"{text} {number(at)}")
         axes.set(xlabel=file.unit_of(name), ylabel="images")
         axes.locator_params(axis="x", nbins=6)
+        _legend(axes)
+
+
+def draw_sparsification(path: Target, curves: Array, width: float = COLUMN) -> None:
+    """Draw mean errors, (3, 20), without the least sure pixels: method, random order, oracle."""
+    names = ("method", "random order", "oracle")
+    with _figure(path, False, width, 0.7 * width) as axes:
+        for curve, name, (color, _) in zip(curves, names, LOOKS[1:], strict=False):
+            axes.plot(100.0 * REMOVED, curve, color=color, label=name)
+        axes.set(xlabel="pixels left out (%), the least sure first", ylabel="AbsRel of the rest")
+        axes.set_ylim(bottom=0.0)
         _legend(axes)
 
 

@@ -158,9 +158,10 @@ def rankings(
         _require_same_rows(together)
         _require_same_baselines(together)
         names = [name for name, score in wanted.items() if task in score.tasks]
-        # Methods that see a scene's first view alone are ranked by what is behind.
+        # Methods that see a scene's first view alone are ranked by what is behind; those that see
+        # none are not, as the mean relief of other rooms beats the baseline that knows as little.
         behind_first = sorted(HEADLINE[members[0].kind], key=lambda name: name != BEHIND)
-        headline = [n for n in behind_first if n != BEHIND or seen in ("first_view", "no_view")]
+        headline = [n for n in behind_first if n != BEHIND or seen == "first_view"]
         there = [n for n in headline if any(n in file.metrics for file in members)]
         if any(file.declared is not None for file in members):
             there = [n for n in there if all(n in file.metrics for file in members)]
@@ -425,6 +426,8 @@ def _why_none_is_told_apart(file: ScoreFile, key: str) -> str:
     scenes, scored = len(np.unique(file.clusters)), file.metrics[name].n
     if of_objects and not file.metrics.keys() & set(of_objects):
         why = "no image shows an object that counts, so the empty room is the truth"
+    elif name == BEHIND and file.shown == "no_view":
+        why = "without an image, the mean relief of other rooms beats the baseline"
     elif scored < 2:
         why = f"only {scored} of {scenes} {file.unit} has a score of {metric(name).title}"
     else:

@@ -7,13 +7,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from metrics.measured.reader import Images
+from metrics.measures.confidence import sparsification
 from metrics.score_file import read_scores
+from metrics.scoring.aligned import aligned
 from metrics.scoring.metric_names import HEADLINE, in_order, metric
 from metrics.scoring.records import ScoreFile, Scores
-from metrics.scoring.runs import Runs
+from metrics.scoring.runs import MeasuredRuns, RoomRuns, Runs
 from metrics.scoring.truth_digests import require_truth, stated_truth
+from metrics.submissions.reader import RoomPredictions
 from metrics.views.examples import examples_of
-from metrics.views.figures import draw_groups, draw_histogram, svg_url
+from metrics.views.figures import (
+    draw_groups,
+    draw_histogram,
+    draw_sparsification,
+    shown_row,
+    svg_url,
+)
 from metrics.views.page import Section, html_page
 from metrics.views.paper import figures_of, paper_table
 from metrics.views.score_tables import (
@@ -35,6 +44,7 @@ ROOMS_REMARK = (
     "Depths share the truth's range; the error ends at a tenth of it. Normals are x, y, z as red,"
     " green, blue. Grey is not scored. A click enlarges a picture."
 )
+MOST_CURVES = 64  # images, spread evenly, over which the curve of confidence is a mean
 QUESTIONS_REMARK = (
     "One answer shows the shape of the reference, turned. The questions are spread evenly over the"
     " file."
@@ -55,7 +65,7 @@ def html_report(
     """
     for file in beside:
         require_truth(file, scores.truth, scores.method, scores.protocol)
-    files = [scores, *beside]
+    files = aligned([scores, *beside])
     tables = [main_table(scores), *([side_by_side(files)] if beside else [])]
     sections = [Section(remarks=[title_of(scores)], tables=tables, notes=notes_of(scores))]
     examples = [] if runs is None else examples_of(scores, runs.truth, runs.files[0])
@@ -68,6 +78,8 @@ def html_report(
     groups = list(group_tables(scores))
     reported = figures_of(scores)
     sections += group_charts(files)
+    if isinstance(runs, RoomRuns | MeasuredRuns):
+        sections += confidence_chart(runs.files[0], runs.truth)
     distributions = list(_distributions(scores))
     if distributions:
         sections.append(Section("Distribution over images", charts=distributions))
@@ -82,6 +94,27 @@ def html_report(
         Section("Where the numbers come from", notes=_origin(scores), folded=True),
     ]
     return html_page(scores.method, sections, warnings_of(scores))
+
+
+def confidence_chart(predictions: RoomPredictions, truth: Images) -> list[Section]:
+    """Return how the error falls as the least sure pixels leave; no section without confidence."""
+    if not predictions.has_confidence:
+        return []
+    curves = []
+    for i in np.unique(np.linspace(0, len(predictions) - 1, MOST_CURVES).astype(int)).tolist():
+        view = predictions.view(i)
+        _, true, (depth,) = shown_row(truth, int(predictions.rows[i]), [view])
+        known = np.isfinite(depth) & np.isfinite(true)
+        if known.any() and view.confidence is not None:
+            errors = np.abs(depth - true)[known] / true[known]
+            sure = view.confidence[: len(true), : true.shape[1]][known]
+            orders = (sure, np.zeros_like(errors), -errors)
+            curves.append([sparsification(errors, order) for order in orders])
+    if not curves:
+        return []
+    mean = np.mean(curves, axis=0)
+    chart = ("AbsRel without the least sure pixels", svg_url(draw_sparsification, mean))
+    return [Section("Confidence", charts=[chart])]
 
 
 def group_charts(files: Sequence[ScoreFile]) -> list[Section]:

@@ -280,7 +280,24 @@ def _truth_name(meta: Meta) -> str:
 
 def warnings_of(scores: ScoreFile) -> list[str]:
     """Return what is to be known before any number."""
-    return [*scores.warnings, *few_clusters(scores), *partner_sentences(scores)]
+    return [
+        *scores.warnings,
+        *few_clusters(scores),
+        *partner_sentences(scores),
+        *confidence_warnings(scores),
+    ]
+
+
+def confidence_warnings(scores: ScoreFile) -> list[str]:
+    """Return a warning where confidence is constant, or larger where errors are larger."""
+    gain = scores.metrics.get("aurg_abs_rel")
+    if gain is None:
+        return []
+    if (np.abs(scores.items["aurg_abs_rel"]) < 1e-12).all():
+        return ["confidence is constant in every image, so it says nothing"]
+    inverted = gain.value < 0.0 and (gain.high is None or gain.high < 0.0)
+    hint = "for uncertainty, say `bench import --confidence-is error`"
+    return [f"confidence is larger where errors are larger: {hint}"] * inverted
 
 
 def notes_of(scores: ScoreFile) -> list[str]:

@@ -24,6 +24,10 @@ MOST_CONDITION = 1e6  # of the equations for the slopes
 ALONG_RAY = "looks like distance along the ray, not planar depth"
 PICTURES = (255.0, 65535.0)  # largest values of pictures of 8 and 16 bits
 UNITS = {1000.0: "millimetres for metres", 100.0: "centimetres for metres"}
+# Factors that are told only where they fit within EXACT.
+FACTORS = {3.2808: "feet for metres", 39.37: "inches for metres", 0.5: "half", 2.0: "twice"}
+EXACT = 0.03
+USUAL_FOCAL = 300.0  # pixels: a network trained at this focal length is often scaled by it
 
 
 def depth_hints(samples: Sequence[Sample], alignment: str, kind: str = "depth") -> list[Problem]:
@@ -183,7 +187,12 @@ def _scale(images: Sequence[_Image], alignment: str) -> str | None:
     if alignment != "none" or not (other_unit or (follows and same)):
         return None
     unit = next((u for f, u in UNITS.items() if f / 2.0 < scale < 2.0 * f), "another unit")
-    guess = f", as if {unit}" if other_unit else ""
+    exact = next((u for f, u in FACTORS.items() if abs(np.log(scale / f)) < EXACT), "")
+    by_focal = scales * USUAL_FOCAL / np.array([1.0 / image.sample.pitch for image in images])
+    if not exact and (np.abs(np.log(by_focal)) < EXACT).all():
+        exact = f"multiplied by focal length / {USUAL_FOCAL:g}"
+    unit = exact or unit
+    guess = f", as if {unit}" if other_unit or exact else ""
     rounded = float(f"{scale:.3g}")
     return f"looks like another scale: {rounded:,g} times the truth{guess}"
 

@@ -39,6 +39,7 @@ class Purpose(IntEnum):
     ROOM = 19
     ARRANGEMENT = 20
     VIEWPOINT = 21
+    CORRUPTION = 22
 
 
 def item_rng(
