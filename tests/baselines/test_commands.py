@@ -90,30 +90,6 @@ def test_settings_reach_the_baseline(fake, folder):
     assert fake["resume"] is True
 
 
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ("--iterations 5", ("iterations",)),
-        ("--set device=cpu", ("--set", "'device'")),
-        ("--set machine=1", ("--set", "'machine'")),
-        ("--minutes 5 --seed 1 --device gpu", ("--device", "'gpu'")),
-        ("--minutes 0", ("--minutes", "0")),
-        ("--set colour=1", ("--set", "'colour'", "depth")),
-        ('--set depth="deep"', ("depth", "'deep'")),
-        ("--set depth=3 --set depth=3", ("--set", "'depth'")),
-        ("--set depth=true", ("depth", "True")),
-        ("--set resume=true", ("--set", "'resume'")),
-        ("--set progress=1", ("--set", "'progress'")),
-        ("--resume --seed 2", ("--resume",)),
-        ("--resume --set depth=50", ("--resume",)),
-    ],
-)
-def test_what_a_baseline_has_not_is_refused(fake, folder, line, words, check_refusal):
-    result = bench(*f"train cnn {DATA} --out run {line}".split())
-    check_refusal(result.exit_code, result.stdout, result.stderr, words)
-    assert fake == {}
-
-
 MISTAKES = [
     (f"train cnn {DATA} --out run --labels 4", ("--labels", "found 4", "1 to 3")),
     ("train cnn --data rooms.h5 --out run", ("rooms.h5", "'pix2shape-bench/iqtt'")),
@@ -141,23 +117,3 @@ def test_a_mistake_is_one_line_and_leaves_nothing(line, words, folder, check_ref
     result = bench(*line.split())
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
     assert files_in(folder) == before
-
-
-@pytest.mark.parametrize("name", ["cnn", "rezende"])
-def test_no_gpu_is_one_line(name, folder, check_refusal):
-    if pytest.importorskip("torch").cuda.is_available():
-        pytest.skip("there is one")
-    result = bench(*f"train {name} {DATA} --out run --device cuda".split())
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("device", "cpu"))
-    assert not (folder / "run").exists()
-
-
-@pytest.mark.parametrize(
-    ("name", "data", "other"),
-    [("chance", "rooms.h5", "nearest"), ("empty-room", "iqtt-test.h5", "outline")],
-)
-def test_data_of_the_other_task_is_answered_with_baselines_of_it(name, data, other, folder):
-    refused = bench("baseline", name, "--data", data, "--out", "x.h5")
-    assert refused.exit_code == 2
-    assert other in refused.stderr.splitlines()[-1]
-    assert not (folder / "x.h5").exists()

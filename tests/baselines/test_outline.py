@@ -2,7 +2,6 @@
 
 import h5py
 import numpy as np
-import pytest
 from refusals import refused
 
 from baselines.outline import (
@@ -11,7 +10,7 @@ from baselines.outline import (
     write_outline,
     write_outline_trees,
 )
-from iqtt.audit.features.outlines import DISTANCES, FEATURES, RINGS, outlines
+from iqtt.audit.features.outlines import outlines
 from scenegen.common.errors import SpecError
 
 
@@ -25,26 +24,6 @@ def boxes(count=80, seed=0):
             masks[row, 1 + k, 4 : 4 + sides[k], 6:17] = True
         masks[row, 0] = np.rot90(masks[row, 1 + right[row]])
     return masks, right
-
-
-def distances_of_another(mask):
-    """Distances from a mask to a square."""
-    square = np.zeros_like(mask)
-    square[10:26, 10:26] = True
-    return outlines(np.stack([mask, square])[None])[1][0, 0, 1]
-
-
-def test_a_turned_or_flipped_outline_is_the_same():
-    mask = np.zeros((48, 48), bool)
-    mask[8:30, 10:16], mask[24:30, 10:30] = True, True
-    four = np.stack([mask, np.rot90(mask), mask[:, ::-1], np.roll(mask, 7, axis=1)])
-    features, distances = outlines(four[None])
-    assert features.shape == (1, 4, len(FEATURES))
-    assert distances.shape == (1, 4, 4, len(DISTANCES))
-    plane = features[0, :, :-RINGS]  # the power spectrum keeps half the waves, so turns change it
-    assert plane == pytest.approx(np.repeat(plane[:1], 4, axis=0), abs=0.02)
-    assert (distances.max(axis=(0, 1, 2)) < 0.3 * distances_of_another(mask)).all()
-    assert outlines(np.zeros((1, 4, 16, 16), bool))[0].any() == False  # noqa: E712
 
 
 def test_nearest_outlines_and_trees_find_turned_boxes():

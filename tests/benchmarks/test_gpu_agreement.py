@@ -3,9 +3,8 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
-from benchmarks.gpu.agreement import NEAR, Made, agreement, sets
+from benchmarks.gpu.agreement import NEAR, Made, agreement
 
 DEPTH = np.linspace(1, 2, 3 * 4 * 5).reshape(3, 4, 5).astype(np.float32)
 IDS = np.zeros((3, 4, 5), np.int8)
@@ -24,12 +23,3 @@ def test_another_item_is_not_compared():
     far = DEPTH + np.array([0, 1, 0])[:, None, None]
     assert agreement(MADE, replace(MADE, items=[b"a", b"x", b"c"], depth=far)) == (2, 1, 1)
     assert agreement(MADE, replace(MADE, items=[b"x"] * 3)) == (0, 0, 0)
-
-
-@pytest.mark.parametrize("name", ["rooms, `shapes`", "questions, `mirror-pair-2`"])
-def test_sets_can_be_made_and_read(name, tmp_path):
-    images, make = next(rest for first, *rest in sets(6) if first == name)
-    made = make(tmp_path / "made.h5", "cpu")
-    assert len(made.items) == len(set(made.items)) > 0
-    assert made.depth.size == made.ids.size == images * 128 * 128
-    assert agreement(made, made) == (len(made.items), 1, 1)

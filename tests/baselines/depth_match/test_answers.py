@@ -7,12 +7,11 @@ import pytest
 import torch
 
 from baselines.depth_match.answers import denials, least_denials, surface_points
-from baselines.depth_match.network import METHOD, seen_depth, symmetric
+from baselines.depth_match.network import METHOD, seen_depth
 from baselines.depth_match.training import BASELINE, read_pictures
 from baselines.training.checkpoint import load_weights
 from baselines.training.questions import question_images
 from iqtt import QuestionsFile, SplitSpec, make_split, open_questions
-from scenegen.camera import back_project
 
 KINDS = ("mirror-pair", pytest.param("matched", marks=pytest.mark.slow))
 SIZE = 64
@@ -74,25 +73,3 @@ def test_surfaces_lie_where_the_camera_sees_them(questions):
         assert (off < 0.1).mean() > 0.9
         assert denials(torch.from_numpy(points).float() / distance, torch.eye(3)[None],
                        depth[0], half) < 2e-3  # fmt: skip
-
-
-def test_points_are_those_of_the_camera():
-    depth = torch.full((8, 8), 2.0)
-    depth[0, 3], depth[5, 6] = torch.inf, 0.7
-    expected = back_project(depth.numpy(), 40.0)[np.isfinite(depth.numpy())] + [0, 0, 1]
-    points = surface_points(depth, float(np.tan(np.radians(20.0)))).numpy()
-    off = np.linalg.norm(points[:, None] - expected[None], axis=2)
-    assert off.min(axis=1).max() < 1e-5
-    assert off.min(axis=0).max() < 1e-5
-    assert surface_points(depth + torch.inf, 1.0).abs().max() == 0
-
-
-@pytest.mark.parametrize("form", range(8))
-def test_each_form_is_undone(form):
-    maps = torch.rand(2, 3, 4, 4)
-    torch.testing.assert_close(symmetric(symmetric(maps, form), -form), maps)
-
-
-def test_the_forms_are_all_different():
-    maps = torch.arange(9).view(1, 3, 3)
-    assert len({tuple(symmetric(maps, form).flatten().tolist()) for form in range(8)}) == 8

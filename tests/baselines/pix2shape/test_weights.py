@@ -11,13 +11,12 @@ from refusals import refused
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.predict import predict_file
 from baselines.pix2shape.weights import FOLDER, names, open_weights, suited
-from baselines.training.checkpoint import load_tensors, save_tensors
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.measures.relief import empty_room
 from metrics.submissions.reader import open_predictions
 from scenegen.camera import look_at
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import SpecError
 from scenegen.description.presets import preset_spec
 from scenegen.description.specs import request_from_json
 from scenegen.rooms.make import make_dataset
@@ -32,17 +31,6 @@ def test_they_are_small_and_each_has_its_card() -> None:
         if card.settings.decay:  # else a run that ended early is one that asked for less
             assert card.iteration == card.settings.iterations
         assert card.settings.depth == 0, "they learned without depth maps"
-
-
-def test_settings_that_are_gone_may_be_off_in_a_card_and_no_more(tmp_path: Path) -> None:
-    tensors, notes = load_tensors(FOLDER / "iqtt.safetensors")
-    ((content, text),) = notes.items()
-    assert '"swap":0.0' in text
-    save_tensors(
-        tmp_path / "w.safetensors", tensors, {content: text.replace('"swap":0.0', '"swap":1.0')}
-    )
-    with refused(FileFormatError, "settings", "swap"):
-        open_weights(tmp_path / "w.safetensors")
 
 
 CLASSES = "shapenet-single-classes"  # told what is there, so that it predicts nothing

@@ -61,14 +61,6 @@ def test_a_room_twice_as_large_looks_the_same_and_is_twice_as_deep(cameras):
     assert (one < told(cameras)[0] - 0.02).any()
 
 
-def test_the_papers_room_is_that_of_infinite_size_to_the_bit(turned_path):
-    among = cameras_of(in_memory(turned_path, 32), torch.arange(3))
-    alone = replace(among, room_size=None)
-    for one, other in zip(told(among), told(alone), strict=True):
-        assert torch.equal(one, other)
-    assert torch.equal(planes_of(among, 32), planes_of(alone, 32))
-
-
 def test_one_network_learns_both_kinds_of_rooms_and_predicts_both(
     interior_path, turned_path, tmp_path
 ):

@@ -105,31 +105,6 @@ def test_pixels_have_the_shading_of_their_triangle():
     assert len(np.unique(distance.argmin(axis=1))) >= 3
 
 
-def test_a_mesh_in_a_batch_has_the_bits_that_it_has_alone():
-    meshes, faces = crumpled(5)
-    these = views(5)
-    together = rasterise(meshes, faces, these)
-    for row in range(5):
-        own = Views(
-            **{
-                **vars(these),
-                "light_position": these.light_position[row : row + 1],
-                "light_color": these.light_color[row : row + 1],
-            }
-        )
-        for whole, alone in zip(together, rasterise(meshes[row : row + 1], faces, own)):
-            np.testing.assert_array_equal(whole[row], alone[0])
-
-
-def test_of_a_mesh_turned_inside_out_the_far_side_shows():
-    vertices, faces = icosphere(2)
-    _, front = rasterise(vertices[None], faces, views(1))
-    _, back = rasterise(vertices[None], faces[:, ::-1], views(1))
-    assert front.min() < DISTANCE - 0.9
-    assert back.min() > DISTANCE - 0.3
-    assert (np.isfinite(front) == np.isfinite(back)).mean() > 0.98
-
-
 def test_what_is_behind_the_camera_or_too_near_does_not_show():
     vertices, faces = icosphere(3)
     _, behind = rasterise(vertices[None] + [0, 0, 2 * DISTANCE], faces, views(1))

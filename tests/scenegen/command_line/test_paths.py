@@ -14,7 +14,6 @@ from scenegen.command_line.paths import (
     OutputPath,
     refuse_command_inputs,
 )
-from scenegen.objects.meshes.listing import SUFFIXES
 
 
 @click.command()
@@ -75,7 +74,3 @@ def test_an_output_is_no_input(files, check_refusal, line, words):
         assert done.exit_code == 0, done.output
     else:
         check_refusal(done.exit_code, done.stdout, done.stderr, words)
-
-
-def test_every_kind_of_mesh_is_known():
-    assert set(MESH_FILES) == set(SUFFIXES)

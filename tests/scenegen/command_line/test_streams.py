@@ -61,23 +61,6 @@ def test_no_stream_keeps_a_command_from_its_file_and_its_exit_code(tmp_path, she
     assert int((tmp_path / "mine.json").read_text()) > 2, "a data file behind a standard stream"
 
 
-def test_a_full_disk_is_told_once():
-    program = """
-import sys
-from scenegen.command_line.streams import robust_streams
-with robust_streams():
-    for i in range(3):
-        try:
-            print(i, flush=True)
-        except OSError as error:
-            print(error.filename, file=sys.stderr)
-"""
-    command = [sys.executable, "-c", program]
-    with open("/dev/full", "w") as full:
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=True)
-    assert done.stderr == "standard output\n"
-
-
 def test_ctrl_c_prints_nothing_twice():
     """A signal comes a little later in each print than in the one before."""
     program = """

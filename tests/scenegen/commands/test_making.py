@@ -1,7 +1,6 @@
 """Options of `scenegen render` for closed rooms: what is told, and when."""
 
 import json
-from dataclasses import fields, replace
 
 import h5py
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from PIL import Image
 
 from scenegen.commands.making import NOISY_SPP
-from scenegen.description.specs import DatasetSpec, InteriorSpec, request_from_json
 from scenegen.rendering.pictures import denoiser
 from scenegen.rendering.pictures.assets import digest_of
 
@@ -45,11 +43,6 @@ def test_a_wrong_option_is_all_that_is_told(refuses, options, word):
     refuses(*RENDER, *options.split(), words=(word,))
 
 
-@pytest.mark.parametrize("asset", ["materials", "environment"])
-def test_rooms_without_them_take_no_assets(refuses, asset):
-    refuses("render", "--n", 1, "--out", "o.h5", f"--{asset}", "nosuch", words=(f"--{asset}",))
-
-
 @pytest.mark.usefixtures("no_denoiser")
 def test_without_a_denoiser_more_paths_are_traced_and_that_is_told_first(run):
     made = run(*RENDER)
@@ -77,20 +70,3 @@ def test_verify_needs_what_the_file_was_made_with(run, refuses, own_wood):
     (own_wood / "more.txt").write_text("x")
     digest_of.cache_clear()  # the bytes of a folder are read once in a process
     refuses("verify", "o.h5", "--materials", own_wood, words=("mats",))
-
-
-def test_a_missing_denoiser_is_told_before_a_file_is_read(monkeypatch, refuses, interior_path):
-    with h5py.File(interior_path) as file:
-        spec = request_from_json(file.attrs["spec"])
-    monkeypatch.setattr(denoiser, "has_denoiser", lambda: False)
-    monkeypatch.setattr("scenegen.rooms.reader.request_from_json",
-                        lambda _: replace(spec, denoise=True))  # fmt: skip
-    refuses("verify", interior_path, words=("--items 0",))
-
-
-def test_info_leaves_out_settings_of_the_papers_room(run):
-    assert run(*RENDER, "--spp", 1, "--no-denoise").exit_code == 0
-    words = set(run("info", "o.h5").stdout.split())
-    assert {"hours", "sensor_noise", "views"} <= words
-    foreign = {row.name for row in fields(DatasetSpec)} - {row.name for row in fields(InteriorSpec)}
-    assert not foreign & words

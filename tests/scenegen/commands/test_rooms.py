@@ -3,7 +3,6 @@
 import json
 import shlex
 import sys
-from dataclasses import fields
 
 import click
 import h5py
@@ -12,21 +11,9 @@ import trimesh
 
 import cli
 from scenegen.description.presets import PATH_SAMPLES
-from scenegen.description.specs import DatasetSpec, InteriorSpec
 
 SOME = "render --n 4 --out x.h5 --seed 3 --size 32x48 --shapes box,teapot --compression lzf"
 TINY = ("--size", "32", "--min-visible-pixels", "3")
-# Settings that no option sets by their own name.
-# --size; --shapes, --classes and the folders; --reflectance own
-BY_OTHERS = {
-    "height", "width", "source", "listing", "own_reflectance", "fov_degrees", "fov_spread_degrees",
-}  # fmt: skip
-FIXED = {"camera_target"}
-NOT_SETTINGS = {
-    "count", "out", "preset", "size", "classes", "shapenet_root", "objects_root", "up", "cache_dir",
-    "compression", "batch", "workers", "shard_size", "scheduler", "device", "overwrite",
-    "withhold_truth", "fov",
-}  # fmt: skip
 
 
 def test_the_command_is_recorded_without_what_changes_no_byte(run, monkeypatch, tmp_path):
@@ -79,12 +66,6 @@ def options() -> dict[str, click.Option]:
     """Return the options of `scenegen render` by name."""
     command = cli.scenegen.get_command(click.Context(cli.scenegen), "render")
     return {p.name: p for p in command.params if isinstance(p, click.Option)}
-
-
-def test_every_setting_has_an_option(options: dict[str, click.Option]) -> None:
-    settings = {row.name for kind in (DatasetSpec, InteriorSpec) for row in fields(kind)}
-    assert settings - set(options) == BY_OTHERS | FIXED
-    assert set(options) - settings == NOT_SETTINGS
 
 
 def test_an_export_never_replaces_what_it_exports(run, refuses, rooms_path, tmp_path):

@@ -78,13 +78,6 @@ def test_a_mistake_is_told_in_one_line(refuses, tmp_path, rooms_path, case):
     assert ".partial" not in line, "the user's name for it, not that of a temporary file"
 
 
-def test_the_longest_name_that_a_disk_takes(run, tmp_path):
-    """Where the final name is possible, no hidden longer one may get in the way."""
-    name = "b" * 252 + ".h5"
-    assert run(*RENDER[:-1], name).exit_code == 0
-    assert [path.name for path in tmp_path.iterdir()] == [name]
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="sets Linux's limit of memory")
 @pytest.mark.parametrize(
     "options",

@@ -8,9 +8,7 @@ import pytest
 from scenegen.common.errors import SpecError
 from scenegen.description.interiors import Interior, Opening
 from scenegen.description.presets import PRESETS, preset_spec
-from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec, InteriorSpec, request_from_json
-from scenegen.layout import columns
 
 OTHER = {
     "object_radius": (0.1, 0.2), "pose": "any", "lights": (1, 1), "shadows": True,
@@ -90,19 +88,6 @@ def test_interiors_with_other_settings_are_refused(change):
         request_from_json(text)
 
 
-def test_pictures_of_8_bits_are_srgb_and_others_are_radiance():
-    (developed,) = (c for c in columns(preset_spec("interiors")) if c.name == "image")
-    spec = preset_spec("interiors", image_dtype="float16")
-    (linear,) = (c for c in columns(spec) if c.name == "image")
-    assert developed.unit.startswith(developed.more["encoding"])
-    assert linear.unit.startswith(linear.more["encoding"])
-
-
-def test_units_are_metres():
-    units = {column.name: column.unit for column in columns(preset_spec("interiors"))}
-    assert units["depth"] == units["room/size"] == "metre"
-
-
 def interior(**changes):
     told = {
         "size": (4.0, 2.5, 3.0), "openings": (), "stands_on": (0, 1), "hour": 12.0,
@@ -126,8 +111,3 @@ def test_an_opening_is_a_rectangle_in_a_wall():
     for wrong in (("hole", "west", 0.5, 1.4), ("door", "up", 0.5, 1.4), ("door", "west", 1.4, 0.5)):
         with pytest.raises(SpecError):
             Opening(*wrong, 0.0, 2.0)
-
-
-def test_a_scene_says_of_each_object_what_it_stands_on():
-    with pytest.raises(SpecError):
-        SceneSpec(0, (object(),), (), (), (0, 0, 0), (0, 0), (0.8,) * 3, interior=interior())

@@ -3,23 +3,12 @@
 import numpy as np
 import pytest
 
-from scenegen.objects.basic_shapes import unit_shape
-from scenegen.objects.cast_meshes import OVERLAP, cast_mesh, normal_table, overlapping
+from scenegen.objects.cast_meshes import OVERLAP, cast_mesh, overlapping
 from scenegen.objects.catalogue import built_in_shape
 from scenegen.objects.solids import Mesh
 
 BASIC = ("box", "torus", "teapot", "icosahedron", "cone")
 MODELS = ("mug/0001", "chair/0002", "bottle/0003", "bag/0004", "table/0005")
-
-
-def test_normals_stand_on_faces_and_at_corners():
-    shape = unit_shape("cone")
-    table = normal_table(shape)
-    a, b, c = (shape.triangles[:, i] for i in range(3))
-    cross = np.cross(b - a, c - a)
-    cross /= np.linalg.norm(cross, axis=1, keepdims=True)
-    np.testing.assert_allclose(table[:, :3], cross, atol=1e-6)
-    np.testing.assert_array_equal(table[:, 3:].reshape(-1, 3, 3), np.float32(shape.normals))
 
 
 def test_meshes_are_cast_in_single_precision():

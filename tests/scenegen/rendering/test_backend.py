@@ -71,35 +71,12 @@ def no_library(name):
     raise OSError(name)
 
 
-class FakeLibrary:
-    """A library that tells a version, as LLVM 16 and later do."""
-
-    def __init__(self, major):
-        self.major = major
-
-    def LLVMGetVersion(self, major, minor, patch):
-        major._obj.value, minor._obj.value, patch._obj.value = self.major, 7, 9
-
-
 @pytest.mark.parametrize("library", NO_LLVM)
 def test_a_library_without_a_version_is_no_llvm(library, monkeypatch):
     assert llvm_version(library) == (0, 0, 0)
     monkeypatch.setenv(LLVM_VARIABLE, library)
     assert find_llvm() is None
     assert os.environ[LLVM_VARIABLE] == library, "the user's setting is left alone"
-
-
-@pytest.mark.parametrize(("major", "good"), [(15, False), (16, True), (23, True)])
-def test_the_version_decides(major, good, monkeypatch):
-    monkeypatch.setattr(ctypes, "CDLL", lambda name: FakeLibrary(major))
-    monkeypatch.setenv(LLVM_VARIABLE, "/some/libLLVM.so")
-    assert llvm_version("/some/libLLVM.so") == (major, 7, 9)
-    assert find_llvm() == ("/some/libLLVM.so" if good else None)
-    if good:
-        assert select_variant("cpu") == "llvm_ad_rgb"
-    else:
-        with pytest.raises(BackendError):
-            select_variant("cpu")
 
 
 @pytest.mark.skipif(not WITH_WHEEL, reason="the wheel is for Linux x86-64")
@@ -172,24 +149,3 @@ def test_a_drjit_imported_first_keeps_its_llvm(version, good, monkeypatch):
     else:
         with pytest.raises(BackendError):
             select_variant("cpu")
-
-
-def test_versions_before_and_after_drjit_is_imported(monkeypatch):
-    code = """
-import sys
-from scenegen.rendering.backend import VERSION_ATTRIBUTES, select_variant, versions
-select_variant("auto")
-before = versions()
-assert "drjit" not in sys.modules and "mitsuba" not in sys.modules
-import mitsuba, drjit
-assert before["mitsuba_version"] == mitsuba.__version__
-assert before["drjit_version"] == drjit.__version__
-assert versions() == before and tuple(before) == VERSION_ATTRIBUTES
-print(before["llvm_version"])
-"""
-    printed = subprocess.check_output([sys.executable, "-c", code], text=True).strip()
-    library = find_llvm()
-    assert printed == (".".join(map(str, llvm_version(library))) if library else "unknown")
-    monkeypatch.setattr(importlib.metadata, "version", no_package)
-    monkeypatch.setenv(LLVM_VARIABLE, "/nowhere/libLLVM.so")
-    assert set(backend.versions().values()) == {"unknown"}

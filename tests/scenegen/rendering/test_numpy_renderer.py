@@ -17,7 +17,6 @@ from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import objects_of
 from scenegen.rendering.numpy_renderer import render_in_numpy
 from scenegen.rendering.packing import pack
-from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.renderer import render
 
 FLOAT = DatasetSpec(image_dtype="float32", seed=11)
@@ -52,14 +51,6 @@ def test_whole_scenes_agree_with_another_engine(name, model_folder):
         spec = replace(preset_spec(name), image_dtype="float32", seed=11)
         objects = objects_of(spec)
     check_against_whole_scenes(spec, some_scenes(spec, objects, 4), objects)
-
-
-@pytest.mark.slow
-def test_a_hundred_whole_scenes_agree_with_another_engine(scenes_of):
-    spec = replace(FLOAT, seed=0, pose="any")
-    check_against_whole_scenes(spec, scenes_of(spec, 50))
-    spec = replace(FLOAT, seed=1, width=160, height=96, allow_cropped=True, objects=(1, 5))
-    check_against_whole_scenes(spec, scenes_of(spec, 50))
 
 
 def compare(ours, theirs):
@@ -133,19 +124,6 @@ def test_shadows_agree_and_are_there(scenes_of, embree_cast):
     expected = render_in_numpy(pack(replace(SMALL, shadows=True), scenes), embree_cast)
     wrong = abs(shadowed.image - expected.image).max(axis=-1) > 1e-3
     assert wrong.mean() < 2e-3, "but for some pixels on the shadows' borders"
-
-
-def test_samples_start_at_the_centre_and_cover_the_pixel():
-    assert sample_positions(1).tolist() == [[0.5, 0.5]]
-    many = sample_positions(256)
-    np.testing.assert_array_equal(many[:16], sample_positions(16))
-    cells = np.floor(many * 8).astype(int) @ [8, 1]
-    assert np.bincount(cells, minlength=64).min() >= 2, "four a cell on average"
-
-
-def test_supersampling_agrees_sample_by_sample(scenes_of, embree_cast):
-    batch = pack(replace(SMALL, spp=5), scenes_of(SMALL, 2))
-    compare(render(batch), render_in_numpy(batch, embree_cast))
 
 
 def test_supersampling_converges_and_leaves_the_truth_alone(scenes_of):

@@ -4,13 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from other_engines import near_silhouettes
-from scipy.spatial.transform import Rotation
 
 from scenegen.camera import Camera
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.rendering.numpy_renderer import render_in_numpy
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
 from scenegen.rendering.shading import shade
@@ -61,64 +58,6 @@ def test_a_light_below_the_surface_has_no_highlight_though_the_lobe_reaches_it()
     assert shine((-10.0, 0.1, 0.0), viewpoint, 5.0) == 0, "nor one behind the mirrored ray"
 
 
-def test_viewer_and_light_may_change_places():
-    """At one distance: r(v) . l = r(l) . v, so a highlight is as bright from either end."""
-    rng = np.random.default_rng(0)
-    for _ in range(50):
-        normal, a, b = rng.standard_normal((3, 3))
-        normal /= np.linalg.norm(normal)
-        a, b = (2 * x / np.linalg.norm(x) for x in (a, b))
-        a, b = (x * np.sign(x @ normal) for x in (a, b))
-        there, back = shine(a, b, 6.0, normal[None]), shine(b, a, 6.0, normal[None])
-        assert there == pytest.approx(back, rel=1e-9, abs=1e-15)
-
-
-def test_each_point_has_a_material_of_its_own_and_any_frame_will_do():
-    rng = np.random.default_rng(3)
-    points, normals = rng.standard_normal((2, 6, 7, 3))
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    lights, colors = rng.standard_normal((3, 3)) * 4, rng.random((3, 3))
-    specular, shininess = rng.random((6, 7)), rng.uniform(1, 50, (6, 7))
-    viewpoint = np.array([3.0, -2.0, 1.0])
-    together = shade(
-        points, normals, WHITE, lights, colors, DARK, K, specular, shininess, viewpoint
-    )
-    for at in np.ndindex(6, 7):
-        alone = shade(points[at], normals[at], WHITE, lights, colors, DARK, K, specular[at],
-                      shininess[at], viewpoint)  # fmt: skip
-        np.testing.assert_allclose(together[at], alone, rtol=1e-12)
-    turn = Rotation.random(rng=4).as_matrix()
-    moved = [x @ turn.T + [1.0, -2.0, 3.0] for x in (points, lights, viewpoint)]
-    there = shade(moved[0], normals @ turn.T, WHITE, moved[1], colors, DARK, K, specular,
-                  shininess, moved[2])  # fmt: skip
-    np.testing.assert_allclose(there, together, rtol=1e-9, atol=1e-13)
-
-
-def test_a_missed_pixel_is_shaded_without_a_warning():
-    """Without depth its point is where the camera is, and its normal is zero."""
-    found = shade(
-        ORIGIN, ORIGIN, WHITE, UP * 2, np.ones((1, 3)), np.full(3, 0.1), K, 1.0, 5.0, DARK
-    )
-    np.testing.assert_allclose(found, 0.1)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"spp": 3, "shadows": True},
-        *(pytest.param(change, marks=pytest.mark.slow) for change in ({}, {"shadows": True})),
-    ],
-    ids=str,
-)
-def test_highlights_agree_with_another_engine(change, scenes_of, embree_cast):
-    batch = pack(replace(GLOSSY, **change), scenes_of(GLOSSY, 4))
-    ours, theirs = render(batch), render_in_numpy(batch, embree_cast)
-    same = (ours.object_id == theirs.object_id) & ~near_silhouettes(ours.object_id)
-    assert same.mean() > 0.8
-    off = abs(ours.image - theirs.image).max(axis=-1)[same] > 1e-3
-    assert off.mean() < 3e-3, "but for the borders of shadows, and creases"
-
-
 @pytest.mark.parametrize("blocked", [False, True])
 def test_a_highlight_by_hand_and_in_the_shadow(blocked):
     """A box's top, seen and lit at 3-4-5 triangles from either side; a ball before the light."""
@@ -138,12 +77,3 @@ def test_a_highlight_by_hand_and_in_the_shadow(blocked):
     np.testing.assert_allclose(
         truth.image[0, 16, 16], 0.1 * rho if blocked else expected, rtol=1e-4
     )
-
-
-def test_a_glossy_image_is_the_same_in_every_batch(scenes_of):
-    """Matte neighbours change no bit either, as the spec says whether there is gloss."""
-    scenes = scenes_of(GLOSSY, 6)
-    dull = [replace(s, objects=tuple(replace(o, specular=0.0) for o in s.objects)) for s in scenes]
-    alone = [render(pack(GLOSSY, [scene])).image[0].tobytes() for scene in scenes]
-    mixed = render(pack(GLOSSY, [x for pair in zip(dull, scenes, strict=True) for x in pair])).image
-    assert [image.tobytes() for image in mixed[1::2]] == alone

@@ -9,7 +9,6 @@ ORIGIN = np.zeros((1, 3))
 UP = np.array([[0.0, 1.0, 0.0]])
 WHITE = np.ones(3)
 DARK = np.zeros(3)
-NO_LIGHT = np.zeros((0, 3))
 K = np.array([0.5, 0.25])
 
 
@@ -32,17 +31,3 @@ def test_cosine_and_distance_of_a_slanted_light():
 def test_light_from_behind_takes_nothing_away(normal, light):
     result = shade(ORIGIN, normal, WHITE, np.array([light]), np.ones((1, 3)), np.full(3, 0.1), K)
     np.testing.assert_allclose(result, 0.1)
-
-
-def test_lights_add_up():
-    rng = np.random.default_rng(1)
-    points, normals = rng.standard_normal((2, 4, 5, 3))
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    rho, lights, colors = rng.random((4, 5, 3)), rng.standard_normal((3, 3)) * 5, rng.random((3, 3))
-    one_by_one = sum(
-        shade(points, normals, rho, lights[j : j + 1], colors[j : j + 1], DARK, K) for j in range(3)
-    )
-    together = shade(points, normals, rho, lights, colors, DARK, K)
-    assert together.shape == (4, 5, 3)
-    assert together.max() > 0
-    np.testing.assert_allclose(together, one_by_one, atol=1e-14)

@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from scenegen.common.errors import PlacementError
-from scenegen.description.presets import preset_spec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import objects_of
 from scenegen.sampling import proposals
@@ -51,28 +50,6 @@ def test_an_item_gets_its_first_attempt_that_is_not_refused(ahead, batch, monkey
             if not refused(item, turn):
                 assert scene == expected
                 break
-
-
-def test_no_item_is_taken_at_or_after_the_end():
-    assert sorted(accepted(8, 110)) == [*range(100, 110)]
-
-
-def test_an_impossible_item_is_named_and_the_first_one(monkeypatch):
-    monkeypatch.setattr("scenegen.sampling.scenes.MAX_ATTEMPTS", 60)
-    spec = DatasetSpec(objects=(40, 40))
-    queue = ProposalQueue(spec, range(3000), objects_of(spec))
-    with pytest.raises(PlacementError) as refused:
-        queue.take(64, 3000)
-    assert refused.value.where == "item 0"
-
-
-def test_a_rare_item_of_a_preset_finds_its_place_in_the_end():
-    """Of the first 20,000 rooms of this preset and seed the one that needs most proposals."""
-    spec = preset_spec("shapenet", seed=1, object_split="train")
-    queue = ProposalQueue(spec, range(16775, 16776), objects_of(spec))
-    scenes = queue.take(1, 16776)
-    assert scenes is not None
-    assert scenes.index.tolist() == [16775]
 
 
 def test_an_item_that_is_always_refused_ends_the_run():

@@ -50,13 +50,6 @@ def test_files_and_their_sha256(page, holey_set, float_path):
     assert page.count("| shard of set.h5 |") == 3
 
 
-def test_the_request_and_command_are_there_to_be_copied(page, holey_set):
-    with open_rooms(holey_set) as rooms:
-        spec = rooms.attributes["spec"]
-        assert f"| set.h5 | 14 | 7 | {rooms.spec.height}x" in page
-    assert f"    {spec}" in page.splitlines()
-
-
 def test_a_card_of_interiors_says_what_is_true_of_them(interior_path, rooms_path, tmp_path):
     page = make_card([interior_path], tmp_path / "README.md")
     wrong = ("scene units", "corner", "no gamma", "two walls")
@@ -86,20 +79,6 @@ def test_texts_from_files_and_people_stay_texts(damaged, tmp_path):
                 if tag in html]  # fmt: skip
     assert html.count("<h1>") == 1
     assert f"    {WICKED}".replace("\n", "\\n") in page.splitlines(), "a block, to be copied"
-
-
-def test_scenes_that_are_in_two_files_are_told(rooms_path, page, tmp_path):
-    assert "no scene is in two" in page
-    (tmp_path / "other.h5").write_bytes(rooms_path.read_bytes())
-    page = make_card([rooms_path, tmp_path / "other.h5"], tmp_path / "README.md")
-    assert "**8 scenes are in more than one file**" in page
-
-
-def test_one_name_twice(rooms_path, tmp_path):
-    (tmp_path / "rooms.h5").write_bytes(rooms_path.read_bytes())
-    with pytest.raises(SpecError) as error:
-        make_card([rooms_path, tmp_path / "rooms.h5"], tmp_path / "README.md")
-    assert error.value.where == "files"
 
 
 @pytest.mark.parametrize("several", [False, True])

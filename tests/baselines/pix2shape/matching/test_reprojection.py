@@ -70,15 +70,3 @@ def test_points_behind_the_other_camera_are_not_seen():
         assert bool(inside[0, 0, 31:33, 31:33].all()) is expected
         assert bool(inside.any()) is expected
         assert found.isfinite().all()
-
-
-def test_depths_are_tried_one_by_one():
-    _, depth = seen(POSES[0])
-    tried = np.stack([depth - 0.1, depth, depth + 0.2])
-    other = batched(np.moveaxis(seen(POSES[1])[0], -1, 0))
-    cameras = [Cameras(batched(camera.world_from_camera), FOV) for camera in POSES]
-    found, _, inside = reprojected(other, cameras[1], batched(tried), cameras[0])
-    for k, one in enumerate(tried):
-        alone, where = reprojection(one)
-        np.testing.assert_allclose(np.moveaxis(found[0, :, k].numpy(), 0, -1), alone, atol=1e-12)
-        np.testing.assert_array_equal(inside[0, k].numpy(), where)

@@ -82,21 +82,6 @@ def test_the_critics_step_teaches_critic_and_statistics_alone(weights, learn):
     assert set(numbers) == ({"distance", "penalty"} if "adversarial" in weights else set())
 
 
-def test_the_critics_total_is_penalty_less_distance_less_information():
-    """So that its step raises the other two, which the generator's step lowers."""
-    batch, noise = some_batch(), draw(8, 8, 3)
-    model = model_of(only(adversarial=1.0, mutual_information=0.1))
-    total, numbers = critic_step(model, batch, noise)
-    code = model.encode(batch.image, batch.views)
-    halves = code[:, :6], code[:, 6:]
-    information = functions.mutual_information(model.statistics, *halves, noise.order)
-    expected = numbers["penalty"] - numbers["distance"] - information
-    assert total.item() == pytest.approx(expected.item(), rel=1e-5)
-    losses = generator_step(model, batch, noise)[1]
-    assert losses["adversarial"].item() == pytest.approx(numbers["distance"].item(), rel=1e-5)
-    assert losses["mutual_information"].item() == pytest.approx(information.item(), rel=1e-5)
-
-
 def test_depth_supervision_ignores_what_is_not_known():
     model, batch = model_of(only(depth=1.0)), some_batch()
     batch.depth[0, :5] = math.nan
@@ -131,32 +116,6 @@ def test_questions_teach_the_scenes_part_of_the_code():
     assert losses["questions"].item() == pytest.approx(expected)
 
 
-def test_questions_of_unknown_answers_are_contrasted_alone():
-    model = model_of(only(questions=1.0, contrast=1.0))
-    images, _ = labelled()
-    codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
-    for answers in ([-1, -1], [-1, 1], [2, 0]):
-        told = torch.tensor(answers)
-        losses = generator_step(model, some_batch(), draw(8, 8, 3), (images, told))[1]
-        expected = functions.contrast_loss(codes, told).item()
-        assert losses["contrast"].item() == pytest.approx(expected)
-        known = told >= 0
-        assert ("questions" in losses) == bool(known.any())
-        if known.any():
-            expected = functions.question_loss(codes[known], told[known]).item()
-            assert losses["questions"].item() == pytest.approx(expected)
-
-
-def test_contrast_has_the_configurations_temperature_and_negatives():
-    config = replace(only(contrast=1.0), temperature=0.7, hard_negatives=0.3, easy_negatives=0.4)
-    model, (images, answers) = model_of(config), labelled()
-    codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
-    found = generator_step(model, some_batch(), draw(8, 8, 3), (images, answers))[1]["contrast"]
-    expected = functions.contrast_loss(codes, answers, 0.7, 0.3, 0.4).item()
-    assert found.item() == pytest.approx(expected)
-    assert expected != pytest.approx(functions.contrast_loss(codes, answers).item(), rel=1e-2)
-
-
 def facing_the_origin(place: Any) -> Any:
     """Return cameras at places (B, 3), upright, that look at the origin: world_from_camera."""
     back = torch.nn.functional.normalize(place, dim=1)
@@ -187,17 +146,6 @@ def test_matching_compares_relief_in_one_view_of_each_scene():
     assert losses["matching"].item() == pytest.approx(expected.item(), rel=1e-5)
     total.backward()
     assert model.encoder.layers[0].weight.grad.any()
-
-
-@pytest.mark.parametrize(
-    ("absolute", "loss"), [(0, functions.reconstruction_loss), (1, functions.absolute_loss)]
-)
-def test_images_are_compared_by_the_norm_or_by_absolute_differences(absolute, loss):
-    batch = some_batch()
-    model = model_of(replace(only(reconstruction=1.0), absolute_differences=bool(absolute)))
-    found = generator_step(model, batch, draw(8, 8, 3))[1]["reconstruction"]
-    again = model.image(model.encode(batch.image, batch.views), batch.views)
-    assert found.item() == pytest.approx(loss(batch.image, again).item(), rel=1e-5)
 
 
 def test_noise_is_the_seeds():

@@ -4,7 +4,6 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -73,39 +72,6 @@ def test_equal_files_in_two_splits_are_an_error(run, refuses, root):
         refuses(*command, "--object-split", split, words=("d.off", "two splits"))
 
 
-def test_exit_codes(run, refuses, root):
-    """1 where no model can be used, 2 where the request makes no sense."""
-    (root / "bad").mkdir()
-    (root / "bad" / "x.stl").write_text("solid")
-    assert run("check-objects", root, "--classes", "bad").exit_code == 1
-    refuses("check-objects", "nothing", words=("nothing",))
-    refuses("check-objects", root, "--classes", "mug", words=("mug", "bad, box, caf\u00e9"))
-
-
-@pytest.mark.parametrize("inside", ["model.obj", "models/model_normalized.obj"])
-def test_a_shapenet_model_without_a_file_is_refused(run, root, tmp_path, inside):
-    for model_id in ("1a", "2b"):
-        path = tmp_path / "net" / "03797390" / model_id / inside
-        path.parent.mkdir(parents=True)
-        path.write_text(BOX.export(file_type="obj"))
-    (tmp_path / "net" / "03797390" / "3c").mkdir()
-    result = run("check-objects", "net")
-    assert result.exit_code == 0
-    assert result.stdout.splitlines()[1].split() == ["mug", "3", "2", "0", "1", "24"]
-    assert "refused  mug/3c: " in result.stdout
-
-
-def test_jobs_give_what_one_gives(root, tmp_path):
-    folder, ticks = open_objects(root), []
-    alone = check_models(folder, None, 1, ticks.append)
-    together = check_models(folder, tmp_path / "cache", 2, ticks.append)
-    assert ticks == [1] * 14
-    assert [replace(r, seconds=0) for r in alone] == [replace(r, seconds=0) for r in together]
-    assert [r.name for r in alone] == [f.name for c in folder.classes for f in folder.models[c]]
-    assert all(r.ok == (not r.reason) for r in alone)
-    assert [r.was_mended for r in alone] == [r.name == "box/double" for r in alone]
-
-
 def deadly(up, cache_dir, file):
     if file.name == "box/1":
         os._exit(1)
@@ -148,9 +114,3 @@ os.execv(sys.executable, [sys.executable, "-c", "import cli; cli.scenegen()", *s
     assert "Permission denied" in done.stdout
     assert done.stderr.startswith(f"note: {cache}: ")
     assert done.stderr.count("\n") == 1
-
-
-def test_seams_and_unused_vertices_do_not_count_as_mended():
-    harmless = {"merged_vertices": 9, "unused_vertices": 9}
-    assert not ModelCheck("a/b", True, "", 1, harmless).was_mended
-    assert ModelCheck("a/b", True, "", 1, {"degenerate_faces": 1}).was_mended

@@ -6,9 +6,7 @@ import trimesh
 from PIL import Image
 
 from scenegen import DatasetSpec, open_rooms
-from scenegen.common.errors import SpecError
 from scenegen.objects.meshes.colors import corner_colors
-from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.sources import object_source
 from scenegen.rooms.make import make_dataset
 from tests.support.verified import checks_of
@@ -75,12 +73,6 @@ def test_vertex_colours_of_ply_are_srgb(up):
     np.testing.assert_allclose(colors, np.where(top[..., None], linear, 0) * np.ones(3), atol=1e-5)
 
 
-def test_without_colours_all_are_one():
-    assert (of(trimesh.creation.icosphere(1), ".stl")[1] == 1).all()
-    with pytest.raises(BadMeshError):
-        corner_colors(b"glTF", ".glb", "y", np.eye(3), np.array([[0, 1, 2]]))
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     root = tmp_path_factory.mktemp("objects")
@@ -126,11 +118,3 @@ def test_colours_are_blended_between_the_corners(tmp_path):
             on = room.object_id > 0
             place = room.truth["object_coordinates"][on] * radius / extents
             np.testing.assert_allclose(room.truth["albedo"][on], 0.8 * (place + 0.5), atol=1e-4)
-
-
-def test_refused_where_there_are_no_files():
-    folder = {"source": "folder", "shapes": ("box",)}
-    for settings in ({}, {**folder, "shading": "path"}, {**folder, "random_reflectance": True}):
-        with pytest.raises(SpecError) as error:
-            DatasetSpec(own_reflectance=True, **settings)
-        assert error.value.where == "own reflectance"

@@ -75,12 +75,6 @@ def test_kinds_that_the_folder_lacks_are_drawn(folder):
     assert material("fabric", rng, room, served).metres < 0.6
 
 
-def test_large_maps_are_reduced(tmp_path):
-    save(tmp_path / "Fabric001_4K_Color.png", (9, 9, 9), 4096)
-    made = read_maps(from_folder(tmp_path)["fabric"][0])
-    assert made.base_color.shape == (1024, 1024, 3)
-
-
 def without_colours(root):
     save(root / "Wood01_1K_Roughness.png", (9, 9, 9))
 
@@ -160,8 +154,3 @@ def test_maps_that_are_cut_short_are_refused_before_they_are_used(tmp_path, endi
     (tmp_path / f"Wood01_1K_Color.{ending}").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(FileFormatError):
         check_maps(from_folder(tmp_path))
-
-
-def test_a_folder_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(SpecError):
-        from_folder(tmp_path / "none")

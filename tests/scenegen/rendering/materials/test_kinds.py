@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from scenegen.common.errors import SpecError
-from scenegen.objects.furniture.furnishing import FAMILIES_FACTS, WHOLE, furnishing
+from scenegen.objects.furniture.furnishing import WHOLE
 from scenegen.rendering.materials.kinds import KINDS, material
 from scenegen.rendering.materials.material import SLOPE_STEPS, Material, slopes_of
 from scenegen.rendering.materials.palettes import palette
@@ -69,39 +68,6 @@ def test_maps_repeat_without_seams(kind):
                 steps = np.abs(np.diff(values, axis=axis, append=values.take([0], axis)))
                 steps = steps.mean(axis=1 - axis).reshape(values.shape[axis], -1).mean(axis=1)
                 assert steps[-1] <= 1.5 * np.quantile(steps, 0.995) + 1e-6
-
-
-@EVERY
-def test_the_same_stream_draws_the_same_material(kind):
-    first, second = drawn(kind, 3), drawn(kind, 3)
-    np.testing.assert_array_equal(first.base_color, second.base_color)
-    np.testing.assert_array_equal(first.roughness, second.roughness)
-
-
-@pytest.mark.parametrize("kind", ["wood", "fabric", "floor", "wall", "picture", "rug", "print"])
-def test_streams_and_palettes_make_a_difference(kind):
-    means = {tuple(np.round(np.mean(color_map(drawn(kind, s)), axis=(0, 1)), 3)) for s in range(8)}
-    assert len(means) > 5
-
-
-def test_rooms_keep_to_their_palette():
-    room = palette(np.random.default_rng(5))
-    for seed in range(4):
-        wall = material("wall", np.random.default_rng(seed), room)
-        mean = color_map(wall).mean(axis=(0, 1))
-        np.testing.assert_allclose(mean, room.walls[0], rtol=0.2)
-
-
-def test_every_part_of_every_family_has_a_material():
-    kinds = {k for f in FAMILIES_FACTS for n in range(8) for k in furnishing(f, n).materials}
-    assert kinds <= set(KINDS)
-    assert len(kinds) > 20
-
-
-def test_unknown_kinds_are_refused():
-    with pytest.raises(SpecError) as error:
-        drawn("mahogany", 0)
-    assert error.value.where == "material"
 
 
 def test_texels_hold_colours_and_roughness():

@@ -1,7 +1,5 @@
 """Images of models: the same bits in any batch, and agreement with Embree."""
 
-from dataclasses import replace
-
 import pytest
 from model_rooms import FAMILIES, folder_objects, folder_spec, some_scenes
 from other_engines import bits
@@ -10,7 +8,7 @@ from scenegen.common.errors import BackendError
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import objects_of
 from scenegen.rendering import renderer
-from scenegen.rendering.packing import SceneBatch, pack
+from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import parts, render
 
 
@@ -31,23 +29,6 @@ def test_an_image_is_the_same_alone_and_in_any_company(source, model_folder):
     assert source == "folder" or len(pack(spec, scenes, objects=objects).names) > 30
     assert all_bits(spec, scenes, objects)[::5] == alone
     assert all_bits(spec, some[::-1], objects) == alone[::-1]
-
-
-@pytest.mark.slow
-def test_hundreds_of_other_models_change_no_bit():
-    """At the far end of a lattice of 7 x 7 x 7, and at its beginning."""
-    spec = replace(FAMILIES, objects=(0, 100))
-    objects = objects_of(spec)
-    (scene,) = some_scenes(FAMILIES, objects, 1)
-    first, last = (
-        replace(scene, objects=(replace(scene.objects[0], shape=name),))
-        for name in ("bag/0007", "table/0007")
-    )
-    alone = [all_bits(spec, [one], objects)[0] for one in (first, last)]
-    bowls = [replace(scene.objects[0], shape=f"bowl/{i:04d}") for i in range(300)]
-    crowds = [replace(scene, objects=tuple(bowls[i : i + 100])) for i in (0, 100, 200)]
-    together = render(pack(spec, [*crowds, first, last]))
-    assert [bits(together, row) for row in (3, 4)] == alone
 
 
 @pytest.mark.parametrize(
@@ -93,13 +74,3 @@ def test_path_tracing_is_refused_where_only_the_slow_path_is(scenes_of, monkeypa
     with pytest.raises(BackendError) as refused:
         renderer.trace(batch, ["image"])
     assert refused.value.where == "shading path"
-
-
-def test_rows_with_every_slot_used_and_with_none():
-    spec = replace(FAMILIES, objects=(0, 2))
-    (scene,) = some_scenes(replace(FAMILIES, objects=(2, 2)), objects_of(FAMILIES), 1)
-    batch: SceneBatch = pack(spec, [scene, replace(scene, objects=())])
-    assert batch.rows(slice(0, 1)).shape.min() == 0
-    empty = batch.rows([1])
-    assert (empty.names, empty.shape.tolist()) == ((), [[-1, -1]])
-    assert bits(render(empty), 0) == bits(render(batch), 1)

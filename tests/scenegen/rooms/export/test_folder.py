@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from PIL import Image
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
 from scenegen.objects.basic_shapes import unit_shape
-from scenegen.rooms.export.bop import diameter
 from scenegen.rooms.export.encoding import Encoding
 from scenegen.rooms.export.folder import CONVENTIONS, export_folder
 from scenegen.rooms.export.formats import FOLDER_FORMATS
@@ -160,22 +158,6 @@ def test_colmap_text_by_hand(path, out):
     assert several > 500, "points are seen from two views"
 
 
-def test_colmap_by_pycolmap(path, out):
-    pycolmap = pytest.importorskip("pycolmap")
-    rooms = shown(path)
-    for folder in sorted(out("colmap").glob("scene-*")):
-        model = pycolmap.Reconstruction(str(folder / "sparse/0"))
-        cameras = {k: camera.calibration_matrix() for k, camera in model.cameras.items()}
-        points = {k: point.xyz for k, point in model.points3D.items()}
-        images = []
-        for image in model.images.values():
-            pose = image.cam_from_world().matrix()
-            observed = [(*p.xy, p.point3D_id) for p in image.points2D]
-            images.append((image.name, (pose[:, :3], pose[:, 3]), image.camera_id, observed))
-        check_colmap(cameras, images, points, rooms)
-        assert model.compute_mean_reprojection_error() < 1e-3
-
-
 @pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 def test_coco_by_pycocotools(path, out, capsys):
     coco_api = pytest.importorskip("pycocotools.coco")
@@ -255,14 +237,6 @@ def test_bop(path, out):
     )
 
 
-def test_diameter_is_the_largest_of_all_distances():
-    rng = np.random.default_rng(0)
-    for shape in ((1, 1, 1), (1, 0.2, 0.1)):
-        points = rng.normal(size=(300, 3)) * shape
-        every = np.linalg.norm(points[:, None] - points, axis=-1)
-        assert diameter(points) == every.max()
-
-
 @pytest.mark.parametrize("source", ["shapes", pytest.param("families", marks=pytest.mark.slow)])
 def test_bop_counts_what_lies_beyond_the_edge(source, make_rooms, tmp_path):
     """As BOP's scripts do, from the exported folder alone: ray casts on three by three images."""
@@ -302,18 +276,6 @@ def test_bop_counts_what_lies_beyond_the_edge(source, make_rooms, tmp_path):
     listed = json.loads((tmp_path / "out/test_targets_bop19.json").read_text())
     assert {(t["scene_id"], t["obj_id"]): t["inst_count"] for t in listed} == targets
     assert cropped > 5
-
-
-def test_what_is_hidden_has_no_annotation_of_coco(make_rooms, tmp_path):
-    make_rooms(tmp_path / "x.h5", 30, seed=1, objects=(3, 3), shapes=FLAT, height=24, width=24,
-               min_visible_pixels=0, allow_cropped=True)  # fmt: skip
-    with open_rooms(tmp_path / "x.h5") as rooms:
-        shown = sum(len(set(room.object_id.flat) - {-1, 0}) for room in rooms)
-        assert shown < 3 * len(rooms)
-        export_folder(rooms, "coco", tmp_path / "out")
-    listed = json.loads((tmp_path / "out/annotations.json").read_text())["annotations"]
-    assert len(listed) == shown
-    assert all(item["area"] > 0 < min(item["bbox"][2:]) for item in listed)
 
 
 def test_moge(path, out):
@@ -396,10 +358,3 @@ def test_what_does_not_fit_is_refused_and_nothing_is_left(form, path, tmp_path):
             with pytest.raises(SpecError):
                 export_folder(rooms, form, tmp_path / "out", rows)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_command(run, path):
-    result = run("export", path, "--format", "coco", "--items", "0-2")
-    assert result.exit_code == 0
-    about = json.loads(Path("x-coco/annotations.json").read_text())
-    assert [image["id"] for image in about["images"]] == [0, 1, 2]

@@ -1,32 +1,13 @@
 """The records of formats: their writers are there, the docs list them, and no other is written."""
 
-import re
-from pathlib import Path
-
 import pytest
 
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
 from scenegen.rooms.export.folder import export_folder
-from scenegen.rooms.export.formats import DATA_FORMATS, FOLDER_FORMATS, FORMATS, ROW_FORMATS
 from scenegen.rooms.export.single import export_paths, export_room
 from scenegen.sharing.export import write_export
 from scenegen.sharing.rooms import ROOMS
-
-DOCS = Path(__file__).parents[4] / "docs"
-
-
-@pytest.mark.parametrize("form", FORMATS.values(), ids=lambda form: form.name)
-def test_each_has_a_writer(form):
-    assert callable(form.load_writer())
-
-
-def test_the_docs_have_a_row_or_column_of_each():
-    page = (DOCS / "export.md").read_text()
-    rows = re.findall(r"^\| `(\w+)`(?:, with `\w+`)? \|", page, re.MULTILINE)
-    assert rows == [*ROW_FORMATS, *FOLDER_FORMATS]
-    columns = [f"`{name}`" for name in DATA_FORMATS]
-    assert f"| | {' | '.join(columns)} |" in (DOCS / "sharing.md").read_text()
 
 
 def test_others_are_refused(rooms_path, tmp_path):
