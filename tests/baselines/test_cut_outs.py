@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from baselines.cut_outs import LEARNING, LIFT, NAMES, blob_balls, outline_features, write_cut_outs
+from baselines.cut_outs import LEARNING, LIFT, NAMES, blob_balls, write_cut_outs
 from baselines.picture import outline_mask
 from metrics.measures.relief import empty_room
 from metrics.scoring.evaluate import score
@@ -77,16 +77,6 @@ def test_a_ball_takes_the_place_of_its_blob():
     assert -ball[2] == pytest.approx(middle)
     assert ball[:3] / -ball[2] == pytest.approx(centre / 1.9, abs=0.01)
     assert ball[3] / -ball[2] == pytest.approx(0.12 / 1.9, rel=0.03)
-
-
-def test_features_of_an_outline_by_hand():
-    mask = np.zeros((10, 10), bool)
-    mask[2:6, 3:5] = True
-    found = outline_features(mask, np.full((10, 10), 2.0))
-    assert found.shape == (8, 12)
-    first = [np.sqrt(8) / 10, 0.4, 0.2, 0.1, 1.0, 0.5, 0.0, 0.4, 2.0, 2.0, 2.0, 0.2]
-    assert found[0] == pytest.approx(first)
-    assert found[-1, [6, 7]] == pytest.approx([0.75, 0.1])
 
 
 @pytest.mark.parametrize(

@@ -66,16 +66,3 @@ def test_the_nearest_scene_is_the_answer(answerer, truths, tmp_path):
     assert done == [(1, 6)] * 6
     assert [p for p in validate(tmp_path / "a.h5") if not p.is_hint] == []
     assert score([tmp_path / "a.h5"]).method == "pix2shape"
-
-
-def test_the_view_has_no_say(answerer, truths, tmp_path):
-    before = answered(answerer, truths.iqtt, tmp_path / "a.h5")
-    spec = answerer.config.networks
-    assert spec.z_view == 10
-    with torch.no_grad():
-        answerer.encoder.last.weight[spec.z_scene :] *= 100
-    after = answered(answerer, truths.iqtt, tmp_path / "a.h5")
-    np.testing.assert_array_equal(after[1], before[1])
-    with torch.no_grad():
-        answerer.encoder.last.weight[: spec.z_scene] *= 2
-    assert not np.array_equal(answered(answerer, truths.iqtt, tmp_path / "a.h5")[1], before[1])

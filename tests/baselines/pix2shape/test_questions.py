@@ -102,23 +102,3 @@ def test_files_without_lights_are_refused(folder, tmp_path):
                 call(path, None, TINY)
     with refused(SpecError, "networks"):
         question_source(folder / "iqtt-val.h5", None, tiny())
-
-
-def test_the_configuration_for_questions(train_path):
-    plain = tiny(classes=7, camera=False, batch=12, seed=9)
-    config = suited(plain, train_path)
-    spec = config.networks
-    assert (spec.camera, spec.classes, spec.z_view, spec.z) == (False, 0, 10, plain.networks.z)
-    assert (spec.size, spec.width, config.batch, config.seed) == (32, 0.05, 12, 9)
-    assert config.opacity
-    distance = 64 / 62 * SPEC.max_radius / math.sin(math.radians(SPEC.fov_degrees) / 2)
-    assert config.depth_middle == pytest.approx(distance)
-    assert config.depth_reach == pytest.approx(SPEC.max_radius / config.depth_middle)
-    with h5py.File(train_path) as file:
-        depth = file["truth/unlabeled/depth"][:] * scales(file)[:, None, None, None]
-        depth /= config.depth_middle
-    assert 1 - config.depth_reach < np.nanmin(depth) < np.nanmax(depth) < 1 + config.depth_reach
-    for change in ({"z_scene": 10}, {"z_view": 32}):
-        with pytest.raises(SpecError) as error:
-            suited(tiny(**change), train_path, "labeled")
-        assert error.value.where.replace(" ", "_") in change

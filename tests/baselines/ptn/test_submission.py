@@ -6,8 +6,6 @@ from ptn_models import tiny, volume_of, voxel_centres
 
 from baselines.ptn.rooms import RoomImages
 from baselines.ptn.submission import seen
-from iqtt.files.make import make_split
-from iqtt.questions.specs import SplitSpec
 from metrics.measures.relief import empty_room
 from scenegen.rooms.reader import RoomsFile
 
@@ -37,11 +35,3 @@ def test_a_true_volume_gives_the_truths_depth_and_normals_in_every_view(make_roo
                 cosine = (normal * room.normal).sum(axis=-1)[both]
                 assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 8
                 assert depth[~inside] == pytest.approx(room.depth[~inside], abs=0.2)
-
-
-@pytest.fixture(scope="module")
-def questions(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("ptn") / "split"
-    spec = SplitSpec(train=6, labeled=4, val=0, test=3, height=32, width=32, min_cube_pixels=0)
-    make_split(folder, spec)
-    return folder

@@ -1,10 +1,7 @@
 """Real processes whose streams are closed, full, a terminal, or read by someone who goes away."""
 
-import os
-import pty
 import subprocess
 import sys
-import termios
 
 import pytest
 
@@ -84,26 +81,3 @@ with robust_streams():
     told = done.stdout.split(b".")
     assert len(told) > 1000
     assert len(set(told)) == len(told)
-
-
-def test_a_terminal_obeys_progress_bars_alone(tmp_path):
-    """Both streams are one terminal, as at a desk."""
-    ours, theirs = pty.openpty()
-    termios.tcsetwinsize(theirs, (24, 80))
-    code = COMMAND.replace("20_000", "2")
-    process = subprocess.Popen(
-        [sys.executable, "-c", code, "score"], cwd=tmp_path, stdout=theirs, stderr=theirs
-    )
-    os.close(theirs)
-    shown = b""
-    try:
-        while block := os.read(ours, 4096):
-            shown += block
-    except OSError:  # Linux: the other end is closed
-        pass
-    os.close(ours)
-    assert process.wait() == 3
-    assert b"0/2" in shown
-    assert b"\r" in shown.split(b"line 0")[0]
-    assert rb"line 1 \x1b[2J \u202e" in shown
-    assert b"\x1b[2J" not in shown

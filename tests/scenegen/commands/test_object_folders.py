@@ -102,21 +102,3 @@ def test_a_folder_whose_files_have_changed_is_noticed(run: Run, meshes: Path) ->
     verified = run("verify", "rooms.h5", "--items", 0, *told)
     assert verified.exit_code == 1
     assert "made from other files than the folder's" in verified.stdout
-
-
-def test_folder_options_that_contradict_one_another_are_refused(
-    run: Run, refuses: Callable[..., str], meshes: Path, shapenet: Path
-) -> None:
-    """As `render` refuses them; the file itself could be read with the first option alone."""
-    for root, more, words in (
-        (("--shapenet-root", shapenet), ("--up", "z"), ("up: found 'z'", "--shapenet-root")),
-        (("--shapenet-root", shapenet), ("--objects-root", meshes), ("expected one of them",)),
-        (("--objects-root", meshes), ("--shapenet-root", shapenet), ("expected one of them",)),
-        ((), ("--up", "z"), ("up: found 'z'", "--objects-root")),
-    ):
-        render(run, *(root or ("--objects-root", meshes)), "--overwrite", count=1)
-        options = (*root, "--cache-dir", "cache", *more)
-        refuses("verify", "rooms.h5", *options, words=words)
-        for form in ("obj", "exr"):
-            how = ("--items", 0, "--format", form)
-            refuses("export", "rooms.h5", *how, *options, words=words)

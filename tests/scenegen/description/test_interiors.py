@@ -1,24 +1,13 @@
 """Settings of closed rooms, and the description of one."""
 
 import json
-from dataclasses import fields
 
 import pytest
 
 from scenegen.common.errors import SpecError
 from scenegen.description.interiors import Interior, Opening
 from scenegen.description.presets import PRESETS, preset_spec
-from scenegen.description.specs import DatasetSpec, InteriorSpec, request_from_json
-
-OTHER = {
-    "object_radius": (0.1, 0.2), "pose": "any", "lights": (1, 1), "shadows": True,
-    "allow_cropped": True, "camera_radius": 2.0, "camera_target": (0.2, 0.2, 0.2),
-    "light_radius": 3.0, "light_level": 0.5, "ambient": (0.2,) * 3, "attenuation": (1.0, 0.5),
-    "light_saturation": 0.1, "reflectance": (0.5,) * 3, "room_reflectance": (0.5,) * 3,
-    "random_reflectance": True, "specular": (0.1, 0.2), "shininess": (2.0, 3.0),
-    "own_reflectance": True,
-}  # fmt: skip
-
+from scenegen.description.specs import DatasetSpec, request_from_json
 
 NAMES_OF_1_0 = [
     "allow_cropped", "ambient", "attenuation", "camera_radius", "camera_target",
@@ -31,16 +20,6 @@ NAMES_OF_1_0 = [
 CHANGED = [
     "fov_degrees", "height", "min_visible_pixels", "objects", "shapes", "source", "spp", "width",
 ]  # fmt: skip
-
-
-@pytest.mark.parametrize("name", OTHER)
-def test_settings_of_the_papers_room_are_refused(name):
-    of_paper, of_interiors = (
-        {row.name for row in fields(kind)} for kind in (DatasetSpec, InteriorSpec)
-    )
-    assert OTHER.keys() == of_paper - of_interiors - {"shading"}
-    with pytest.raises(SpecError):
-        preset_spec("interiors", **{name: OTHER[name]})
 
 
 @pytest.mark.parametrize(

@@ -88,24 +88,6 @@ def test_ranges_of_rooms(float_path):
     assert float(size) * {"kB": 1e3, "MB": 1e6}[unit] == pytest.approx(texts, abs=60)
 
 
-def test_where_the_answers_are(split, released, tmp_path):
-    text = of_questions.describe(split / "iqtt-test.h5")
-    assert value(text, "answers") == "in iqtt-test-answers.h5"
-    assert not re.search("distractors|angle|cubes", text.split(" questions of ")[1])
-    known = of_questions.describe(split / "iqtt-test-answers.h5")
-    assert (value(known, "seed"), value(known, "command")) == ("5", "tests")
-    assert value(known, "fingerprint") == value(text, "fingerprint")
-    assert not re.search(r"^ +radiance ", known, re.MULTILINE)
-    path = released("a.h5", {"labeled": (2, [2, 0]), "unlabeled": (6, None)})
-    text = of_questions.describe(path)
-    assert value(text, "answers") == "to 2 of them (25.0%)"
-    assert "fingerprint" not in text
-    assert "over 6 questions" in text
-    empty = released("b.h5", {"labeled": (0, np.zeros(0, int)), "unlabeled": (1, None)})
-    assert value(of_questions.describe(empty), "answers") == "none"
-    assert ": 0 questions, " in of_questions.describe(released("c.h5", {"": (0, None)}))
-
-
 def test_unknown_pixels_do_not_spoil_the_ranges(damaged):
     def edit(file):
         file["depth"][0, :4] = np.nan

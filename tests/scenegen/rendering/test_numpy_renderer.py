@@ -99,33 +99,6 @@ def test_normals_face_the_viewer_inside_open_shapes_too(embree_cast):
     assert (abs(truth.normal[0] - expected).max(axis=-1)[inside] < 1e-3).mean() > 0.95
 
 
-def test_scenes_without_a_room_agree_and_show_their_background(scenes_of, embree_cast):
-    sky = (0.2, 0.3, 0.4)
-    floating = [
-        replace(scene, room_reflectance=None, background=sky) for scene in scenes_of(SMALL, 4)
-    ]
-    batch = pack(replace(SMALL, shadows=True), floating)
-    truth = render(batch)
-    compare(truth, render_in_numpy(batch, embree_cast))
-    missed = truth.object_id == -1
-    assert set(np.unique(truth.object_id)) == {-1, 1, 2, 3}
-    assert np.isnan(truth.depth[missed]).all()
-    assert not truth.normal[missed].any()
-    np.testing.assert_array_equal(truth.image[missed], np.float32(sky) * np.ones((missed.sum(), 1)))
-
-
-def test_shadows_agree_and_are_there(scenes_of, embree_cast):
-    scenes = scenes_of(SMALL, 5)
-    lit, shadowed = (render(pack(replace(SMALL, shadows=s), scenes)) for s in (False, True))
-    dark = (lit.image - shadowed.image).max(axis=-1) > 0.01
-    assert dark.mean() > 0.01
-    assert (shadowed.image <= lit.image).all()
-    assert lit.depth.tobytes() == shadowed.depth.tobytes()
-    expected = render_in_numpy(pack(replace(SMALL, shadows=True), scenes), embree_cast)
-    wrong = abs(shadowed.image - expected.image).max(axis=-1) > 1e-3
-    assert wrong.mean() < 2e-3, "but for some pixels on the shadows' borders"
-
-
 def test_supersampling_converges_and_leaves_the_truth_alone(scenes_of):
     """To the mean of 8 x 8 pixels of an image eight times as large."""
     spec = replace(SMALL, height=32, width=48)

@@ -115,18 +115,6 @@ def test_walls_block_light_from_behind(variant):
     assert (image == 0).all()
 
 
-def test_noise_of_neighbours_is_independent(variant):
-    side = 192
-    room = replace(OPEN, objects=(), room_reflectance=(0.7,) * 3, ambient=(0.3,) * 3)
-    spec = replace(PATH, height=side, width=side, objects=(0, 0), lights=(1, 1), spp=16)
-    a, b = (render(pack(replace(spec, seed=s), [room])).image[0] for s in (1, 2))
-    found = (a - b).mean(axis=-1) / np.maximum(a + b, 1e-3).mean(axis=-1)
-    assert found.std() > 1e-3
-    for lag in (1, 2, 3, 4):
-        for ahead, behind in ((found[:, lag:], found[:, :-lag]), (found[lag:], found[:-lag])):
-            assert abs(np.corrcoef(ahead.ravel(), behind.ravel())[0, 1]) < 0.02
-
-
 def test_it_is_the_picture_of_mitsubas_own_path_tracer(variant):
     """Of a room with a ball and a box, from Mitsuba's shapes, lights, materials and integrator."""
     import mitsuba as mi

@@ -123,46 +123,22 @@ def nudged(name, by):
     return values(name, lambda array: array + array.dtype.type(by))
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        None,
-        "Mitsuba",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("release", "variant")),
-    ],
-)
+@pytest.mark.parametrize("other", [None, "Mitsuba", "release", "variant"])
 @pytest.mark.parametrize(
     ("edit", "alike"),
-    [
-        (lambda file: None, True),
-        (nudged("depth", 5e-5), True),
-        (put("depth", (2, 7, 9), 1.9), False),
-        (nudged("depth", 1e-2), False),
-        (nudged("normal", 5e-4), True),
-        (nudged("normal", 5e-3), False),
-        (nudged("image", 1), True),
-        (nudged("image", 3), False),
-        (put("object_id", (2, 7, 9), 3), False),
-        (at_edge, True),
-        (put("object_id", (2, 7, slice(9, 13)), 3), False),
-    ],
-    ids=["as rendered", "depth 5e-5", "one depth", "depth 1e-2", "normal 5e-4", "normal 5e-3",
-         "image 1",
-         "image 3", "one id", "one id at an edge", "four ids"],
-)  # fmt: skip
+    [(nudged("depth", 5e-5), True), (at_edge, True), (put("object_id", (2, 7, 9), 3), False)],
+    ids=["depth 5e-5", "one id at an edge", "one id"],
+)
 def test_other_versions_are_told_and_compared_within_a_tolerance(damaged, other, edit, alike):
     """With the same versions a single bit counts."""
     attributes = OTHERS.get(other, {})
 
     def spoil(file):
-        before = {name: file[name][:] for name in ("image", "depth", "normal", "object_id")}
         edit(file)
-        spoil.changed = any((before[name] != file[name][:]).any() for name in before)
         file.attrs.update(attributes)
 
-    path = damaged(spoil)
-    again = {check.name: check for check in checks_of(path, 3)}["rendered again"]
-    assert again.ok == (alike if attributes else not spoil.changed), again.detail
+    again = {check.name: check for check in checks_of(damaged(spoil), 3)}["rendered again"]
+    assert again.ok == (bool(attributes) and alike), again.detail
     for name, value in attributes.items():
         assert f"{name} {value}" in again.detail
 
@@ -432,6 +408,23 @@ def test_images_agree_in_their_floats_and_path_traced_ones_in_their_means(how, f
     again = np.full_like(noise, 0.5) if how.get("shading") else noise
     stored, none = (factor * noise).astype(noise.dtype), np.zeros((64, 64), bool)
     assert _within_tolerance("image", stored, again, none, spec) == within
+
+
+@pytest.mark.parametrize(
+    ("name", "by", "within"),
+    [
+        ("depth", 5e-5, True),
+        ("depth", 1e-2, False),
+        ("normal", 5e-4, True),
+        ("normal", 5e-3, False),
+        ("image", 1, True),
+        ("image", 3, False),
+        ("object_id", 1, False),
+    ],
+)
+def test_tolerances_of_pixels(name, by, within):
+    again, none = np.ones((64, 64)), np.zeros((64, 64), bool)
+    assert _within_tolerance(name, again + by, again, none, DatasetSpec()) == within
 
 
 @pytest.mark.parametrize(("pixels", "within"), [(0, True), (2, True), (20, False)])

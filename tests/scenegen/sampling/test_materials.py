@@ -63,8 +63,3 @@ def test_specular_and_shininess_are_uniform_in_their_ranges_and_independent():
     assert kstest(found[:, 0], "uniform", (0.2, 0.4)).pvalue > 0.01
     assert kstest(found[:, 1], "uniform", (5, 40)).pvalue > 0.01
     assert abs(np.corrcoef(found.T)[0, 1]) < 4 / len(found) ** 0.5
-
-
-def lights(saturation, count=60, **settings):
-    spec = DatasetSpec(objects=(0, 0), light_saturation=saturation, **settings)
-    return [light for scene in scenes(spec, count) for light in scene.lights]

@@ -68,22 +68,3 @@ def test_an_item_that_is_always_refused_ends_the_run():
         refuse_the_first()
     assert refused.value.where == "item 100"
     assert refused_before == MAX_RENDERED
-
-
-def test_waiting_items_do_not_pile_up_proposals(monkeypatch):
-    """While one item is refused again and again, no more than two draws wait."""
-    drawn: list[int] = []
-    sample = proposals.sample_scenes
-
-    def counted(spec, index, *rest):
-        drawn.extend(index)
-        return sample(spec, index, *rest)
-
-    monkeypatch.setattr(proposals, "sample_scenes", counted)
-    monkeypatch.setattr(proposals, "AHEAD", 16)
-    queue = ProposalQueue(SPEC, range(10**9), objects_of(SPEC))
-    for _ in range(20):
-        scenes = queue.take(4, 8)
-        for item in [] if scenes is None else scenes.index.tolist():
-            (queue.refuse if item == 0 else queue.accept)(item)
-    assert max(drawn) < 8 + 4 * 16, "of a thousand million items"

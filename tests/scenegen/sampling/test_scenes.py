@@ -8,19 +8,14 @@ import pytest
 from scipy.stats import chisquare, kstest
 
 from scenegen.camera import Camera
-from scenegen.common.errors import PlacementError
 from scenegen.description.names import SHAPE_NAMES
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import pack, pack_arrays
-from scenegen.sampling import scenes as sampling
 from scenegen.sampling.scenes import (
-    POSES_PER_OBJECT,
-    refusal,
     sample_scene,
     sample_scenes,
 )
 
-CROWD = DatasetSpec(objects=(40, 40))
 EMPTY = DatasetSpec(objects=(0, 0), lights=(1, 3))  # always succeeds: distributions as drawn
 
 
@@ -146,23 +141,3 @@ def test_the_room_fills_the_image_from_everywhere_on_the_octant(size):
             with np.errstate(divide="ignore"):
                 t = np.where(rays < 0, -position / rays, np.inf).min(axis=1)
             assert (position + t[:, None] * rays).max() <= 1.0, (height, azimuth)
-
-
-def test_a_crowd_is_refused_after_bounded_work(monkeypatch):
-    tried = 0
-    find_places = sampling.find_places
-
-    def counted(rows, *args):
-        nonlocal tried
-        tried += len(rows)
-        return find_places(rows, *args)
-
-    monkeypatch.setattr(sampling, "find_places", counted)
-    placed, scenes = sample_scenes(CROWD, [0] * 10, range(10))
-    assert not placed.any()
-    assert len(scenes) == 0
-    assert 0 < tried <= 10 * 40 * POSES_PER_OBJECT
-    before = tried
-    error = refusal(CROWD, 0, 0)
-    assert isinstance(error, PlacementError)
-    assert tried == before, "it is not tried again"

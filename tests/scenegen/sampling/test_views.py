@@ -12,8 +12,6 @@ from scenegen import open_rooms
 from scenegen.camera import look_at
 from scenegen.common.errors import SpecError
 from scenegen.description.specs import DatasetSpec
-from scenegen.rooms import render as dataset
-from scenegen.rooms.render import render_items
 from scenegen.sampling.cameras import sample_cameras
 from scenegen.sampling.scenes import sample_scene, sample_scenes
 
@@ -82,19 +80,3 @@ def test_input_views_are_uniform_in_their_span_on_either_side():
     heights = away[:, 0, 1] / MANY.camera_radius
     assert kstest(heights, "uniform").pvalue > 0.01
     assert kstest(heights[low], "uniform").pvalue > 0.01, "which side says nothing of the height"
-
-
-@pytest.mark.parametrize("batch", [1, 5, 14])
-def test_no_wavefront_has_more_images_than_the_batch_or_one_scene(batch, monkeypatch):
-    sizes = []
-    launch = dataset.launch_fields
-
-    def counted(images, *more):
-        sizes.append(len(images))
-        return launch(images, *more)
-
-    monkeypatch.setattr(dataset, "launch_fields", counted)
-    spec = DatasetSpec(**{**TINY, "height": 16, "width": 16, "min_visible_pixels": 0})
-    found = [room.index for some in render_items(spec, range(7), batch) for room in some]
-    assert found == [*range(7)]
-    assert max(sizes) == max(5, batch // 5 * 5)

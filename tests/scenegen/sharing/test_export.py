@@ -1,7 +1,6 @@
 """Exported rows, read by the loaders that people use: nothing is lost, and nothing half done."""
 
 import json
-import re
 import tarfile
 
 import numpy as np
@@ -142,17 +141,3 @@ def test_refused(how, where, rooms_path, tmp_path):
         export_rows(rooms_path, "parquet", tmp_path / "out", **how)
     assert error.value.where == where
     assert list(tmp_path.iterdir()) == []
-
-
-def test_no_more_rows_are_in_memory_than_fit(rooms_path, tmp_path, monkeypatch):
-    with open_rooms(rooms_path) as rooms:
-        size = sum(np.asarray(rooms.read(name, 0)).nbytes for name in rooms.fields)
-    monkeypatch.setattr("scenegen.sharing.task.BLOCK_BYTES", 3 * size)
-    steps = []
-    made = export_rows(rooms_path, "parquet", tmp_path / "out", progress=steps.append)
-    import pyarrow.parquet as pq
-
-    file = pq.ParquetFile(made[0])
-    groups = [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)]
-    assert groups == steps == [3, 3, 2]
-    assert re.fullmatch(r"rooms-00000-of-00001\.parquet", made[0].name)

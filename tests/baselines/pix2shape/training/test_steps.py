@@ -1,13 +1,12 @@
 """One step: the losses that are asked for, their weighted sum, and gradients where they belong."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import pytest
 import torch
 
-from baselines.pix2shape.batch import Batch, Relief
+from baselines.pix2shape.batch import Batch
 from baselines.pix2shape.network.architecture import NetworkSpec
 from baselines.pix2shape.network.config import LOSSES, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape, Views
@@ -114,54 +113,3 @@ def test_questions_teach_the_scenes_part_of_the_code():
     codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
     expected = functions.question_loss(codes, answers).item()
     assert losses["questions"].item() == pytest.approx(expected)
-
-
-def facing_the_origin(place: Any) -> Any:
-    """Return cameras at places (B, 3), upright, that look at the origin: world_from_camera."""
-    back = torch.nn.functional.normalize(place, dim=1)
-    right = torch.linalg.cross(torch.tensor([[0.0, 0.0, 1.0]]).expand_as(back), back)
-    right = torch.nn.functional.normalize(right, dim=1)
-    pose = torch.eye(4).repeat(len(place), 1, 1)
-    pose[:, :3] = torch.stack([right, torch.linalg.cross(back, right), back, place], dim=2)
-    return pose
-
-
-def test_matching_compares_relief_in_one_view_of_each_scene():
-    networks = NetworkSpec(size=32, width=0.05, z_scene=3, rays=True)
-    model = model_of(replace(only(), networks=networks, matching=1.0))
-    batch, noise = some_batch(), draw(8, 3, 3)
-    place = 0.5 + batch.views.condition
-    poses = facing_the_origin(place)[:, None].repeat(1, 2, 1, 1)
-    poses[:, 1, 0, 3] += 0.1
-    found = torch.rand(8, 2, 32, 32)
-    views = replace(batch.views, world_from_camera=poses[:, 0])
-    batch = replace(batch, views=views, relief=Relief(found, poses))
-    total, losses = generator_step(model, batch, noise)
-    drawn = (noise.share >= 0.5).long()
-    assert 0 < drawn.sum() < 8, "either view is drawn for some"
-    code = model.encode(batch.image, views)
-    each = torch.arange(8)
-    said = model.relief(code, poses[each, drawn, :3, 3])
-    expected = (said - found[each, drawn]).abs().mean()
-    assert losses["matching"].item() == pytest.approx(expected.item(), rel=1e-5)
-    total.backward()
-    assert model.encoder.layers[0].weight.grad.any()
-
-
-def test_noise_is_the_seeds():
-    state = torch.get_rng_state()
-    one, again, other = draw(9, 4, 7, 5, 3), draw(9, 4, 7, 5, 3), draw(9, 4, 8, 5, 3)
-    assert torch.equal(torch.get_rng_state(), state), "no other random numbers are touched"
-    assert (one.code.shape, one.share.shape) == ((9, 4), (9,))
-    assert sorted(one.order.tolist()) == list(range(9))
-    assert 0 <= one.share.min() <= one.share.max() <= 1
-    assert 0 <= one.turn.min() < one.turn.max() <= 2 * math.pi
-    by_question = one.mirror.view(5, 3)
-    assert torch.equal(by_question.all(dim=1), by_question.any(dim=1)), "a question's, or none"
-    assert by_question.any()
-    assert not by_question.all()
-    for name in ("code", "share", "order"):  # the same, whatever is compared
-        assert torch.equal(getattr(one, name), getattr(draw(9, 4, 7), name))
-    for name in ("code", "share", "order", "turn", "mirror"):
-        assert torch.equal(getattr(one, name), getattr(again, name))
-        assert not torch.equal(getattr(one, name), getattr(other, name))

@@ -3,16 +3,13 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import pytest
 from audit_tables import audited
 from click.testing import CliRunner
-from cluster_tasks import crash, fail, shared, slow_square, version_by_process
+from cluster_tasks import crash, shared, slow_square, version_by_process
 
 import cli
 from iqtt.files.make import make_split
@@ -86,12 +83,6 @@ def test_a_crash_is_tried_again_and_named(plain, tmp_path):
     assert lost.value.found == "signal 11, SIGSEGV"
 
 
-def test_errors_of_workers_are_raised_here(plain):
-    with pytest.raises(SceneGenError) as raised:
-        list(plain.results(fail, range(3)))
-    assert raised.value.found == "a task that fails"
-
-
 def test_workers_with_other_versions_are_refused(cluster):
     here = partial(version_by_process, os.getpid())
     address = cluster.client.scheduler.address
@@ -133,25 +124,6 @@ def test_no_scheduler_is_one_line(monkeypatch, address):
     result = CliRunner().invoke(cli.scenegen, words)
     assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
     assert address in result.stderr
-
-
-PLAIN = """
-print("once")
-from scenegen.files.sets.cluster import LOCAL, connected
-with connected(LOCAL, 2, dict) as cluster:
-    print(list(cluster.results(abs, [-1, 2, -3])))
-"""
-
-
-@pytest.mark.slow
-def test_a_plain_script_needs_no_guard(tmp_path):
-    (tmp_path / "plain.py").write_text(PLAIN)
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[4])}
-    done = subprocess.run(
-        [sys.executable, "plain.py"], cwd=tmp_path, env=environment, timeout=120,
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert (done.stdout, done.stderr) == ("once\n[1, 2, 3]\n", "")
 
 
 def test_scores_are_those_of_one_process(cluster, make_rooms, tmp_path):

@@ -29,8 +29,8 @@ DIGESTS = {
 DIRECTIONS = np.concatenate([unit_vectors(300), np.eye(3), -np.eye(3)])
 
 
-def spread(family, step=74):
-    return (member_shape(family, member) for member in range(0, MEMBERS, step))
+def spread(family):
+    return (member_shape(family, member) for member in (4, 10, 24, *range(0, MEMBERS, 74)))
 
 
 def welded(shape):

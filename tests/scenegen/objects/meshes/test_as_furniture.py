@@ -223,6 +223,13 @@ def test_rooms_with_meshes_are_verified(own, run):
 
 
 @pytest.mark.parametrize(
+    "options", [("--classes", "chair,nonsense"), ("--classes", "rug"), ("--shapes", "box")]
+)
+def test_classes_that_nobody_has_are_refused(own, refuses, options):
+    refuses("render", "--n", 1, "--preset", "interiors", "--objects-root", own, *options)
+
+
+@pytest.mark.parametrize(
     "line", ["v nan 0 0\nf 5/1 1/1 2/2", "v 99 50 9\nf 5/1 5/1 5/2"], ids=["not finite", "no area"]
 )
 def test_faces_that_cleaning_drops_move_no_picture(tmp_path, line):
@@ -295,3 +302,16 @@ def test_pictures_of_glb_files_are_moved_and_mirrored_as_they_tell(tmp_path):
     assert lower_left(moved(rotation=np.pi / 2)) == lower_right
     assert lower_left(moved(scale=[-1, 1])) == lower_right
     assert lower_left(moved(scale=[-1, -1])) == upper_right
+
+
+def test_vertex_colours_beside_a_material_count(tmp_path):
+    box = trimesh.creation.box((1, 2, 1))
+    box.visual.vertex_colors = [[255, 0, 0, 255]] * len(box.vertices)
+
+    def change(document):
+        document["materials"] = [{}]
+        document["meshes"][0]["primitives"][0]["material"] = 0
+
+    data = trimesh.Scene(box).export(file_type="glb")
+    (tmp_path / "a.glb").write_bytes(rewritten(data, change))
+    assert store_of(tmp_path / "a.glb").paint("thing/a").textures[0].color.tolist() == [[[1, 0, 0]]]

@@ -7,6 +7,7 @@ from PIL import Image
 
 from scenegen import DatasetSpec, open_rooms
 from scenegen.objects.meshes.colors import corner_colors
+from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.sources import object_source
 from scenegen.rooms.make import make_dataset
 from tests.support.verified import checks_of
@@ -71,6 +72,12 @@ def test_vertex_colours_of_ply_are_srgb(up):
     top = corners[..., 1] > 0 if up == "z" else corners[..., 2] > 0
     linear = ((188 / 255 + 0.055) / 1.055) ** 2.4
     np.testing.assert_allclose(colors, np.where(top[..., None], linear, 0) * np.ones(3), atol=1e-5)
+
+
+def test_without_colours_all_are_one():
+    assert (of(trimesh.creation.icosphere(1), ".stl")[1] == 1).all()
+    with pytest.raises(BadMeshError):
+        corner_colors(b"glTF", ".glb", "y", np.eye(3), np.array([[0, 1, 2]]))
 
 
 @pytest.fixture(scope="module")

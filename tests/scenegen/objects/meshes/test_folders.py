@@ -3,6 +3,7 @@
 import hashlib
 import json
 import pickle
+from unittest.mock import Mock
 
 import pytest
 
@@ -10,6 +11,7 @@ from scenegen.objects.meshes.errors import MeshFolderError
 from scenegen.objects.meshes.folders import open_models, open_objects
 from scenegen.objects.meshes.listing import ModelFile, object_split
 from scenegen.objects.meshes.shapenet import open_shapenet
+from scenegen.objects.sources import folder_notes
 
 INSIDE = {1: "model.obj", 2: "models/model_normalized.obj"}
 MUG, BOWL, PLANE = "03797390", "02880940", "02691156"
@@ -205,3 +207,39 @@ def test_refusals(shapenet, make):
         assert refused.value.where.endswith(where), arguments
         assert found in refused.value.found, arguments
         assert refused.value.expected or refused.value.hint, arguments
+
+
+def test_files_and_folders_that_cannot_be_read(shapenet, monkeypatch):
+    root = shapenet(1)
+    with pytest.raises(MeshFolderError):
+        open_objects(root / ("x" * 5000))
+    (root / "all.csv").mkdir()
+    with pytest.raises(MeshFolderError) as refused:
+        open_shapenet(root)
+    assert refused.value.where.endswith("all.csv")
+
+    monkeypatch.setattr("os.scandir", Mock(side_effect=PermissionError(13, "Permission denied")))
+    with pytest.raises(MeshFolderError) as refused:
+        open_objects(root)
+    assert "Permission denied" in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "up", "own", "count"),
+    [
+        ("a.stl", b"", "y", False, 1),
+        ("a.stl", b"", "z", False, 0),
+        ("a.glb", b"", "z", False, 1),
+        ("a.glb", b'{"baseColorTexture": {}}', "y", False, 1),
+        ("a.ply", b"property uchar red\n", "y", False, 1),
+        ("a.ply", b"property uchar red\n", "y", True, 0),
+        ("a.obj", b"v 0 0 1 0.5 0.5 1e-1\n", "y", False, 1),
+        ("a.obj", b"mtllib a.mtl\nv 0 0 1\n", "y", False, 0),
+    ],
+)
+def test_notes_tell_of_axes_and_colours_that_may_surprise(make, name, content, up, own, count):
+    root = make(f"mug/{name}")
+    (root / "mug" / name).write_bytes(content)
+    notes = folder_notes(open_objects(root, up=up), own)
+    assert len(notes) == count
+    assert all(("--reflectance own" if content else "--up") in note for note in notes)

@@ -8,6 +8,7 @@ import trimesh
 
 from scenegen.objects.cache import DiskCache
 from scenegen.objects.meshes import models
+from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.models import content_hash, load_model
 
 
@@ -55,3 +56,16 @@ def test_what_a_model_was_made_from_is_in_its_key(ball, disk, cleaned, monkeypat
     load_model(ball, "y", disk)
     assert cleaned.call_count == 4
     assert content_hash(b"", ".obj", "y") != content_hash(b"", ".off", "y")
+
+
+@pytest.mark.parametrize(
+    ("error", "where"), [(MemoryError(), "model"), (np.linalg.LinAlgError("odd"), "cleaning")]
+)
+def test_errors_that_are_not_the_file_s_are_not_kept(error, where, ball, disk, monkeypatch):
+    with monkeypatch.context() as patch:
+        patch.setattr(models, "clean_mesh", Mock(side_effect=error))
+        with pytest.raises(BadMeshError) as refused:
+            load_model(ball, "y", disk)
+    assert refused.value.where == where
+    assert str(error) in refused.value.found
+    load_model(ball, "y", disk)

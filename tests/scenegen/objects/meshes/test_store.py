@@ -1,5 +1,7 @@
 """Models as unit shapes: their surface, their hull, and the store that keeps them."""
 
+from unittest.mock import Mock
+
 import numpy as np
 import pytest
 import trimesh
@@ -15,7 +17,9 @@ from shape_checks import (
     unit_vectors,
 )
 
+from scenegen.objects.coarse_hulls import coarse_hull
 from scenegen.objects.meshes import hull
+from scenegen.objects.meshes import models as model_files
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.folders import open_objects
 from scenegen.objects.meshes.hull import hull_points
@@ -154,3 +158,18 @@ def test_refusals_are_remembered(opened):
         models.shape("odd/1")
     assert refused.value.where == "odd/1: file"
     assert set(models.problems) == {"odd/bad", "odd/1"}
+
+
+def test_a_coarse_body_is_kept(models, tmp_path, monkeypatch):
+    """It is the same when it comes from the cache, where it is not computed again."""
+    monkeypatch.setattr(model_files, "MOST_CORNERS", 100)
+    shapes = [MeshStore(open_objects(models), tmp_path / "cache").shape("odd/0") for _ in range(2)]
+    hull = np.column_stack([shapes[0].hull_points, shapes[0].hull_discs])
+    expected = coarse_hull(hull)
+    counted = Mock(wraps=coarse_hull)
+    monkeypatch.setattr(model_files, "coarse_hull", counted)
+    shapes.append(MeshStore(open_objects(models), tmp_path / "cache").shape("odd/0"))
+    for shape in shapes:
+        np.testing.assert_array_equal(shape.coarse[0], expected[0])
+        assert shape.coarse[1] == expected[1]
+    assert counted.call_count == 0

@@ -1,5 +1,7 @@
 """Images of models: the same bits in any batch, and agreement with Embree."""
 
+from dataclasses import replace
+
 import pytest
 from model_rooms import FAMILIES, folder_objects, folder_spec, some_scenes
 from other_engines import bits
@@ -8,7 +10,7 @@ from scenegen.common.errors import BackendError
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import objects_of
 from scenegen.rendering import renderer
-from scenegen.rendering.packing import pack
+from scenegen.rendering.packing import SceneBatch, pack
 from scenegen.rendering.renderer import parts, render
 
 
@@ -74,3 +76,13 @@ def test_path_tracing_is_refused_where_only_the_slow_path_is(scenes_of, monkeypa
     with pytest.raises(BackendError) as refused:
         renderer.trace(batch, ["image"])
     assert refused.value.where == "shading path"
+
+
+def test_rows_with_every_slot_used_and_with_none():
+    spec = replace(FAMILIES, objects=(0, 2))
+    (scene,) = some_scenes(replace(FAMILIES, objects=(2, 2)), objects_of(FAMILIES), 1)
+    batch: SceneBatch = pack(spec, [scene, replace(scene, objects=())])
+    assert batch.rows(slice(0, 1)).shape.min() == 0
+    empty = batch.rows([1])
+    assert (empty.names, empty.shape.tolist()) == ((), [[-1, -1]])
+    assert bits(render(empty), 0) == bits(render(batch), 1)

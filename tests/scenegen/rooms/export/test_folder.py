@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -278,6 +279,18 @@ def test_bop_counts_what_lies_beyond_the_edge(source, make_rooms, tmp_path):
     assert cropped > 5
 
 
+def test_what_is_hidden_has_no_annotation_of_coco(make_rooms, tmp_path):
+    make_rooms(tmp_path / "x.h5", 30, seed=1, objects=(3, 3), shapes=FLAT, height=24, width=24,
+               min_visible_pixels=0, allow_cropped=True)  # fmt: skip
+    with open_rooms(tmp_path / "x.h5") as rooms:
+        shown = sum(len(set(room.object_id.flat) - {-1, 0}) for room in rooms)
+        assert shown < 3 * len(rooms)
+        export_folder(rooms, "coco", tmp_path / "out")
+    listed = json.loads((tmp_path / "out/annotations.json").read_text())["annotations"]
+    assert len(listed) == shown
+    assert all(item["area"] > 0 < min(item["bbox"][2:]) for item in listed)
+
+
 def test_moge(path, out):
     rooms, folder = shown(path), out("moge")
     for name in (folder / ".index.txt").read_text().split():
@@ -358,3 +371,10 @@ def test_what_does_not_fit_is_refused_and_nothing_is_left(form, path, tmp_path):
             with pytest.raises(SpecError):
                 export_folder(rooms, form, tmp_path / "out", rows)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_command(run, path):
+    result = run("export", path, "--format", "coco", "--items", "0-2")
+    assert result.exit_code == 0
+    about = json.loads(Path("x-coco/annotations.json").read_text())
+    assert [image["id"] for image in about["images"]] == [0, 1, 2]

@@ -5,9 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
 from scenegen import open_rooms
+from scenegen.objects.catalogue import objects_of
 from scenegen.rooms.export.folder import export_folder
 from scenegen.rooms.export.single import export_paths, export_room
 
@@ -50,3 +52,16 @@ def test_folders_tell_the_step_of_depth(tmp_path, interior_path, form, depth, fi
     steps = np.asarray(Image.open(folder / depth / "000000.png"))
     known = np.isfinite(room.depth)
     np.testing.assert_allclose(steps[known] * metres, room.depth[known], rtol=0, atol=0.501e-3)
+
+
+def test_meshes_are_those_of_furniture(tmp_path, interior_path):
+    with open_rooms(interior_path) as rooms:
+        room, objects = rooms[0], objects_of(rooms.spec)
+    paths = export_paths(0, tmp_path, "a", "obj")
+    export_room(room, paths, "obj")  # without being told the objects
+    parts = {name: mesh.bounds for name, mesh in trimesh.load_scene(paths[0]).geometry.items()}
+    for k, item in enumerate(room.scene.objects, start=1):
+        shape = objects.shape(item.shape)
+        bounds = parts[f"object_{k}"]
+        size = np.ptp(shape.triangles.reshape(-1, 3)[:, 1]) * item.scale
+        assert bounds[1, 1] - bounds[0, 1] == pytest.approx(size, abs=1e-5)
