@@ -1,5 +1,6 @@
 """Features answer by the nearest; labels teach which dimensions count; misfits are refused."""
 
+import io
 from pathlib import Path
 
 import h5py
@@ -65,21 +66,24 @@ def test_features_that_do_not_fit_are_refused(values: np.ndarray, truths, tmp_pa
         read_features(tmp_path / "f.npy", 6, questions)
 
 
-def test_a_file_that_is_no_array_is_refused(truths, tmp_path):
-    np.savez(tmp_path / "f.npz", a=np.zeros(3))
-    for name, data in {"f.npy": b"nothing", "p.npy": b"\x80\x04N."}.items():
-        (tmp_path / name).write_bytes(data)
-    for name in ("f.npy", "p.npy", "f.npz"):
-        with open_questions(truths.iqtt) as questions, pytest.raises(SceneGenError):
-            read_features(tmp_path / name, 6, questions)
+def with_head(text: str) -> bytes:
+    """Return a file of numpy's format with this head and no values."""
+    head = text.ljust(117) + "\n"
+    return b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head.encode()
 
 
-@pytest.mark.parametrize(
-    "head", ["((((", "{[]: 1}", "{'descr': '<f8', 'fortran_order': False, 'shape': (10**23,)}"]
-)
-def test_hostile_heads_are_refused(head: str, truths, tmp_path):
-    head = head.ljust(117) + "\n"
-    content = b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head.encode()
+def archive() -> bytes:
+    """Return an archive of one array."""
+    file = io.BytesIO()
+    np.savez(file, a=np.zeros(3))
+    return file.getvalue()
+
+
+HEADS = ("((((", "{[]: 1}", "{'descr': '<f8', 'fortran_order': False, 'shape': (10**23,)}")
+
+
+@pytest.mark.parametrize("content", [b"nothing", b"\x80\x04N.", archive(), *map(with_head, HEADS)])
+def test_files_that_are_no_arrays_are_refused(content: bytes, truths, tmp_path):
     (tmp_path / "f.npy").write_bytes(content)
     with open_questions(truths.iqtt) as questions, pytest.raises(SceneGenError):
         read_features(tmp_path / "f.npy", 6, questions)

@@ -8,13 +8,7 @@ import torch
 from pix2shape_models import room_source
 from torch.utils.data import default_collate
 
-from baselines.pix2shape.pictures import (
-    drawn,
-    image_tiles,
-    rotation_frames,
-    sheet,
-    turned_camera,
-)
+from baselines.pix2shape.pictures import drawn, image_tiles, rotation_frames, sheet, turned_camera
 from scenegen.camera import look_at
 from scenegen.description.presets import PAPER_VIEWS
 from scenegen.description.specs import DatasetSpec

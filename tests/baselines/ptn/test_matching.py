@@ -4,9 +4,7 @@ import numpy as np
 import torch
 from ptn_models import cubes_volume, tiny
 
-from baselines.ptn.matching import (
-    best_fits,
-)
+from baselines.ptn.matching import best_fits
 from baselines.ptn.questions import uniform_rotation
 from iqtt.shapes.polycube import mirror
 

@@ -2,21 +2,12 @@
 
 from pathlib import Path
 
-import h5py
-import numpy as np
 import pytest
 from pix2shape_models import released
 from refusals import refused
 
 from baselines.training.data import TrainingFiles
-from baselines.training.questions import (
-    LABELED,
-    UNLABELED,
-    each_question,
-    is_question_file,
-    open_test,
-)
-from iqtt import open_questions
+from baselines.training.questions import LABELED, UNLABELED, is_question_file, open_test
 from scenegen.common.errors import FileFormatError, SpecError
 
 
@@ -45,11 +36,3 @@ def test_training_questions_are_told_from_those_to_answer(truths, train_question
         open_test(train_questions, 16)
     with refused(SpecError, "iqtt-test.h5", "32x32", "24"):
         open_test(truths.iqtt, 24)
-
-
-def test_an_image_that_is_not_finite_is_refused(tmp_path):
-    path = released(tmp_path / "released.h5", [0, 1])
-    with h5py.File(path, "r+") as file:
-        file["questions"][1, 2, 3, 4] = np.nan
-    with open_questions(path) as questions, refused(FileFormatError, f"{path}: row 1"):
-        each_question(questions, 16, lambda images: images, 1)

@@ -8,12 +8,7 @@ from click.testing import CliRunner
 
 from scenegen.command_line.groups import PackageCommands
 from scenegen.command_line.options import MESH_FILES
-from scenegen.command_line.paths import (
-    InputPath,
-    OutputFolder,
-    OutputPath,
-    refuse_command_inputs,
-)
+from scenegen.command_line.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
 
 
 @click.command()

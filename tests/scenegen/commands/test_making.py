@@ -11,19 +11,7 @@ from scenegen.commands.making import NOISY_SPP
 from scenegen.rendering.pictures import denoiser
 from scenegen.rendering.pictures.assets import digest_of
 
-RENDER = (
-    "render",
-    "--preset",
-    "interiors",
-    "--n",
-    1,
-    "--size",
-    16,
-    "--objects",
-    4,
-    "--out",
-    "o.h5",
-)
+RENDER = "render --preset interiors --n 1 --size 16 --objects 4 --out o.h5"
 
 
 @pytest.fixture
@@ -40,12 +28,12 @@ def no_denoiser(monkeypatch):
 )  # fmt: skip
 @pytest.mark.usefixtures("no_denoiser")
 def test_a_wrong_option_is_all_that_is_told(refuses, options, word):
-    refuses(*RENDER, *options.split(), words=(word,))
+    refuses(*RENDER.split(), *options.split(), words=(word,))
 
 
 @pytest.mark.usefixtures("no_denoiser")
 def test_without_a_denoiser_more_paths_are_traced_and_that_is_told_first(run):
-    made = run(*RENDER)
+    made = run(*RENDER.split())
     assert made.exit_code == 0, made.output
     assert str(NOISY_SPP) in made.stdout.splitlines()[0]
     with h5py.File("o.h5") as file:
@@ -58,7 +46,7 @@ def own_wood(run, tmp_path):
     """A folder of a material, with which o.h5 was made."""
     (tmp_path / "mats").mkdir()
     Image.new("RGB", (8, 8), (200, 10, 10)).save(tmp_path / "mats" / "Wood01_1K_Color.png")
-    made = run(*RENDER, "--spp", 1, "--no-denoise", "--materials", "mats")
+    made = run(*RENDER.split(), "--spp", 1, "--no-denoise", "--materials", "mats")
     assert made.exit_code == 0, made.output
     return tmp_path / "mats"
 

@@ -42,16 +42,6 @@ def test_presets_take_their_classes_from_a_folder_that_has_them(
     assert {name.split("/")[0] for name in models_of()} == {"mug"}
 
 
-def test_a_file_is_verified_with_its_folder(run: Run, verdict: Any, meshes: Path) -> None:
-    render(run, "--objects-root", meshes, "--views", "0,40", count=3)
-    folder = ("--objects-root", meshes, "--cache-dir", "cache")
-    code, checks, output = verdict("rooms.h5", *folder)
-    assert code == 0, output
-    assert set(checks.values()) == {"ok"}
-    moved = meshes.rename(meshes.with_name("moved"))
-    assert verdict("rooms.h5", "--objects-root", moved, "--cache-dir", "new")[0] == 0
-
-
 def test_with_another_folder_or_none_it_is_refused(
     run: Run, refuses: Callable[..., str], meshes: Path, shapenet: Path
 ) -> None:

@@ -41,9 +41,7 @@ EXPORT_MISTAKES = [
     ("--out /proc", "/proc"),
     ("--objects-root .", "objects: found the folder .", "built in"),
 ]
-VERIFY_MISTAKES = [
-    ("--objects-root .", "objects: found the folder .", "built in"),
-]
+VERIFY_MISTAKES = [("--objects-root .", "objects: found the folder .", "built in")]
 MISTAKES = [
     *((RENDER, *case) for case in RENDER_MISTAKES),
     *((("preview", "FILE"), *case) for case in PREVIEW_MISTAKES),
@@ -63,8 +61,7 @@ def test_a_mistake_is_told_in_one_line(refuses, tmp_path, rooms_path, case):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="sets Linux's limit of memory")
 @pytest.mark.parametrize(
-    "options",
-    ["render --n 1000000000000 --size 32", "preview FILE --items 0-9999999999"],
+    "options", ["render --n 1000000000000 --size 32", "preview FILE --items 0-9999999999"]
 )
 def test_huge_numbers_do_not_fill_the_memory(tmp_path, check_refusal, rooms_path, options):
     """With 4 GB of address space, so that a failing test harms nobody."""

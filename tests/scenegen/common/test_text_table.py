@@ -8,13 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenegen.common.text_table import (
-    distinct,
-    markdown,
-    number,
-    plain,
-    printable,
-)
+from scenegen.common.text_table import distinct, markdown, number, plain, printable
 
 ANY_TEXT = st.text(st.characters(exclude_categories=()), max_size=30)
 

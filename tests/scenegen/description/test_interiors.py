@@ -23,23 +23,20 @@ CHANGED = [
 
 
 @pytest.mark.parametrize(
-    "settings",
-    [{"hours": (9, 10)}, {"denoise": True}, {"sensor_noise": 0.1}, {"materials": "0" * 16}],
-)
-def test_settings_of_closed_rooms_are_refused_elsewhere(settings):
-    with pytest.raises(SpecError):
-        preset_spec("shapes", **settings)
-
-
-@pytest.mark.parametrize(
-    "settings",
-    [{"objects": (500, 500)}, {"objects": (0, 3)},
-     {"objects": (12, 100)}, {"hours": (20, 25)}, {"shading": "paper"},
-     {"source": "shapes", "shapes": ("box",)}, {"shapes": ("unicorn",)}],
+    ("preset", "settings"),
+    [
+        *(("shapes", {name: value}) for name, value in
+          (("hours", (9, 10)), ("denoise", True), ("sensor_noise", 0.1), ("materials", "0" * 16))),
+        *(("interiors", {"objects": value}) for value in ((500, 500), (0, 3), (12, 100))),
+        *(("interiors", {name: value}) for name, value in
+          (("hours", (20, 25)), ("shading", "paper"), ("shapes", ("unicorn",)),
+           ("shadows", True), ("lights", (1, 1)))),
+        ("interiors", {"source": "shapes", "shapes": ("box",)}),
+    ],
 )  # fmt: skip
-def test_what_closed_rooms_cannot_have_is_refused(settings):
+def test_settings_that_a_kind_of_rooms_cannot_have_are_refused(preset, settings):
     with pytest.raises(SpecError):
-        preset_spec("interiors", **settings)
+        preset_spec(preset, **settings)
 
 
 def test_requests_that_leave_later_settings_alone_have_the_json_of_1_0():

@@ -216,15 +216,3 @@ def test_every_setting_with_a_range_is_tried_above():
         "own_reflectance",
         "truth",
     }
-
-
-@pytest.mark.parametrize(
-    ("settings", "alike"),
-    [
-        ({"fov_degrees": 28}, {"fov_degrees": 28.0}),
-        ({"attenuation": (0, 1)}, {"attenuation": (0.0, 1.0)}),
-        ({"ambient": (0.0, -0.0, 0.0)}, {"ambient": (0.0, 0.0, 0.0)}),
-    ],
-)
-def test_equal_requests_have_equal_texts(settings, alike):
-    assert DatasetSpec(**settings).to_json() == DatasetSpec(**alike).to_json()

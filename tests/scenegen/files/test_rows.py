@@ -246,15 +246,6 @@ def openings(monkeypatch):
     return processes
 
 
-def test_each_process_opens_the_file_once(whole, task, openings, monkeypatch):
-    data = DATASETS[task](whole)
-    del openings[:]
-    for process in (1, 1, 2, 2):
-        monkeypatch.setattr("os.getpid", lambda process=process: process)
-        data[0], data[1]
-    assert openings == [1, 2]
-
-
 def test_an_open_file_is_not_opened_again(whole, task, openings):
     """Until it is closed: then the data set opens it for itself."""
     with READERS[task](whole) as file:

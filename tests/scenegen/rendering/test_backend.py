@@ -5,7 +5,6 @@ import ctypes.util
 import importlib.metadata
 import os
 import platform
-import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -31,23 +30,6 @@ OLD = sorted(
 )  # Debian 12's, where installed: the real thing
 NO_LLVM = ["/nowhere/libLLVM.so", ctypes.util.find_library("c") or "libc.so.6", *OLD]
 WITH_WHEEL = sys.platform == "linux" and platform.machine() == "x86_64"
-
-TINY_RENDER = """
-import warnings
-from scenegen.description.specs import DatasetSpec
-from scenegen.rendering.packing import pack
-from scenegen.rendering.renderer import render
-from scenegen.sampling.scenes import sample_scene
-spec = DatasetSpec(height=8, width=8, objects=(1, 1), shapes=("teapot",), min_visible_pixels=0)
-scene = next(s for i in range(9) if (s := sample_scene(spec, i)))
-with warnings.catch_warnings(record=True) as caught:
-    warnings.simplefilter("always")
-    truth, again = render(pack(spec, [scene])), render(pack(spec, [scene]))
-assert truth.depth.tobytes() == again.depth.tobytes()
-assert (truth.object_id >= 0).all() and truth.depth.min() > 0.3, truth
-import mitsuba
-print(mitsuba.variant(), *(warning.category.__name__ for warning in caught))
-"""
 
 
 @pytest.fixture(autouse=True)
@@ -126,17 +108,6 @@ def test_devices(monkeypatch):
         assert caught.value.where == where
     monkeypatch.setattr(ctypes, "CDLL", lambda name: None)
     assert select_variant("cuda") == "cuda_ad_rgb"
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("library", [NO_LLVM[0], *OLD[:1]])
-def test_rendering_goes_on_without_llvm_and_says_so_once(library):
-    environment = os.environ | {LLVM_VARIABLE: library}
-    done = subprocess.run(
-        [sys.executable, "-c", TINY_RENDER], env=environment, capture_output=True, text=True,
-        check=True, cwd=Path(backend.__file__).parents[2], timeout=120,
-    )  # fmt: skip
-    assert done.stdout.split() == ["scalar_rgb", "SlowFallbackWarning"]
 
 
 @pytest.mark.parametrize(("version", "good"), [((15, 0, 7), False), ((23, 1, 4), True)])

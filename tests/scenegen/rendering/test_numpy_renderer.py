@@ -41,8 +41,7 @@ def check_against_whole_scenes(spec, scenes, objects=None):
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["shapes", "shapenet", "folder", pytest.param("furniture-256", marks=pytest.mark.slow)],
+    "name", ["shapes", "shapenet", "folder", pytest.param("furniture-256", marks=pytest.mark.slow)]
 )
 def test_whole_scenes_agree_with_another_engine(name, model_folder):
     if name == "folder":
@@ -71,8 +70,7 @@ KINDS = {"box", "sphere", "torus", "teapot"}  # others are polyhedra, or alike
 
 
 @pytest.mark.parametrize(
-    "name",
-    [n if n in KINDS else pytest.param(n, marks=pytest.mark.slow) for n in SHAPE_NAMES],
+    "name", [n if n in KINDS else pytest.param(n, marks=pytest.mark.slow) for n in SHAPE_NAMES]
 )
 def test_each_shape_agrees_in_depth_normal_and_image(name, scenes_of, embree_cast):
     spec = replace(SMALL, shapes=(name,), pose="any", shadows=True)

@@ -39,18 +39,6 @@ def test_the_first_items_of_a_larger_file_are_those_of_a_smaller(rooms_path, mak
         np.testing.assert_array_equal(values, expected, err_msg=name)
 
 
-def test_neighbouring_seeds_differ_in_every_item(rooms_path, make_rooms, tmp_path):
-    """In every item, and no item of one seed turns up anywhere under the next."""
-    here, mark = contents(rooms_path)
-    there, other = contents(make_rooms(tmp_path / "x.h5", 8, seed=4))
-    assert mark != other
-    for name in ("image", "depth", "normal", "camera/world_from_camera", "light/color", "scene"):
-        rows = [np.asarray(values).tobytes() for values in (*here[name], *there[name])]
-        if name == "scene":
-            rows = [*here[name], *there[name]]
-        assert len(set(rows)) == 16, name
-
-
 def test_image_types_agree(make_rooms, tmp_path):
     images = {}
     for dtype in ("uint8", "float16", "float32"):

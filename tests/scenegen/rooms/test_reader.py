@@ -112,19 +112,6 @@ def test_the_fingerprint_is_that_of_spec_and_scenes(rooms_path):
         assert file.attrs["fingerprint"] == hashlib.sha256(lines.encode()).hexdigest()
 
 
-def test_every_compression_gives_equal_contents(rooms_path, make_rooms, tmp_path):
-    sizes = [rooms_path.stat().st_size]
-    for compression in ("lzf", "none"):
-        path = make_rooms(tmp_path / compression, 8, {"compression": compression})
-        sizes.append(path.stat().st_size)
-        with h5py.File(rooms_path) as a, h5py.File(path) as b:
-            assert b["depth"].compression == (None if compression == "none" else compression)
-            for name, *_ in LAYOUT:
-                np.testing.assert_array_equal(a[name][:], b[name][:], err_msg=name)
-            assert a.attrs["fingerprint"] == b.attrs["fingerprint"]
-    assert sizes[0] < sizes[1] < sizes[2]
-
-
 def test_a_room_is_complete(float_path):
     with open_rooms(float_path) as rooms, h5py.File(float_path) as file:
         room = rooms[2]

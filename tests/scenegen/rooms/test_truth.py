@@ -129,8 +129,7 @@ def test_each_is_checked_against_depth_and_poses(edit, check, merged, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("settings", "where"),
-    [({"truth": ("depths",)}, "truth"), ({"truth": ("flow",)}, "flow")],
+    ("settings", "where"), [({"truth": ("depths",)}, "truth"), ({"truth": ("flow",)}, "flow")]
 )
 def test_refused(settings, where):
     with pytest.raises(SpecError) as error:

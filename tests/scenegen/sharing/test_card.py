@@ -1,13 +1,11 @@
 """A data card as its readers see it: Hugging Face's reader of headers, and Markdown on a page."""
 
-import hashlib
 from contextlib import ExitStack
 from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 import yaml
-from huggingface_hub import DatasetCard
 from markdown_it import MarkdownIt
 
 from scenegen import open_rooms
@@ -32,31 +30,6 @@ def make_card(paths, path, publication=TOLD):
 def page(holey_set, float_path, tmp_path_factory):
     """Return the card of a set and of a file."""
     return make_card([holey_set, float_path], tmp_path_factory.mktemp("card") / "README.md")
-
-
-def test_what_the_header_tells(page):
-    card = DatasetCard(page)
-    assert (card.data.pretty_name, card.data.license) == ("Two rooms", "cc-by-4.0")
-    assert {"depth-estimation", "pix2shape-bench"} < set(card.data.tags)
-    assert "      author = {{A. Person} and {B Person}}," in page.splitlines()
-
-
-def test_files_and_their_sha256(page, holey_set, float_path):
-    names = ["set.h5", *(f"set-0000{i}-of-00003.h5" for i in range(3))]
-    files = [*(holey_set.with_name(name) for name in names), float_path]
-    for path in files:
-        data = path.read_bytes()
-        assert f"| {path.name} | {len(data)} | {hashlib.sha256(data).hexdigest()} |" in page
-    assert page.count("| shard of set.h5 |") == 3
-
-
-def test_a_card_of_interiors_says_what_is_true_of_them(interior_path, rooms_path, tmp_path):
-    page = make_card([interior_path], tmp_path / "README.md")
-    wrong = ("scene units", "corner", "no gamma", "two walls")
-    assert not [words for words in wrong if words in page]
-    assert "| `depth` | (y, x) | float32 | metre |" in page
-    with pytest.raises(SpecError):
-        make_card([interior_path, rooms_path], tmp_path / "both")
 
 
 def test_no_licence_is_guessed_of_what_others_made():

@@ -3,12 +3,9 @@
 import itertools
 
 import torch
-from pix2shape_models import tiny
 
 from baselines.pix2shape.network import architecture
 from baselines.pix2shape.network.architecture import Critic, Decoder, Encoder, NetworkSpec
-from baselines.pix2shape.network.model import Pix2Shape, Surfels, Views, shaded
-from baselines.pix2shape.network.surfels import Scene
 
 
 def count(module: torch.nn.Module) -> int:
@@ -35,18 +32,3 @@ def test_the_papers_networks_have_the_tables_sizes() -> None:
     joined = convolutions([6, 85, 170, 340, 680]) + 16 * (680 + 128) * 1360 + 1360
     assert count(Critic(spec)) == joined + 16 * 1360 + 1
     assert count(architecture.Statistics(spec)) == 128 * 256 + 256 + 256 * 512 + 512 + 512 + 1
-
-
-def test_bfloat16_reaches_neither_renderer_nor_losses() -> None:
-    """An image is the same under autocast, to the bit; codes and scores are full."""
-    model = Pix2Shape(tiny()).eval()
-    place, color = torch.rand(3, 2, 3) + torch.tensor([0.0, 0.0, 1.5]), torch.rand(3, 2, 3)
-    scene = Scene(28.0, place, color, torch.rand(3, 3), torch.rand(3, 2) + 0.2, torch.rand(3, 3))
-    views = Views(torch.rand(3, 3), scene)
-    depth = 1.5 + 0.1 * torch.rand(3, 32, 32)
-    plain = shaded(Surfels(depth), views)
-    with torch.autocast("cpu", torch.bfloat16):
-        assert torch.equal(shaded(Surfels(depth), views), plain)
-        code = model.encode(plain, views)
-        score = model.critic(plain, code, views.condition)
-        assert {code.dtype, score.dtype, model.image(code, views).dtype} == {torch.float32}

@@ -83,15 +83,6 @@ def test_depth_maps_of_earlier_runs_are_not_forgotten(rooms_path, tmp_path):
         new_run(TrainingFiles(rooms_path), CONFIG, start=start)
 
 
-def test_labels_of_earlier_runs_are_not_forgotten(train_questions, tmp_path):
-    start = None
-    for labels, earlier in ((2, 0), (1, 2), (0, 3)):
-        state, _ = new_run(TrainingFiles(train_questions), CONFIG, labels=labels, start=start)
-        card = state.card
-        assert (card.labels, card.earlier_labels) == (labels, earlier)
-        start = stored(tmp_path / f"{labels}.safetensors", state.network, card)
-
-
 @pytest.mark.parametrize(
     ("data", "name", "value"),
     [

@@ -94,18 +94,6 @@ def test_a_stop_in_the_middle_changes_nothing(case, rooms_path, train_questions,
     assert_same(bits(again), bits(unbroken))
 
 
-def test_every_step_has_noise_of_its_own(rooms_path, tmp_path, monkeypatch):
-    """Of each critic's batch, too; but the same wherever training began."""
-    seeds: list[int] = []
-    draw = iterations.draw
-    monkeypatch.setattr(iterations, "draw", lambda *a: (seeds.append(a[2]), draw(*a))[1])
-    config = replace(TINY, critic_steps=2, iterations=2)
-    for first in (0, 0, 1):
-        run(state_of(config, iteration=first), room_source(rooms_path, config), tmp_path)
-    assert len(set(seeds[:4])) == 4
-    assert seeds == [*seeds[:4], *seeds[:4], *seeds[2:4]]
-
-
 def test_the_generators_step_leaves_the_critic_alone(rooms_path, tmp_path, monkeypatch):
     config = replace(TINY, mutual_information=0.1, networks=replace(TINY.networks, z_view=2))
     state, before = state_of(config), {}

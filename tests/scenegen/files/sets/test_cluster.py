@@ -7,7 +7,6 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
-from audit_tables import audited
 from click.testing import CliRunner
 from cluster_tasks import crash, shared, slow_square, version_by_process
 
@@ -55,15 +54,6 @@ def test_rooms_and_questions_are_those_of_one_process(cluster, make_rooms, tmp_p
     assert sum(rows) == 8 + 10
     assert contents(tmp_path / "many") == contents(tmp_path / "one")
     assert contents(tmp_path / "many" / "split") == contents(tmp_path / "one" / "split")
-
-
-@pytest.mark.slow
-def test_whole_files_and_audits_are_those_of_one_process(cluster, tmp_path):
-    make_split(tmp_path / "one", SPLIT)
-    make_split(tmp_path / "many", SPLIT, cluster=cluster)
-    assert contents(tmp_path / "many") == contents(tmp_path / "one")
-    records = [audited([tmp_path / "one"], cluster=how).record() for how in (cluster, None)]
-    assert json.dumps(records[0]) == json.dumps(records[1])
 
 
 def test_tasks_of_workers_that_die_go_to_others(plain, tmp_path):

@@ -16,7 +16,7 @@ import pytest
 from scenegen.common.errors import SceneGenError
 from scenegen.files import pool
 from scenegen.files.pool import LostWorkerError
-from scenegen.files.sets.workers import in_order, in_processes, in_threads
+from scenegen.files.sets.workers import in_processes
 
 BUSY = """
 import sys, time
@@ -60,26 +60,6 @@ def test_ctrl_c_is_left_to_the_process_that_started_them():
     process = start(1)
     os.killpg(process.pid, signal.SIGINT)
     assert process.communicate(timeout=20) == ("stopped\n", "")
-
-
-def _counted(task):
-    yield from range(task)
-    return task
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_what_a_generator_yields_and_returns_comes_in_order(workers):
-    ends = []
-    assert list(in_order(_counted, [2, 0, 3], workers, ends.append)) == [0, 1, 0, 1, 2]
-    assert ends == [2, 0, 3]
-
-
-def test_few_tasks_are_begun_ahead():
-    begun = []
-    results = in_threads(abs, (begun.append(i) or i for i in range(100)), 2, 5)
-    assert next(results) == 0
-    assert len(begun) <= 7
-    results.close()
 
 
 def test_warnings_of_a_process_are_given_here():

@@ -8,7 +8,7 @@ import pytest
 from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families import store
 from scenegen.objects.families.members import make_member
-from scenegen.objects.families.store import MemberStore, code_version
+from scenegen.objects.families.store import MemberStore
 
 MUG = ("mug", 7)
 
@@ -43,15 +43,3 @@ def test_a_member_is_made_once_and_comes_back_as_it_was(tmp_path, made):
     path.write_bytes(path.read_bytes()[:-30])
     check(MemberStore(tmp_path))
     assert made.call_count == 2
-
-
-def test_other_code_has_entries_of_its_own(tmp_path, made, monkeypatch):
-    MemberStore(tmp_path).mesh(*MUG)
-    monkeypatch.setattr(np, "__version__", "0.0")
-    code_version.cache_clear()
-    try:
-        MemberStore(tmp_path).mesh(*MUG)
-    finally:
-        code_version.cache_clear()
-    assert made.call_count == 2
-    assert len(list(tmp_path.iterdir())) == 2

@@ -359,10 +359,7 @@ def test_what_does_not_fit_is_refused_and_nothing_is_left(form, path, tmp_path):
     too_bright = Encoding(exposure=50.0)
     too_deep = replace(Encoding(), depth_unit=1e-6)
     with open_rooms(path) as rooms:
-        for encoding, forms in (
-            (too_bright, FOLDER_FORMATS),
-            (too_deep, ("nerfstudio", "bop")),
-        ):
+        for encoding, forms in ((too_bright, FOLDER_FORMATS), (too_deep, ("nerfstudio", "bop"))):
             if form in forms:
                 with pytest.raises(SpecError) as refused:
                     export_folder(rooms, form, tmp_path / "out", encoding=encoding)
