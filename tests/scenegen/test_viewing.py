@@ -52,22 +52,6 @@ def test_a_recording_holds_the_truth_of_each_view(path, tmp_path):
         assert labels == ["the room", *(item.shape for item in room.scene.objects), "nothing"]
 
 
-def test_cameras_see_the_points_where_their_pixels_are(make_rooms, tmp_path):
-    with open_rooms(make_rooms(tmp_path / "x.h5", 1, width=24)) as rooms:
-        write(tmp_path / "x.rrd", "x", room_scenes(rooms, [[0]]))
-    there = recorded(tmp_path / "x.rrd", "scene")
-    camera, (points, _) = (
-        there["/world/cameras/view_0"][0],
-        points_of(there["/world/truth/view_0"][0]),
-    )
-    rotation = np.reshape(camera["Transform3D:mat3x3"], (3, 3)).T  # by columns
-    local = (points - camera["Transform3D:translation"]) @ rotation
-    matrix = np.reshape(camera["Pinhole:image_from_camera"], (3, 3)).T
-    x, y, z = matrix @ (local * (1, -1, -1)).T
-    rows, columns = np.indices((32, 24)).reshape(2, -1)
-    np.testing.assert_allclose([x / z - 0.5, y / z - 0.5], [columns, rows], atol=1e-3)
-
-
 def test_rows_and_cameras_that_cannot_be_shown(rooms_path):
     with open_rooms(rooms_path) as rooms:
         assert scene_rows(rooms, [5, 2, 5]) == [[2], [5]]

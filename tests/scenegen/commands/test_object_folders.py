@@ -9,7 +9,7 @@ from typing import Any
 import h5py
 import pytest
 import trimesh
-from object_folders import Run, models_of, render
+from object_folders import SMALL, Run, models_of, render
 
 
 def test_a_broken_model_is_passed_over_and_told_of(run: Run, meshes: Path) -> None:
@@ -20,6 +20,13 @@ def test_a_broken_model_is_passed_over_and_told_of(run: Run, meshes: Path) -> No
     assert note.startswith("note: mug/broken was passed over: ")
     used = set(models_of())
     assert used == {"mug/tall", "mug/round", "bowl/ball", "bowl/cone"}
+
+
+def test_a_folder_with_nothing_usable_is_refused(refuses: Callable[..., str], meshes: Path) -> None:
+    for path in meshes.glob("*/*.*"):
+        path.write_text("nothing of use")
+    render_two = ("render", "--n", 2, *SMALL[:-2], "--objects-root", meshes)
+    refuses(*render_two, words=("classes", "check-objects"))
 
 
 def test_presets_take_their_classes_from_a_folder_that_has_them(

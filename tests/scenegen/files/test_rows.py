@@ -299,3 +299,10 @@ def test_a_file_replaced_by_another_is_noticed(copied, task):
         file.attrs["content_digest"] = "0" * 64
     with pytest.raises(FileFormatError, match="replaced"):
         pickle.loads(data)[0]
+
+
+def test_a_link_to_the_file_of_a_set_reads_the_set(sets, task, tmp_path):
+    path = sets[task][1]
+    (tmp_path / "link.h5").symlink_to(path)
+    data, linked = DATASETS[task](path), DATASETS[task](tmp_path / "link.h5")
+    np.testing.assert_array_equal(linked[3][IMAGES[task]], data[3][IMAGES[task]])

@@ -1,7 +1,6 @@
 """The kernel against Embree, on whole scenes and through the numpy renderer."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -95,22 +94,3 @@ def test_normals_face_the_viewer_inside_open_shapes_too(embree_cast):
     assert inside.sum() > 100
     expected = render_in_numpy(batch, embree_cast).normal[0]
     assert (abs(truth.normal[0] - expected).max(axis=-1)[inside] < 1e-3).mean() > 0.95
-
-
-def test_supersampling_converges_and_leaves_the_truth_alone(scenes_of):
-    """To the mean of 8 x 8 pixels of an image eight times as large."""
-    spec = replace(SMALL, height=32, width=48)
-    scenes = scenes_of(spec, 4)
-    large = render(pack(replace(spec, height=256, width=384), scenes)).image
-    expected = large.reshape(4, 32, 8, 48, 8, 3).mean(axis=(2, 4))
-    error = []
-    for spp in (1, 4, 16, 64):
-        truth = render(pack(replace(spec, spp=spp), scenes))
-        error.append(float(np.sqrt(np.mean((truth.image - expected) ** 2))))
-        if spp == 1:
-            first = truth
-        assert truth.depth.tobytes() == first.depth.tobytes()
-        assert truth.normal.tobytes() == first.normal.tobytes()
-        assert truth.object_id.tobytes() == first.object_id.tobytes()
-    assert all(after < 0.65 * before for before, after in pairwise(error))
-    assert error[-1] < 3e-3

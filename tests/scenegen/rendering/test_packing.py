@@ -27,22 +27,6 @@ BARE = replace(FULL, index=5, objects=(), lights=(), room_reflectance=None)
 LAST = replace(FULL, index=6, objects=(CONE,), lights=(LAMP,))
 
 
-def test_several_views_follow_scene_after_scene():
-    shiny = replace(LAST, objects=(replace(CONE, specular=0.25, shininess=7.0),))
-    batch = pack(SPEC, [FULL, BARE, shiny], (1, 0))
-    assert len(batch) == 6
-    assert batch.index.tolist() == [4, 4, 5, 5, 6, 6]
-    assert batch.view.tolist() == [1, 0] * 3
-    assert batch.fov_y_degrees.tolist() == [33.0, 28.0] * 3
-    assert batch.gloss[4:, 1].tolist() == [[0.25, 7.0]] * 2
-    assert batch.gloss[:4].tolist() == [[[0.0, 1.0]] * 4] * 4, "matte, unused slots too"
-    one = [pack(SPEC, [FULL, BARE, shiny], (view,)) for view in (1, 0)]
-    for name, values in vars(batch).items():
-        if isinstance(values, np.ndarray):
-            for first, alone in enumerate(one):
-                np.testing.assert_array_equal(values[first::2], getattr(alone, name), err_msg=name)
-
-
 @pytest.mark.parametrize("start", range(4))
 @pytest.mark.parametrize("count", [1, 2, 5])
 def test_rows_are_a_part_of_every_array(start, count):

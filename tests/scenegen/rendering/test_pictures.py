@@ -30,6 +30,11 @@ def test_white_balance_moves_light_towards_grey():
     assert 1.0 < means[0] / means[2] < 1.5
 
 
+def test_floating_point_pictures_hold_the_radiance():
+    picture, _ = develop(RADIANCE, ALBEDO, INSIDE, "float16", None)
+    np.testing.assert_array_equal(picture, RADIANCE.astype(np.float16))
+
+
 def write_environment(path, values):
     import mitsuba
 

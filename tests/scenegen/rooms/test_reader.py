@@ -8,7 +8,6 @@ import json
 import h5py
 import numpy as np
 
-from scenegen import open_rooms
 from scenegen.description.names import SHAPE_NAMES
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.content import datasets
@@ -112,19 +111,17 @@ def test_the_fingerprint_is_that_of_spec_and_scenes(rooms_path):
         assert file.attrs["fingerprint"] == hashlib.sha256(lines.encode()).hexdigest()
 
 
-def test_a_room_is_complete(float_path):
-    with open_rooms(float_path) as rooms, h5py.File(float_path) as file:
-        room = rooms[2]
-        assert (room.index, room.view_index, room.scene.index) == (2, 0, 2)
-        for name in ("image", "depth", "normal", "object_id"):
-            np.testing.assert_array_equal(getattr(room, name), file[name][2])
-        assert room.depth.shape == (48, 40)
-        assert room.image.dtype == room.radiance.dtype == np.float32
-        camera = room.scene.cameras[0]
-        np.testing.assert_allclose(room.world_from_camera, camera.world_from_camera, atol=1e-15)
-        assert room.fov_y_degrees == file["camera/fov_y_degrees"][2]
-        np.testing.assert_allclose(room.points[..., 2], -room.depth, atol=1e-7)
-        assert room.points[0, 0, 0] < 0 < room.points[0, 0, 1]  # top left: x left, y up
+def test_every_compression_gives_equal_contents(rooms_path, make_rooms, tmp_path):
+    sizes = [rooms_path.stat().st_size]
+    for compression in ("lzf", "none"):
+        path = make_rooms(tmp_path / compression, 8, {"compression": compression})
+        sizes.append(path.stat().st_size)
+        with h5py.File(rooms_path) as a, h5py.File(path) as b:
+            assert b["depth"].compression == (None if compression == "none" else compression)
+            for name, *_ in LAYOUT:
+                np.testing.assert_array_equal(a[name][:], b[name][:], err_msg=name)
+            assert a.attrs["fingerprint"] == b.attrs["fingerprint"]
+    assert sizes[0] < sizes[1] < sizes[2]
 
 
 def test_radiance_of_developed_pictures_is_what_they_show(interior_path, rooms_path):

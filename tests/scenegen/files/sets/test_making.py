@@ -216,14 +216,6 @@ def test_files_of_others_are_kept(task, tmp_path):
 
 
 @BOTH
-@pytest.mark.parametrize("options", [{"compression": "zip"}, {"shard_size": 0}], ids=str)
-def test_bad_settings_leave_nothing(task, tmp_path, options):
-    with pytest.raises(SpecError):
-        task.shards(tmp_path / "set", **options)
-    assert not list(tmp_path.rglob("*.*"))
-
-
-@BOTH
 def test_what_takes_a_name_meanwhile_or_fails_leaves_all_as_it_was(task, tmp_path, monkeypatch):
     """A run of one file replaces an older one only when it is complete."""
     folder = tmp_path / "set"

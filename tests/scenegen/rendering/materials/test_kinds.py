@@ -1,5 +1,7 @@
 """Materials: within range, without seams, of the palette, the same again."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,6 @@ from scenegen.objects.furniture.furnishing import WHOLE
 from scenegen.rendering.materials.kinds import KINDS, material
 from scenegen.rendering.materials.material import SLOPE_STEPS, Material, slopes_of
 from scenegen.rendering.materials.palettes import palette
-
-EVERY = pytest.mark.parametrize("kind", KINDS)
 
 
 def drawn(kind, seed):
@@ -40,8 +40,8 @@ def maps_of(made):
             yield values
 
 
-@EVERY
-def test_maps_are_within_range(kind):
+@pytest.mark.parametrize("kind", KINDS)
+def test_maps_are_within_range_and_repeat_without_seams(kind):
     for seed in range(8):
         made = drawn(kind, seed)
         color = np.asarray(made.base_color)
@@ -53,21 +53,15 @@ def test_maps_are_within_range(kind):
         assert 0.0 <= made.specular <= 1.0
         assert made.metallic in (0.0, 1.0)
         assert made.metres > 0.0
-        for values in maps_of(made):
-            assert np.isfinite(values).all()
+        maps = list(maps_of(made))
+        assert all(np.isfinite(values).all() for values in maps)
         if made.slopes is not None:
             assert slope_maps(made).any()
             assert np.quantile(np.abs(slope_maps(made)), 0.9) < 1.0
-
-
-@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in WHOLE])
-def test_maps_repeat_without_seams(kind):
-    for seed in range(8):
-        for values in maps_of(drawn(kind, seed)):
-            for axis in (0, 1):
-                steps = np.abs(np.diff(values, axis=axis, append=values.take([0], axis)))
-                steps = steps.mean(axis=1 - axis).reshape(values.shape[axis], -1).mean(axis=1)
-                assert steps[-1] <= 1.5 * np.quantile(steps, 0.995) + 1e-6
+        for values, axis in itertools.product(maps, (0, 1) if kind not in WHOLE else ()):
+            steps = np.abs(np.diff(values, axis=axis, append=values.take([0], axis)))
+            steps = steps.mean(axis=1 - axis).reshape(values.shape[axis], -1).mean(axis=1)
+            assert steps[-1] <= 1.5 * np.quantile(steps, 0.995) + 1e-6
 
 
 def test_texels_hold_colours_and_roughness():
