@@ -93,7 +93,11 @@ BAD = [
     ({"wood_diff_1k.png": (GREY,), "wood_diff_1k.jpg": (GREY,)}, SpecError, "color"),
     ({"Thing01_1K_Color.png": (GREY,)}, SpecError, "name"),
     ({COLOR: b"\x89PNG\r\n\x1a\n" + b"x" * 99}, FileFormatError, ""),
-    ({COLOR: (GREY,), "Wood01_nor_gl_1k.exr": b"v/1\x01" + b"x" * 99}, FileFormatError, ""),
+    (
+        {"Wood01_diff_1k.png": (GREY,), "Wood01_nor_gl_1k.exr": b"v/1\x01" + b"x" * 99},
+        FileFormatError,
+        "",
+    ),
     ({COLOR: (WIDE,)}, FileFormatError, "9000"),
 ]
 
