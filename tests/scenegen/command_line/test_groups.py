@@ -59,6 +59,11 @@ def test_arguments_that_are_not_utf8_are_refused_first(tmp_path, check_refusal, 
     assert list(tmp_path.iterdir()) == []
 
 
+def test_an_argument_with_a_nul_is_refused(check_refusal):
+    done = CliRunner().invoke(group_of(lambda: None), ["x\0"], catch_exceptions=False)
+    check_refusal(done.exit_code, done.stdout, done.stderr, (r"x\x00",))
+
+
 def test_a_recorded_command_can_be_pasted(monkeypatch):
     words = ["render", "--out", "my rooms.h5", "--objects-root", "it's $HOME; rm *", "--seed", "1"]
     monkeypatch.setattr(sys, "argv", ["/x/scenegen", *words])

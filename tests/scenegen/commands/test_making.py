@@ -1,6 +1,7 @@
 """Options of `scenegen render` for closed rooms: what is told, and when."""
 
 import json
+from dataclasses import replace
 
 import h5py
 import numpy as np
@@ -8,6 +9,7 @@ import pytest
 from PIL import Image
 
 from scenegen.commands.making import NOISY_SPP
+from scenegen.description.specs import request_from_json
 from scenegen.rendering.pictures import denoiser
 from scenegen.rendering.pictures.assets import digest_of
 
@@ -58,3 +60,12 @@ def test_verify_needs_what_the_file_was_made_with(run, refuses, own_wood):
     (own_wood / "more.txt").write_text("x")
     digest_of.cache_clear()  # the bytes of a folder are read once in a process
     refuses("verify", "o.h5", "--materials", own_wood, words=("mats",))
+
+
+def test_a_missing_denoiser_is_told_before_a_file_is_read(monkeypatch, refuses, interior_path):
+    with h5py.File(interior_path) as file:
+        spec = request_from_json(file.attrs["spec"])
+    monkeypatch.setattr(denoiser, "has_denoiser", lambda: False)
+    monkeypatch.setattr("scenegen.rooms.reader.request_from_json",
+                        lambda _: replace(spec, denoise=True))  # fmt: skip
+    refuses("verify", interior_path, words=("--items 0",))

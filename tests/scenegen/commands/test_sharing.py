@@ -24,6 +24,11 @@ def test_all_rows_go_to_a_folder_of_its_own(run, rooms_path, tmp_path):
     ]  # fmt: skip
 
 
+def test_refused_exports(refuses, rooms_path):
+    refuses("export", rooms_path, "--format", "png", words=("--items",))
+    refuses("export", rooms_path, "--format", "parquet", "--items", 8, words=("--items", "0 to 7"))
+
+
 def test_refused_cards(run, refuses, meshes, rooms_path, tmp_path):
     (tmp_path / "README.md").write_text("mine")
     refuses("card", rooms_path, *WHO, words=("README.md", "--overwrite"))

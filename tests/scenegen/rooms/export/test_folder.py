@@ -159,6 +159,22 @@ def test_colmap_text_by_hand(path, out):
     assert several > 500, "points are seen from two views"
 
 
+def test_colmap_by_pycolmap(path, out):
+    pycolmap = pytest.importorskip("pycolmap")
+    rooms = shown(path)
+    for folder in sorted(out("colmap").glob("scene-*")):
+        model = pycolmap.Reconstruction(str(folder / "sparse/0"))
+        cameras = {k: camera.calibration_matrix() for k, camera in model.cameras.items()}
+        points = {k: point.xyz for k, point in model.points3D.items()}
+        images = []
+        for image in model.images.values():
+            pose = image.cam_from_world().matrix()
+            observed = [(*p.xy, p.point3D_id) for p in image.points2D]
+            images.append((image.name, (pose[:, :3], pose[:, 3]), image.camera_id, observed))
+        check_colmap(cameras, images, points, rooms)
+        assert model.compute_mean_reprojection_error() < 1e-3
+
+
 @pytest.mark.filterwarnings("ignore:__array__ implementation:DeprecationWarning")
 def test_coco_by_pycocotools(path, out, capsys):
     coco_api = pytest.importorskip("pycocotools.coco")

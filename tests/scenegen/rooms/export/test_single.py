@@ -238,3 +238,13 @@ def test_normals_of_obj_are_those_of_the_corners(tmp_path, simple):
     np.testing.assert_allclose(normals[side], radial, atol=1e-4)
     flat = np.abs(normals[6:][~side[6:]])
     np.testing.assert_allclose(flat, np.broadcast_to((0, 1, 0), flat.shape), atol=1e-6)
+
+
+def test_the_command_names_what_it_wrote(run, rooms_path):
+    result = run("export", rooms_path, "--items", "3,5-6", "--format", "ply")
+    assert result.exit_code == 0
+    names = result.output.splitlines()
+    assert names == [f"rooms-{i:06d}.ply" for i in (3, 5, 6)]
+    with open_rooms(rooms_path) as rooms:
+        cloud = trimesh.load(names[1])
+        np.testing.assert_allclose(cloud.vertices, rooms[5].points_world.reshape(-1, 3), atol=1e-6)
