@@ -58,6 +58,17 @@ def test_views_that_a_scene_lacks_are_refused(views):
     assert error.expected == "views from 0 to 1"
 
 
+def test_models_are_known_by_class_and_number():
+    spec = replace(SPEC, source="families", shapes=("mug", "can"))
+    mug, can = replace(CONE, shape="mug/0007"), replace(BOX, shape="can/0001")
+    batch = pack(spec, [replace(FULL, objects=(mug, can, mug)), replace(LAST, objects=(can,))])
+    assert batch.names == ("can/0001", "mug/0007")
+    assert batch.shape.tolist() == [[1, 0, 1], [0, -1, -1]]
+    assert batch.shape_of("mug/0007").name == "mug/0007"
+    with pytest.raises(SpecError, match="'bowl'"):
+        pack(spec, [replace(FULL, objects=(replace(CONE, shape="bowl/0001"),))])
+
+
 @pytest.mark.parametrize(
     ("change", "where", "found"),
     [
