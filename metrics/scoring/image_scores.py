@@ -186,12 +186,13 @@ def _floors(
     """Return the scores of guesses that follow from the truth; `facing` has the walls' normals."""
     mask, fov, empty = truth.mask, truth.fov_y_degrees, reference.empty
     room = Geometry(empty, back_project(empty, fov)[mask], True)
+    walls, _ = normals_from_points(_image(room.points, mask), fov, mask)
     surface, true = reference.surface, truth.depth[mask].astype(np.float64)
     inside = reference.inside
     at, derived_at = inside > 0, _smooth_pixels(inside, reference.smooth)
     scores = depth_scores(DepthPair(empty[mask], true))
     if truth.room_size is None:  # distances of surfaces are no headline of closed rooms
-        seen = surface_of(room.points, facing[mask], surface.pitch, mask)
+        seen = surface_of(room.points, walls[mask], surface.pitch, mask)
         nearest = surface_distances(seen, surface, _nearest(room, truth, surface), True)
         scores |= {"chamfer": chamfer(nearest), "hausdorff": hausdorff(nearest)}
         scores |= object_means(_single_objects(empty, truth, nearest))
@@ -203,7 +204,7 @@ def _floors(
     scores |= {
         "shape_error": flat_error((empty - truth.depth)[at], inside[at]),
         "shape_normal_degrees": _mean_angle(facing, truth.normal, at),
-        "derived_shape_normal_degrees": _mean_angle(facing, reference.normals, derived_at),
+        "derived_shape_normal_degrees": _mean_angle(walls, reference.normals, derived_at),
     }
     of_empty = [name for name in scores if EMPTY_ROOM in SKILLED.get(name, ())]
     floors = {EMPTY_ROOM + name: scores[name] for name in of_empty}

@@ -45,7 +45,10 @@ def items(views: list[SimpleNamespace], submission: Path) -> dict[str, Array]:
             scores |= part("object_normal_mean_degrees", angles, view.counts)
             scores |= part("shape_normal_degrees", angles, inside)
         if "fov_y_degrees" in given:
-            scores["fov_error_degrees"] = abs(given["fov_y_degrees"][row] - view.fov)
+            scores["fov_bias_degrees"] = given["fov_y_degrees"][row] - view.fov
+            scores["fov_error_degrees"] = abs(scores["fov_bias_degrees"])
+        if "confidence" in given:
+            scores |= confidence(abs(z - view.t) / view.t, given["confidence"][row][view.mask])
         if others and "relief_iou" in scores:
             scores |= other_scene(view, views[others[row]], z, P, kind)
         table.append(scores | view.floors | {"row": row})
@@ -67,11 +70,13 @@ def read_truth(path: Path) -> list[SimpleNamespace]:
             )
         ]
     views = [view_of(*values) for values in zip(*columns, strict=True)]
-    for view in views:
+    for row, view in enumerate(views):
+        view.row = row
+        view.turned = [true_pairs(view, q) for q in (1, 2, 4, 8)]
         same = [one for one in views if one.scene == view.scene and one.view == 0]
         view.first = same[0] if same else None
         view.hidden = hidden(view)
-        view.floors = cut_outs(view) | empty_room_scores(view)
+        view.floors = cut_outs(view) | empty_room_scores(view) | blind(view)
         view.floors |= {"scene_index": view.scene, "view_index": view.view}
         view.floors["view_angle_degrees"] = view_angle(view)
     return views
@@ -226,6 +231,10 @@ def geometry(view, z: Array, P: Array, kind: str) -> dict[str, float]:
     v, w = (view.Z[view.mask] - view.t), predicted_relief(view, z, P, kind)
     if (v > 0.05).any():
         scores |= relief("relief_", w, v)
+    scores |= pairs(view, z, P, scores["boundary_f1"]) | flying(view, z)
+    scores["scale_log2"] = np.log2(max(np.median(z / view.t), 2.0**-10))
+    if kind == "points":
+        scores["ray_error_degrees"] = angle(P, view.rays).mean()
     return scores | points(view, P)
 
 
@@ -240,6 +249,7 @@ def depth_scores(z: Array, t: Array) -> dict[str, float]:
         "abs_rel": (abs(e) / t).mean(),
         "silog": 100 * np.sqrt((logs**2).mean()),
         **{f"delta_{k}": ((z < 1.25**k * t) & (t < 1.25**k * z)).mean() for k in (1, 2, 3)},
+        "delta_1.03": ((z < 1.03 * t) & (t < 1.03 * z)).mean(),
         "sq_rel": (e**2 / t).mean(),
         "rmse_log": np.sqrt(((np.log(low) - np.log(t)) ** 2).mean()),
         "log10": abs(np.log10(low) - np.log10(t)).mean(),
@@ -249,7 +259,7 @@ def depth_scores(z: Array, t: Array) -> dict[str, float]:
 
 def after_alignment(view, z: Array, P: Array, kind: str, declared: str) -> dict[str, float]:
     scores = {}
-    names = "mse_depth", "rmse", "abs_rel", "silog", "delta_1", "delta_2", "delta_3"
+    names = "mse_depth", "rmse", "abs_rel", "silog", "delta_1", "delta_1.03", "delta_2", "delta_3"
     for alignment in ALIGNMENTS["depth" if kind == "points" else kind, declared]:
         again = kind == "points" or (kind == "depth" and alignment != declared)
         found = depth_scores(align(z, view.t, alignment) if again else z, view.t)
@@ -480,6 +490,7 @@ def empty_room_scores(view) -> dict[str, float]:
     Z = view.Z[view.mask]
     scores = geometry(view, Z, Z[:, None] * view.rays, "depth")
     names = {"chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness"}
+    names |= {"abs_rel", "delta_1", "points_rel", "boundary_f1"}
     names |= {"behind_depth_error", "shape_error", "derived_shape_normal_degrees"}
     found = {f"empty_room_{name}": scores[name] for name in names & scores.keys()}
     # The plane that a pixel sees is that on which its world point lies.
@@ -554,12 +565,191 @@ def points(view, P: Array) -> dict[str, float]:
     return scores
 
 
+# Pairs of pixels
+
+
+def spread(count: int, axes: int, row: int) -> Array:
+    roots = np.roots([1, *[0] * (axes - 1), -1, -1])
+    root = roots[(abs(roots.imag) < 1e-9) & (roots.real > 0)].real[0]
+    k = np.arange(row * count, (row + 1) * count)
+    return np.stack([0.5 + k * root**-j for j in range(1, axes + 1)], -1) % 1
+
+
+def samples(view, q: int) -> Array:
+    """Return the scored pixel (r, c) nearest to the middle of each square of q pixels, or -1."""
+    grid = np.full((-(-view.H // q), -(-view.W // q), 2), -1)
+    for i, j in np.ndindex(grid.shape[:2]):
+        r, c = np.nonzero(view.mask[q * i : q * i + q, q * j : q * j + q])
+        if len(r):
+            k = np.argmin((r - (q - 1) / 2) ** 2 + (c - (q - 1) / 2) ** 2)
+            grid[i, j] = q * i + r[k], q * j + c[k]
+    return grid
+
+
+def true_pairs(view, q: int) -> tuple[Array, Array, Array]:
+    """Return the corners of pairs of triangles (n, 2, 3, 2), their angles, and which are of one."""
+    grid = samples(view, q)
+    h, w = grid.shape[0] - 2, grid.shape[1] - 2
+    u = spread(8192, 4, view.row)
+    radius = min(max(32 // q, 3), max(h, w))
+    a = np.floor(u[:, :2] * [h, w]).astype(int)
+    b = np.floor(u[:, :2] * [h, w] + (2 * u[:, 2:] - 1) * radius).astype(int)
+    ends = np.stack([a, b], 1)[((b >= 0) & (b < [h, w])).all(1)]
+    corners = np.stack(
+        [grid[tuple((ends + o).transpose(2, 0, 1))] for o in ([0, 0], [2, 0], [0, 2])], 2
+    )
+    corners = corners[(corners >= 0).all((1, 2, 3))]
+    n = triangle_normals(on_grid(view, view.T), corners)
+    good = np.isfinite(n).all((1, 2))
+    ids = on_grid(view, view.ids)[corners[good][..., 0], corners[good][..., 1]].reshape(-1, 6)
+    same = (ids > 0).all(1) & (ids.min(1) == ids.max(1))
+    return corners[good], angle(n[good][:, 0], n[good][:, 1]), same
+
+
+def triangle_normals(X: Array, corners: Array) -> Array:
+    a, b, c = np.moveaxis(X[corners[..., 0], corners[..., 1]], 2, 0)
+    sides = [v / np.maximum(length(v), 1e-300)[..., None] for v in (b - a, c - a)]
+    n = np.cross(*sides)
+    with np.errstate(all="ignore"):
+        return np.where(length(n)[..., None] > 1e-5, n / length(n)[..., None], np.nan)
+
+
+def pairs(view, z: Array, P: Array, boundary_f1: float) -> dict[str, float]:
+    X, errors, ours = on_grid(view, P), [], []
+    for corners, true, same in view.turned:
+        n = triangle_normals(X, corners)
+        e = np.where(np.isfinite(n).all((1, 2)), abs(angle(n[:, 0], n[:, 1]) - true), 180)
+        errors += [e.mean()] if len(e) else []
+        ours += [e[same].mean()] if same.any() else []
+    scores = {"relative_normal_degrees": np.mean(ours)} if ours else {}
+    u = spread(16384, 2, view.row)
+    everywhere = np.floor(u * len(z)).astype(int)
+    order = np.argsort(view.ids, kind="stable")
+    order = order[view.ids[order] > 0]
+    first = order[np.floor(u[:, 0] * len(order)).astype(int)] if len(order) else order
+    own = {k: order[view.ids[order] == k] for k in set(view.ids[order])}
+    within = [own[view.ids[i]] for i in first]
+    second = [o[int(x * len(o))] for o, x in zip(within, u[:, 1], strict=False)]
+    alone = np.stack([first, np.array(second, int)], 1)
+    asked = {
+        "": everywhere,
+        "_between": everywhere[view.ids[everywhere[:, 0]] != view.ids[everywhere[:, 1]]],
+        "_within": np.concatenate([one_object(view, everywhere), alone]),
+    }
+    for name, p in asked.items():
+        t = view.t[p]
+        p = p[t.max(1) > 1.02 * t.min(1)]
+        if len(p):
+            right = np.sign(z[p[:, 0]] - z[p[:, 1]]) == np.sign(view.t[p[:, 0]] - view.t[p[:, 1]])
+            scores[f"ordinal_accuracy{name}"] = right.mean()
+    i, j = everywhere.T
+    unordered = ((z[i] < z[j]) != (view.t[i] < view.t[j])).mean()
+    near = []
+    for fitted in (disparity_fit(z, view.t), line(z / abs(z).max(), view.t)):
+        fitted = np.maximum(fitted, 1e-4)
+        limit = 1.25**0.125
+        near.append(((fitted < limit * view.t) & (view.t < limit * fitted)).mean())
+    turned = np.radians(np.mean(errors)) if errors else 0
+    total = 3.65 * unordered + 0.18 * (1 - near[0]) + 0.01 * (1 - near[1])
+    return scores | {"sawa_h": total + 0.2 * (1 - boundary_f1) + 1.94 * turned}
+
+
+def one_object(view, p: Array) -> Array:
+    a, b = view.ids[p].T
+    return p[(a == b) & (a > 0)]
+
+
+def disparity_fit(z: Array, t: Array) -> Array:
+    q = 1 / np.maximum(z / abs(z).max(), 1e-4)
+    return 1 / np.maximum(line(q, 1 / t), 1e-4)
+
+
+# Flying points
+
+
+def across(view) -> Array:
+    """Return the true depth across the nearest occlusion edge of each scored pixel, or NaN."""
+    Z, ids, found = on_grid(view, view.t), on_grid(view, view.ids), []
+    steps = [(i, j) for i in range(-2, 3) for j in range(-2, 3) if 0 < i * i + j * j <= 4]
+    steps.sort(key=lambda s: (s[0] ** 2 + s[1] ** 2, (-s[0], -s[1])))
+    for r, c in view.pixel:
+        other = np.nan
+        for i, j in steps:
+            if 0 <= r + i < view.H and 0 <= c + j < view.W and view.mask[r + i, c + j]:
+                near, far = sorted([Z[r, c], Z[r + i, c + j]])
+                if ids[r, c] != ids[r + i, c + j] and far > 1.05 * near:
+                    other = Z[r + i, c + j]
+                    break
+        found.append(other)
+    return np.array(found)
+
+
+def flying(view, z: Array) -> dict[str, float]:
+    if not hasattr(view, "across"):
+        view.across = across(view)
+    at = np.isfinite(view.across)
+    part_of_gap = (z[at] - view.t[at]) / (view.across[at] - view.t[at])
+    between = (part_of_gap > 0.05) & (part_of_gap < 0.95)
+    return {"flying_points": between.mean()} if at.any() else {}
+
+
+def half_resolution(view) -> Array:
+    """Return the true depth at half the resolution, doubled again, of the scored pixels."""
+    Z, rows, columns = on_grid(view, view.t), -(-view.H // 2), -(-view.W // 2)
+    sums = np.zeros((2, rows, columns))
+    for r, c in view.pixel:
+        sums[:, r // 2, c // 2] += Z[r, c], 1
+    found = []
+    for r, c in view.pixel:
+        total = np.zeros(2)
+        for i, a in ((r // 2, 0.75), (r // 2 + (1 if r % 2 else -1), 0.25)):
+            for j, b in ((c // 2, 0.75), (c // 2 + (1 if c % 2 else -1), 0.25)):
+                total += a * b * sums[:, np.clip(i, 0, rows - 1), np.clip(j, 0, columns - 1)]
+        found.append(total[0] / total[1])
+    return np.array(found)
+
+
+# Confidence
+
+
+def confidence(errors: Array, sure: Array) -> dict[str, float]:
+    areas = [sparsified(errors, order) for order in (sure, -errors)]
+    return {
+        "ause_abs_rel": np.mean(areas[0] - areas[1]),
+        "aurg_abs_rel": np.mean(errors.mean() - areas[0]),
+        "random_order_ause_abs_rel": np.mean(errors.mean() - areas[1]),
+    }
+
+
+def sparsified(errors: Array, sure: Array) -> Array:
+    same = {x: errors[sure == x].mean() for x in set(sure.tolist())}
+    sorted_errors = np.array([same[x] for x in sorted(sure.tolist(), reverse=True)])
+    counts = [max(int(np.ceil((1 - k / 20) * len(errors))), 1) for k in range(20)]
+    return np.array([sorted_errors[:n].mean() for n in counts])
+
+
 # Cut-outs and guesses
+
+
+def blind(view) -> dict[str, float]:
+    """Return the scores of one depth for all pixels, and of depth that falls to the lower edge."""
+    scores = {}
+    down = (view.pixel[:, 0] + 0.5) / view.H
+    for name, a in (("flat", np.ones(len(down))), ("ramp", 2 - down)):
+        z = line(a, view.t)
+        found = depth_scores(z, view.t) | points_scores(z[:, None] * view.rays, view.T)
+        scores |= {f"{name}_{one}": found[one] for one in ("abs_rel", "delta_1", "points_rel")}
+    half = flying(view, half_resolution(view))
+    return scores | {f"half_resolution_{name}": value for name, value in half.items()}
 
 
 def cut_outs(view) -> dict[str, float]:
     scores = {}
     inside = view.inside
+    cut = np.where(view.ids > 0, flat(view.t, view.ids, np.median), view.t)
+    scores["cut_out_boundary_f1"] = boundaries(view, cut)["boundary_f1"]
+    true = [angles[same].mean() for _, angles, same in view.turned if same.any()]
+    scores |= {"cut_out_relative_normal_degrees": np.mean(true)} if true else {}
     of_object = flat(view.t, inside, np.median)
     scores |= part("cut_out_shape_error", abs(view.t - of_object), inside > 0)
     angles = mean_normal_angles(view.n, inside)
@@ -647,16 +837,19 @@ def means(columns: dict[str, Array]) -> dict[str, float]:
 def skills(columns: dict[str, Array]) -> dict[str, float]:
     """Return the skills of a submission that was shown the scored view."""
     found = {}
-    kinds = ("empty_room", "cut_out", "balls", "blocks", "other_scene")
+    kinds = ("empty_room", "cut_out", "balls", "blocks", "other_scene", "flat", "ramp")
+    kinds += ("half_resolution", "random_order")
     for name, values in columns.items():
+        higher = name in ("delta_1", "boundary_f1")
         floors = [f"{kind}_{name}" for kind in kinds if f"{kind}_{name}" in columns]
-        floor = min(floors, key=lambda f: scene_means(columns, columns[f]).mean(), default=None)
+        best = max if higher else min
+        floor = best(floors, key=lambda f: scene_means(columns, columns[f]).mean(), default=None)
         if floor is None:
             continue
         missing = np.isnan(values) | np.isnan(columns[floor])
         pair = (np.where(missing, np.nan, x) for x in (values, columns[floor]))
         a, b = (scene_means(columns, x).mean() for x in pair)
-        if floor.startswith("other_scene"):
+        if higher or floor.startswith("other_scene"):
             b = max(b, 0)
             a, b = 1 - a, 1 - b
         if b > 0:
