@@ -74,13 +74,6 @@ def test_exactly_equal_to_the_command(kind, form, rooms, tmp_path):
             assert np.array_equal(value, expected.items[name][row], equal_nan=True), name
 
 
-def test_two_lines_of_a_training_script(rooms):
-    depth = torch.tensor(rooms.read("depth", slice(None)))
-    scores = metrics.evaluate(depth, rooms.path)
-    assert scores.metrics["relief_iou"].value == 1.0
-    assert metrics.evaluate_room(depth[3], rooms[3])["relief_iou"] == 1.0
-
-
 def test_some_rows(rooms):
     scores = metrics.evaluate([rooms[5].depth, rooms[2].depth], rooms, items=[5, 2])
     assert scores.ids.tolist() == [2, 5]

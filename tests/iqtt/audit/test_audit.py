@@ -3,27 +3,20 @@
 import json
 import shutil
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 from audit_tables import audited
-from polycubes import are_congruent
 
 from iqtt.audit.audit import to_json
 from iqtt.audit.report import markdown, table
-from iqtt.files.layout import NO_CUBE
-from iqtt.questions.views import rotation_angle_degrees
 from iqtt.shapes.polycube import (
     ROTATIONS,
     canonical,
     canonical_class,
-    is_chiral,
-    mirror,
     set_ids,
-    symmetries,
 )
 from scenegen.common.errors import FileFormatError, SpecError
 
@@ -37,7 +30,7 @@ PROOFS = {"content", *OF_IMAGES, *BY_CUBES}
 Edit = Callable[[h5py.File], Any]
 
 
-def set_shape(truth: h5py.Group, row: int, image: int, cubes: Any) -> None:
+def set_shape(truth, row, image, cubes):
     """Store another shape of as many cubes, and ids that are right for it."""
     stored = truth["cubes"][row]
     stored[image, : len(cubes)] = cubes
@@ -48,179 +41,89 @@ def set_shape(truth: h5py.Group, row: int, image: int, cubes: Any) -> None:
         truth[name][row] = ids
 
 
-def shape(truth: h5py.Group, row: int, image: int) -> Any:
+def shape(truth, row, image):
     return truth["cubes"][row, image, : truth["cube_count"][row]]
 
 
-def changed(name: str, at: Any, change: Callable[[Any], Any]) -> Edit:
+def changed(name, at, change):
     """Change one row of a dataset."""
     return lambda file: file[name].__setitem__(at, change(file[name][at]))
 
 
-def wrong(file: h5py.File, row: int, k: int = 1) -> int:
+def wrong(file, row, k=1):
     """Return which image of a question shows its k-th wrong answer."""
     return 1 + int((file["answers"][row] + k) % 3)
 
 
-def second_right_answer(file: h5py.File) -> None:
+def second_right_answer(file):
     set_shape(file["truth"], 2, wrong(file, 2), shape(file["truth"], 2, 0) @ ROTATIONS[7].T)
 
 
-def unlabeled_second_right_answer(file: h5py.File) -> None:
-    truth = file["truth/unlabeled"]
-    kinds = truth["distractor_kind"][2]
-    at = int((kinds >= 0).argmax())
-    set_shape(truth, 2, 1 + at, shape(truth, 2, 0))
-    kinds[at] = -1
-    truth["distractor_kind"][2] = kinds
-
-
-def distractors_alike(file: h5py.File) -> None:
-    first, second = wrong(file, 2, 1), wrong(file, 2, 2)
-    set_shape(file["truth"], 2, second, shape(file["truth"], 2, first) @ ROTATIONS[7].T)
-
-
-def other_labels(kinds: Any) -> Any:
-    """Call each mirror image of the reference a near shape."""
-    return np.where(kinds == 2, 1, kinds)
-
-
-def in_pieces(cubes: Any) -> Any:
+def in_pieces(cubes):
     cubes[1, 0] += 9
     return cubes
 
 
-def at_the_border(file: h5py.File) -> None:
+def at_the_border(file):
     image = file["questions"][3, 1]
     left = int((image != 255).any(axis=(0, 2)).argmax())
     file["questions"][3, 1] = np.roll(image, -left, axis=1)
 
 
-def another_background(images: Any) -> Any:
-    images[(images == 255).all(axis=-1)] = 250
-    return images
-
-
-def hidden_cube(shown: Any) -> Any:
-    shown[3, :2] = shown[3, :2].sum() - 1, 1
-    return shown
-
-
-def few_pixels(shown: Any) -> Any:
-    shown[3] = np.minimum(shown[3], 3)
-    return shown
-
-
-def same_side(file: h5py.File) -> None:
-    views, right = file["truth/world_from_shape"][1], 1 + file["answers"][1]
-    views[right] = views[0]
-    file["truth/world_from_shape"][1] = views
-    file["truth/angle_degrees"][1] = 0
-
-
-def from_behind(file: h5py.File) -> None:
-    """Turn the right answer to the reference's view and then by 180 degrees about the vertical."""
-    truth, right = file["truth"], 1 + int(file["answers"][1])
-    set_shape(truth, 1, right, shape(truth, 1, 0))
-    views = truth["world_from_shape"][1]
-    views[right] = np.diag([-1, 1, -1]) @ views[0]
-    truth["world_from_shape"][1] = views
-    turns = symmetries(shape(truth, 1, 0)[None].astype(np.int8))[0]
-    truth["angle_degrees"][1] = rotation_angle_degrees(views[0], views[right], turns)
-
-
-def scaled(image: int, factor: float) -> Callable[[Any], Any]:
-    def change(values: Any) -> Any:
+def scaled(image, factor):
+    def change(values):
         values[image] *= factor
         return values
 
     return change
 
 
-def turned(file: h5py.File, factor: float) -> None:
-    changed("truth/world_from_shape", 1, scaled(wrong(file, 1), factor))(file)
-
-
 VAL, TEST, TRAIN = "iqtt-val.h5", "iqtt-test-answers.h5", "iqtt-train.h5"
-ALL = slice(None)
+ALL, VIEWS = slice(None), "truth/world_from_shape"
 # File, what is done to it, and the proofs that fail; others may fail too where it ends in dots.
 DAMAGES: list[tuple[str, Edit, str]] = [
     (VAL, changed("answers", ALL, lambda a: (a + 1) % 3), "one right answer"),
     (TEST, changed("answers", ALL, lambda a: (a + 1) % 3), "one right answer"),
-    (VAL, changed("answers", ALL, np.zeros_like), "one right answer, answer places"),
     (VAL, second_right_answer, "one right answer, answers differ, ..."),
-    (TRAIN, unlabeled_second_right_answer, "one right answer, ..."),
     (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one right answer, ..."),
-    (VAL, distractors_alike, "answers differ, ..."),
-    (VAL, changed("truth/distractor_kind", ALL, other_labels), "labels, ..."),
     (VAL, changed("truth/cubes", 3, in_pieces), "shapes, ..."),
     (VAL, changed("truth/shape_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
     (VAL, changed("truth/class_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
     (VAL, at_the_border, "framing, cast again"),
-    (VAL, changed("questions", ALL, another_background), "framing, cast again, ..."),
-    (VAL, changed("truth/visible_pixels", 2, hidden_cube), "visibility, cast again"),
-    (VAL, changed("truth/visible_pixels", 2, few_pixels), "visibility, cast again"),
-    (VAL, same_side, "angles, cast again"),
-    (VAL, from_behind, "lines of sight, cast again"),
-    (VAL, changed("truth/angle_degrees", 4, lambda angle: angle + 0.01), "angles"),
-    (VAL, lambda file: turned(file, -1.0), "rotations, ..."),
-    (VAL, lambda file: turned(file, 1.001), "rotations, ..."),
-    (VAL, lambda file: turned(file, np.nan), "rotations, ..."),
+    *(
+        (
+            VAL,
+            lambda file, by=by: changed(VIEWS, 1, scaled(wrong(file, 1), by))(file),
+            "rotations, ...",
+        )
+        for by in (-1.0, 1.001, np.nan)
+    ),
     (VAL, changed("truth/light_color", 3, scaled(2, 1.05)), "cast again"),
     (VAL, changed("questions", 3, lambda images: images[[0, 2, 1, 3]]), "cast again, ..."),
 ]
 
 
 @pytest.mark.parametrize(("name", "edit", "proofs"), DAMAGES)
-def test_every_damage_fails_its_proof(
-    failing: Callable[..., set[str]], name: str, edit: Edit, proofs: str
-) -> None:
+def test_every_damage_fails_its_proof(failing, name, edit, proofs):
     questions = ["iqtt-test.h5"] if name == TEST else []
     failed, expected = failing(edit, name, *questions), set(proofs.split(", "))
     assert failed >= expected - {"..."}
     assert "..." in expected or failed == expected
-    assert edit is not distractors_alike or "one right answer" not in failed
 
 
-def test_an_image_twice_in_two_files(failing: Callable[..., set[str]], split_folder: Path) -> None:
+def test_an_image_twice_in_two_files(failing, split_folder):
     with h5py.File(split_folder / "iqtt-train.h5") as train:
         image = train["unlabeled/questions"][3, 2]
     failed = failing(lambda file: file["questions"].__setitem__((5, 0), image), VAL, TRAIN)
     assert failed >= {"distinct images", "cast again"}
 
 
-def test_faces_are_told_apart(
-    failing: Callable[..., set[str]], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_faces_are_told_apart(failing, monkeypatch):
     monkeypatch.setattr("iqtt.audit.proofs.views.FACE_STEPS", 60)
     assert failing(lambda file: file.attrs.__setitem__("command", "")) == {"cast again"}
 
 
-def test_a_mirror_image_in_another_split(
-    failing: Callable[..., set[str]], split_folder: Path
-) -> None:
-    with h5py.File(split_folder / "iqtt-train.h5") as train:
-        truths = (train["truth/labeled"], train["truth/unlabeled"])
-        shapes = [shape(t, row, image) for t in truths for row in range(6) for image in range(4)]
-    # The training file has this shape in one hand only.
-    chiral = next(
-        cubes
-        for cubes in shapes
-        if is_chiral(cubes[None])[0] and not any(are_congruent(mirror(cubes), s) for s in shapes)
-    )
-
-    def edit(file: h5py.File) -> None:
-        file["truth/cube_count"][0] = len(chiral)
-        file["truth/cubes"][0] = NO_CUBE
-        for image in range(4):
-            set_shape(file["truth"], 0, image, mirror(chiral) @ ROTATIONS[image].T)
-
-    assert "splits apart" in failing(edit, VAL, TRAIN)
-
-
-def test_a_fair_split_passes_and_all_is_told(
-    split_folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_fair_split_passes_and_all_is_told(split_folder, monkeypatch):
     monkeypatch.setattr("iqtt.audit.audit.EXPLAINED", 8)
     told: list[int] = []
     found = audited([split_folder], progress=told.append)
@@ -239,25 +142,24 @@ def test_a_fair_split_passes_and_all_is_told(
     assert {proof["name"] for proof in record["proofs"]} == PROOFS
     assert all(0 <= p["low"] <= p["accuracy"] <= p["high"] <= 1 for p in record["probes"])
     assert all(len(t["fingerprint"]) == 64 for t in record["tables"])
-    for text in (table(found), markdown(found)):
-        for proof in found.proofs:
-            assert proof.detail in text
-        assert all(probe.statistic in text for probe in found.probes)
+    assert all(
+        proof.detail in text for text in (table(found), markdown(found)) for proof in found.proofs
+    )
 
 
-def test_files_that_cannot_be_audited(tmp_path: Path) -> None:
-    with pytest.raises(SpecError) as error:
-        audited([])
-    assert error.value.where == "paths"
-    with pytest.raises(FileNotFoundError):
-        audited([tmp_path])
+def test_files_that_cannot_be_audited(tmp_path):
     (tmp_path / "iqtt-val.h5").write_bytes(b"no HDF5")
-    with pytest.raises(FileFormatError):
-        audited([tmp_path])
+    for paths, kind in (
+        ([], SpecError),
+        ([tmp_path / "x"], FileNotFoundError),
+        ([tmp_path], FileFormatError),
+    ):
+        with pytest.raises(kind):
+            audited(paths)
 
 
 @pytest.mark.usefixtures("few_explained")
-def test_a_file_of_answers_stands_for_its_questions(split_folder: Path) -> None:
+def test_a_file_of_answers_stands_for_its_questions(split_folder):
     test, answers = (split_folder / f"iqtt-test{kind}.h5" for kind in ("", "-answers"))
     found = audited([test])
     assert audited([answers, test]).tables == found.tables
@@ -265,19 +167,18 @@ def test_a_file_of_answers_stands_for_its_questions(split_folder: Path) -> None:
 
 
 @pytest.mark.usefixtures("few_explained")
-def test_questions_without_answers(split_folder: Path, tmp_path: Path) -> None:
+def test_questions_without_answers(split_folder, tmp_path):
     shutil.copy(split_folder / "iqtt-test.h5", tmp_path)
     found = audited([tmp_path])
     assert found.passed
     assert found.probes == ()
-    assert "no right answers" in table(found)
     skipped = {proof.name for proof in found.proofs if proof.status == "skipped"}
     assert skipped == BY_CUBES | {"answer places"}
     both = audited([tmp_path, split_folder / "iqtt-val.h5"])
     assert "iqtt-test.h5" in both.proofs[0].detail
 
 
-def plain(count: int = 7) -> Any:
+def plain(count=7):
     """White images, each with a grey rectangle of its own, (count, 4, 20, 24, 3) float32."""
     images = np.ones((count, 4, 20, 24, 3), np.float32)
     for k, image in enumerate(images.reshape(-1, 20, 24, 3)):
@@ -286,10 +187,10 @@ def plain(count: int = 7) -> Any:
 
 
 @pytest.fixture
-def failed(tmp_path: Path) -> Callable[..., set[str]]:
+def failed(tmp_path):
     """Write a file as released, and return the proofs that fail."""
 
-    def judge(images: Any, answers: Any) -> set[str]:
+    def judge(images, answers):
         with h5py.File(tmp_path / "plain.h5", "w") as file:
             file["questions"], file["answers"] = images, answers
         found = audited([tmp_path / "plain.h5"], probed=0).proofs
@@ -299,7 +200,7 @@ def failed(tmp_path: Path) -> Callable[..., set[str]]:
     return judge
 
 
-def test_released_files(failed: Callable[..., set[str]]) -> None:
+def test_released_files(failed):
     fair = np.arange(7) % 3
     assert failed(plain(), fair) == set()
     assert failed(plain(), [0, 1, 2, 0, 1, 2, 2]) == set()
@@ -313,17 +214,16 @@ def test_released_files(failed: Callable[..., set[str]]) -> None:
     assert failed(images, fair) == {"distinct images", "distinct questions"}
 
 
-def test_an_audit_of_no_questions_does_not_pass(tmp_path: Path) -> None:
+def test_an_audit_of_no_questions_does_not_pass(tmp_path):
     with h5py.File(tmp_path / "iqtt-val.h5", "w") as file:
         file["questions"], file["answers"] = plain(0), np.zeros(0, np.uint8)
     found = audited([tmp_path])
     assert not found.passed
     assert json.loads(to_json([found]))["passed"] is False
     assert {proof.status for proof in found.proofs} <= {"ok", "skipped"}
-    assert "there are no questions" in table(found)
 
 
-def test_only_questions_with_answers_are_measured(tmp_path: Path) -> None:
+def test_only_questions_with_answers_are_measured(tmp_path):
     with h5py.File(tmp_path / "iqtt-train.h5", "w") as file:
         file["unlabeled/questions"] = plain(7)
         file["labeled/questions"], file["labeled/answers"] = 1 - plain(3) / 2, np.arange(3)

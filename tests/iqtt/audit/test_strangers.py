@@ -1,8 +1,6 @@
 """Questions of other people: each fault is named, and questions of ours have none."""
 
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,15 +15,15 @@ TILTED = [[0.8, 0.0, 0.6], [0.36, 0.8, -0.48], [-0.48, 0.6, 0.64]]
 OTHER = [[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]]
 
 
-def mirrored(cubes: list[list[int]]) -> list[list[int]]:
+def mirrored(cubes):
     return [[-x, y, z] for x, y, z in cubes]
 
 
-def view(cubes: Any, rotation: Any = TILTED) -> dict[str, Any]:
+def view(cubes, rotation=TILTED):
     return {"cubes": cubes, "rotation": rotation}
 
 
-def faults(tmp_path: Path, *questions: Any, **more: Any) -> list[set[str]]:
+def faults(tmp_path, *questions, **more):
     path = tmp_path / "shapes.json"
     path.write_text(json.dumps({"questions": questions, **more}))
     return [set(found) for found in audit_strangers(path, lambda done: None)["faults"]]
@@ -52,14 +50,12 @@ CASES = [
 
 @pytest.mark.parametrize(("question", "expected"), CASES)
 @pytest.mark.parametrize("more", [{}, {"camera_distance": 40.0}])
-def test_each_fault_is_named(
-    tmp_path: Path, question: Any, expected: set[str], more: dict[str, float]
-) -> None:
+def test_each_fault_is_named(tmp_path, question, expected, more):
     assert faults(tmp_path, question, **more) == [expected]
     assert expected <= set(RULES)
 
 
-def test_questions_of_ours_have_no_fault(split_folder: Path, tmp_path: Path) -> None:
+def test_questions_of_ours_have_no_fault(split_folder, tmp_path):
     with QuestionsFile(split_folder / "iqtt-val.h5") as file:
         truths = [truth for row in range(len(file)) if (truth := file.truth(row)) is not None]
         answers = [record.answer for record in file]
@@ -87,7 +83,7 @@ def test_questions_of_ours_have_no_fault(split_folder: Path, tmp_path: Path) -> 
         json.dumps({"questions": [GOOD], "camera_distance": -3}),
     ],
 )  # fmt: skip
-def test_what_is_no_list_of_questions_is_refused(tmp_path: Path, content: str) -> None:
+def test_what_is_no_list_of_questions_is_refused(tmp_path, content):
     path = tmp_path / "shapes.json"
     path.write_text(content)
     with pytest.raises(FileFormatError):

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from polycubes import some_shapes
 
 from iqtt.shapes.polycube import (
@@ -21,8 +20,6 @@ from iqtt.shapes.polycube import (
     set_ids,
     symmetries,
 )
-
-Shapes = NDArray[np.int8]
 
 ROD = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
 CORNER = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
@@ -159,14 +156,6 @@ def test_the_radius_reaches_the_farthest_corner(cubes):
         assert box_centre(shape[None])[0] == pytest.approx(centre)
         farthest = np.linalg.norm(corners - centre, axis=1).max()
         assert bounding_radius(shape[None])[0] == pytest.approx(farthest)
-
-
-def test_no_shapes_are_no_trouble():
-    nothing = np.zeros((0, 4, 3), dtype=np.int8)
-    assert canonical(nothing).shape == canonical_class(nothing).shape == (0, 4, 3)
-    assert set_ids(nothing).shape == is_chiral(nothing).shape == (0,)
-    assert symmetries(nothing).shape == (0, 24)
-    assert bounding_radius(nothing).shape == (0,)
 
 
 @pytest.mark.parametrize(

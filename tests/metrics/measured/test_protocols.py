@@ -19,7 +19,7 @@ SIZES = {"nyu": (480, 640), "kitti": (375, 1242)}
 SMALL = 1e-9
 
 
-def data(name: str, kind: str) -> tuple[np.ndarray, np.ndarray]:
+def data(name, kind):
     """True depth with holes and outliers in range, and a prediction (depth or disparity)."""
     rng = np.random.default_rng(len(name))
     height, width = SIZES["nyu" if "nyu" in name else "kitti"]
@@ -30,7 +30,7 @@ def data(name: str, kind: str) -> tuple[np.ndarray, np.ndarray]:
     return true, said if kind == "depth" else 3.0 / said + 0.2
 
 
-def kept(name: str, true: np.ndarray) -> np.ndarray:
+def kept(name, true):
     """The scored pixels, as the code of the sources selects them."""
     height, width = true.shape
     mask = np.nan_to_num(true) > 0
@@ -71,7 +71,7 @@ def kept(name: str, true: np.ndarray) -> np.ndarray:
     return mask & crop & (filled > low) & (filled < high)
 
 
-def aligned(name: str, p: np.ndarray, t: np.ndarray) -> np.ndarray:
+def aligned(name, p, t):
     """The prediction after the alignment and the clipping of the source."""
     if name == "kitti-eigen-garg-median":
         return np.clip(p * np.median(t) / np.median(p), 1e-3, 80.0)
@@ -88,7 +88,7 @@ def aligned(name: str, p: np.ndarray, t: np.ndarray) -> np.ndarray:
     return p
 
 
-def numbers(p: np.ndarray, t: np.ndarray) -> dict[str, float]:
+def numbers(p, t):
     """The measures of Eigen et al. 2014, as their formulas read."""
     ratio, logs = np.maximum(p / t, t / p), np.log(p) - np.log(t)
     return {
@@ -103,7 +103,7 @@ def numbers(p: np.ndarray, t: np.ndarray) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("name", [p.name for p in PROTOCOLS if not p.name.startswith("moge")])
-def test_a_protocol_is_that_of_its_source(name: str) -> None:
+def test_a_protocol_is_that_of_its_source(name):
     """To 1e-9, with holes, values out of range and predictions beyond the clip."""
     kind = "disparity" if "disparity" in name else "depth"
     true, said = data(name, kind)
@@ -117,7 +117,7 @@ def test_a_protocol_is_that_of_its_source(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "shift"), [("moge", True), ("moge-scale", False)])
-def test_moge_is_an_optimum_in_l1(name: str, shift: bool) -> None:
+def test_moge_is_an_optimum_in_l1(name, shift):
     """No line near the fitted one has a smaller mean of |s p + b - t| / t."""
     rng = np.random.default_rng(0)
     t = rng.uniform(1.0, 9.0, 400)
@@ -130,7 +130,7 @@ def test_moge_is_an_optimum_in_l1(name: str, shift: bool) -> None:
             assert np.mean(np.abs((scale + ds) * p + offset + db - t) / t) >= least - 1e-12
 
 
-def test_a_crop_of_another_size_is_refused() -> None:
+def test_a_crop_of_another_size_is_refused():
     """NYU's crop is of 480x640; the benchmark's crop of KITTI needs 352x1216; none may be empty."""
     for name, size in (("nyu-eigen", (479, 640)), ("kitti-kb", (352, 1215))):
         with pytest.raises(ProtocolError):
@@ -139,6 +139,6 @@ def test_a_crop_of_another_size_is_refused() -> None:
         scored_pixels(BY_NAME["nyu-eigen"], np.full((480, 640), 11.0))
 
 
-def test_the_page_has_the_table() -> None:
+def test_the_page_has_the_table():
     """docs/real-data.md shows every protocol as it is."""
     assert markdown_table() in (ROOT / "docs" / "real-data.md").read_text()

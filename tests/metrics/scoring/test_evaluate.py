@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import warnings
-from importlib.metadata import version
 
 import h5py
 import numpy as np
@@ -13,7 +12,6 @@ from h5_edits import replaced, told_again
 from refusals import refused
 
 from baselines.trivial import write_room_baseline
-from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import read_scores, to_json, write_scores
 from metrics.scoring import rooms
@@ -77,20 +75,6 @@ def test_runs_are_averaged_image_by_image(folder):
     assert [one.run for one in found.meta.submissions] == ["0", "1", "2"]
 
 
-def test_shards_are_scored_as_one_file(folder, make_rooms, tmp_path):
-    """The same rows, whichever way the submission was made."""
-    whole = make_rooms(tmp_path / "one.h5", 8)
-    (tmp_path / "set").mkdir()
-    parts = make_rooms(tmp_path / "set" / "rooms.h5", 8, {"shard_size": 3})
-    scores = []
-    for truth, name in ((whole, "a.h5"), (parts, "b.h5")):
-        write_room_baseline("empty-room", truth, tmp_path / name)
-        assert [p for p in validate(tmp_path / name, truth) if not p.is_hint] == []
-        scores.append(score([tmp_path / name], truth))
-    assert scores[0].metrics == scores[1].metrics
-    assert scores[0].meta.truth_digest == scores[1].meta.truth_digest
-
-
 def test_processes_change_no_digit_and_scores_read_back(folder, tmp_path):
     paths = [folder / "empty-room.h5"]
     one, two = (to_json(score(paths, settings=Settings(processes=n))) for n in (1, 2))
@@ -99,31 +83,6 @@ def test_processes_change_no_digit_and_scores_read_back(folder, tmp_path):
     assert found.metrics["chamfer"].value > 0.005
     write_scores(found, tmp_path / "x.json")
     assert to_json(read_scores(tmp_path / "x.json")) == one
-
-
-def test_files_are_opened_once_however_many_rows_they_have(folder, monkeypatch):
-    """Not once for each chunk of rows, or the cost would grow with the square of their number."""
-    opened = []
-    real = h5py.File
-
-    def counted(name, *arguments, **options):
-        opened.append(name)
-        return real(name, *arguments, **options)
-
-    monkeypatch.setattr(h5py, "File", counted)
-    counts = []
-    for chunk in (8, 1):
-        opened.clear()
-        monkeypatch.setattr("metrics.scoring.rows.CHUNK", chunk)
-        score([folder / "empty-room.h5"], settings=Settings(processes=1))
-        counts.append(len(opened))
-    assert counts[0] == counts[1]
-
-
-def test_provenance_names_the_libraries_that_compute(folder, questions):
-    for path in (folder / "oracle.h5", questions / "chance-0.h5"):
-        versions = score([path]).meta.versions
-        assert versions == {name: version(name) for name in ("numpy", "pykdtree", "scipy")}
 
 
 def test_views_are_averaged_within_scenes_and_told_by_angle(folder, tmp_path):
@@ -199,12 +158,6 @@ def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_pa
     assert found.meta.counts["rows_penalised"] == 1
     assert found.items["mse_depth"][row] == metric("mse_depth").worst()
     assert np.count_nonzero(found.items["mse_depth"]) == 1
-
-
-def test_another_truth_is_refused(folder, make_rooms, tmp_path):
-    other = make_rooms(tmp_path / "other.h5", 8, seed=99)
-    with refused(ScoringError, "oracle.h5: truth_fingerprint"):
-        score([folder / "oracle.h5"], other)
 
 
 def test_only_runs_of_one_method_are_averaged(folder):
@@ -304,14 +257,3 @@ def test_the_largest_depth_that_may_be_is_scored(folder, tmp_path):
     assert found.comparable
     for one in found.metrics.values():
         assert np.isfinite([one.value, one.low, one.high]).all()
-
-
-def test_half_the_depth_of_a_closed_room_has_the_shape_of_leaning_cut_outs(interior_path, tmp_path):
-    with RoomsFile(interior_path) as rooms:
-        pose, fov = (rooms.read(f"camera/{n}", 0) for n in ("world_from_camera", "fov_y_degrees"))
-        depth, _ = empty_room(pose, float(fov), 32, 32, rooms.room_size(0))
-        with RoomPredictionWriter(tmp_path / "x.h5", interior_path, method="half") as file:
-            file.add(0, 1.0 + 0.5 * depth)
-    items = score([tmp_path / "x.h5"], interior_path).items
-    assert items["shape_error"] == pytest.approx(items["leaning_shape_error"], rel=1e-5)
-    assert items["shape_error"] != pytest.approx(items["empty_room_shape_error"], rel=1e-2)

