@@ -26,7 +26,6 @@ from metrics.scoring.rows import other_scenes
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.truths import TrueView
-from metrics.views.score_tables import partner_sentences
 from scenegen.camera import back_project
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
@@ -210,13 +209,6 @@ def test_a_row_without_a_partner_is_left_out_of_the_skill_of_relief(tmp_path):
     write_scores(file, tmp_path / "m.json")
     found = read_scores(tmp_path / "m.json")
     assert found.skills["relief_iou"].value == pytest.approx(0.4 / 0.9)
-    assert "over 3 of 4 images" in partner_sentences(found)[0]
-    assert (
-        partner_sentences(
-            rooms_scores("m", columns | {"other_scene_relief_iou": [0.1] * 4}, range(4))
-        )
-        == []
-    )
 
 
 def test_the_scores_of_one_scene_have_no_skill_of_relief(make_rooms, tmp_path):
@@ -226,8 +218,8 @@ def test_the_scores_of_one_scene_have_no_skill_of_relief(make_rooms, tmp_path):
     assert found.skills["chamfer"].low is None
 
 
-@pytest.mark.parametrize(("value", "told"), [(-1, "no shape"), (99, "no shape")])
-def test_a_truth_whose_objects_have_no_shape_is_refused(folder, tmp_path, value, told):
+@pytest.mark.parametrize("value", [-1, 99])
+def test_a_truth_whose_objects_have_no_shape_is_refused(folder, tmp_path, value):
     truth = tmp_path / "rooms.h5"
     truth.write_bytes((folder / "rooms.h5").read_bytes())
     with h5py.File(truth, "r+") as file:
@@ -235,7 +227,7 @@ def test_a_truth_whose_objects_have_no_shape_is_refused(folder, tmp_path, value,
     with pytest.raises(FileFormatError) as caught:
         score([folder / "noisy-0.h5"], truth)
     assert caught.value.where == f"{truth}: object/shape, row 3"
-    assert told in caught.value.found
+    assert "no shape" in caught.value.found
 
 
 @pytest.fixture(scope="module")

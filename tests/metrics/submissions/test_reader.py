@@ -125,18 +125,6 @@ def test_answers_from_scores_abstain_where_tied(truths, tmp_path):
         assert found.answers.tolist() == [0, -1, -1, 2, 1, 0]
 
 
-def test_answers_alone(truths, tmp_path):
-    def edit(file):
-        del file["scores"]
-        file["answer"][0] = -1
-        file["question"][...] = [5, 4, 3, 2, 1, 0]
-
-    with open_predictions(edited(edit, good_answers)(tmp_path, truths.iqtt)) as found:
-        assert found.answers.tolist() == [-1, 1, 2, 2, 1, 0]
-        assert found.rows.tolist() == [5, 4, 3, 2, 1, 0]
-        assert found.scores is None
-
-
 @pytest.mark.parametrize("count", [3, 65_536, 70_001])
 def test_scores_are_read_in_blocks(count, tmp_path):
     rng = np.random.default_rng(count)

@@ -4,7 +4,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
-from h5_edits import attribute, damaged_chunk
+from h5_edits import attribute
 from submissions import edited, good_answers, good_rooms
 
 from metrics.submissions.validation import validate
@@ -62,18 +62,6 @@ def test_ids_are_rows_of_the_truth(truths, tmp_path):
     assert problem.ids == (7,)
 
 
-def test_a_damaged_row_does_not_hide_the_others(truths, tmp_path):
-    def spoil(file):
-        damaged_chunk("depth", 3)(file)
-        file["depth"][6, 0, 0] = np.nan
-
-    problems = validate(edited(spoil)(tmp_path, truths.rooms), truths.rooms)
-    assert [(one.dataset, one.rule, one.ids) for one in problems] == [
-        ("depth", "finite", (6,)),
-        ("depth", "readable", (3,)),
-    ]
-
-
 def test_problems_of_answers_at_once(truths, tmp_path):
     def spoil(file):
         file.attrs["run"] = 3
@@ -85,21 +73,6 @@ def test_problems_of_answers_at_once(truths, tmp_path):
     assert {(p.dataset, p.rule) for p in problems} >= {
         ("run", "type"), ("question", "unique"), ("outcome", "range"), ("rotated", "agreement"),
     }  # fmt: skip
-
-
-def test_without_depth_the_rest_is_still_told(truths, tmp_path):
-    def spoil(file):
-        del file["depth"]
-        del file["normal"]
-        file["normal"] = np.zeros((8, 3))
-        file["row"][0] = 3
-
-    problems = validate(edited(spoil)(tmp_path, truths.rooms))
-    assert [(one.dataset, one.rule) for one in problems] == [
-        ("depth", "present"),
-        ("normal", "shape"),
-        ("row", "unique"),
-    ]
 
 
 def test_another_truth_is_told_alone(truths, tmp_path):
