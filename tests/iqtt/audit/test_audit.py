@@ -12,12 +12,7 @@ from audit_tables import audited
 
 from iqtt.audit.audit import to_json
 from iqtt.audit.report import markdown, table
-from iqtt.shapes.polycube import (
-    ROTATIONS,
-    canonical,
-    canonical_class,
-    set_ids,
-)
+from iqtt.shapes.polycube import ROTATIONS, canonical, canonical_class, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
 
 OF_IMAGES = ("answer places", "pixel values", "framing", "distinct images", "distinct questions")

@@ -160,10 +160,7 @@ def test_plain_h5py_reads_every_type_and_compression(compression, dtype, plain, 
     spec = replace(TINY, image_dtype=dtype, with_depth=True)
     make_split(tmp_path / "split", spec, compression=compression)
     for name, path in (("iqtt-train.h5", "unlabeled/questions"), ("iqtt-val.h5", "questions")):
-        with (
-            h5py.File(plain / name) as whole,
-            h5py.File(tmp_path / "split" / name) as file,
-        ):
+        with h5py.File(plain / name) as whole, h5py.File(tmp_path / "split" / name) as file:
             images = file[path]
             assert images.dtype == dtype
             assert images.compression == (None if compression == "none" else compression)

@@ -6,13 +6,7 @@ import pytest
 from refusals import refused
 
 from iqtt.files.layout import NO_CUBE
-from iqtt.files.reader import (
-    AnswersFile,
-    QuestionsDataset,
-    answers_beside,
-    open_questions,
-    parts,
-)
+from iqtt.files.reader import AnswersFile, QuestionsDataset, answers_beside, open_questions, parts
 from iqtt.questions.kinds import DISTRACTOR_KINDS
 from scenegen.common.errors import FileFormatError, SpecError
 

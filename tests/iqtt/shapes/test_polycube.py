@@ -107,16 +107,10 @@ def test_many_shapes_at_once_give_what_each_gives_alone():
 @pytest.mark.parametrize(
     ("cubes", "count", "chiral"),
     [
-        ([[0, 0, 0]], 24, False),
-        (BLOCK, 24, False),
-        (ROD, 8, False),
-        (SQUARE, 8, False),
-        (TRIPOD, 3, False),
-        (CORNER, 2, False),
-        (TWIST, 2, True),
-        (BENT_ARM, 1, True),
+        ([[0, 0, 0]], 24, False), (BLOCK, 24, False), (ROD, 8, False), (SQUARE, 8, False),
+        (TRIPOD, 3, False), (CORNER, 2, False), (TWIST, 2, True), (BENT_ARM, 1, True),
     ],
-)
+)  # fmt: skip
 def test_symmetries_and_chirality_of_known_shapes(cubes, count, chiral):
     shape = one(cubes)
     assert is_chiral(shape) == is_chiral(mirror(shape)) == [chiral]

@@ -18,12 +18,7 @@ from metrics.submissions.reader import open_predictions
 
 pytest.importorskip("inspect_ai")
 pytest.importorskip("openai")
-from inspect_ai.log import (
-    EvalSampleLimit,
-    ProvenanceData,
-    read_eval_log,
-    write_eval_log,
-)
+from inspect_ai.log import EvalSampleLimit, ProvenanceData, read_eval_log, write_eval_log
 
 pytestmark = pytest.mark.filterwarnings("default")  # of what Inspect imports
 KEY = "sk-secret-of-this-test"

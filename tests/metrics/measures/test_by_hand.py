@@ -16,12 +16,7 @@ from metrics.measures.depth import align, compare_depth, delta, depth_scores, si
 from metrics.measures.guesses import balls_and_blocks
 from metrics.measures.objects import LEAST_PIXELS, object_means, single_objects, size_range
 from metrics.measures.relief import depth_along, empty_room, relief_scores
-from metrics.measures.shape import (
-    flat_error,
-    inside_objects,
-    one_normal_degrees,
-    shape_scores,
-)
+from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores
 from metrics.measures.skill import skill, skill_intervals
 from metrics.measures.statistics import pooled_means
 from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, f_score

@@ -13,15 +13,7 @@ from refusals import refused
 from baselines.trivial import write_chance
 from iqtt.files.make import make_split
 from iqtt.files.reader import open_questions
-from iqtt.floors import (
-    CHANCE,
-    Floor,
-    Measured,
-    floor_of_questions,
-    floors_of,
-    settings_of,
-    to_json,
-)
+from iqtt.floors import CHANCE, Floor, Measured, floor_of_questions, floors_of, settings_of, to_json
 from iqtt.questions.kinds import question_kind
 from iqtt.questions.specs import PRESETS, SUITE, SplitSpec, preset_spec
 from metrics.measures.statistics import design_effect, wilson_interval

@@ -10,11 +10,7 @@ from h5_edits import damaged_chunk, put
 from refusals import refused
 from submissions import as_json, edited, good_answers
 
-from metrics.submissions.reader import (
-    QuestionPredictions,
-    RoomPredictions,
-    open_predictions,
-)
+from metrics.submissions.reader import QuestionPredictions, RoomPredictions, open_predictions
 from metrics.submissions.truths import match_problems
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile

@@ -10,10 +10,7 @@ from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
 from metrics.measures.surfaces.chamfer_hausdorff import nearest_distances, point_scores
-from metrics.measures.surfaces.normals import (
-    angular_errors_degrees,
-    normals_from_depth,
-)
+from metrics.measures.surfaces.normals import angular_errors_degrees, normals_from_depth
 from scenegen.camera import back_project, pixel_directions
 
 FOV = 20.0
