@@ -1,4 +1,4 @@
-"""Who may import whom, and which heavy modules a start-up leaves out."""
+"""Which heavy modules a start-up leaves out."""
 
 import json
 import subprocess

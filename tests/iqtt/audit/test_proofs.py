@@ -1,4 +1,4 @@
-"""Proofs of kinds: fair questions pass, and each rule is seen to be broken."""
+"""Proofs of kinds, images, views, splits and explanations: each rule is seen to be broken."""
 
 import hashlib
 from dataclasses import replace

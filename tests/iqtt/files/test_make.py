@@ -129,21 +129,17 @@ def test_odd_requests_are_answered_in_full(changed, tmp_path):
     done = []
     make_split(tmp_path / "split", spec, batch=1, progress=done.append)
     assert sum(done) == spec.train + spec.val + spec.test
-    sizes = {
-        "iqtt-train.h5": {"labeled/": spec.labeled, "unlabeled/": spec.train - spec.labeled},
-        "iqtt-val.h5": {"": spec.val},
-        "iqtt-test.h5": {"": spec.test},
-    }
-    for name, groups in sizes.items():
-        with h5py.File(tmp_path / "split" / name) as file:
-            for group, count in groups.items():
-                images = file[group + "questions"]
-                assert images.shape == (count, 4, spec.height, spec.width, 3)
-                raw = {image.tobytes() for image in images[:].reshape(-1, *images.shape[2:])}
-                assert len(raw) == 4 * count, "all images differ"
-                if f"{group}answers" in file:
-                    counts = np.bincount(file[f"{group}answers"][:], minlength=3)
-                    assert np.ptp(counts) <= 1
+    for name, group, count in (
+        ("train", "labeled/", spec.labeled), ("train", "unlabeled/", spec.train - spec.labeled),
+        ("val", "", spec.val), ("test", "", spec.test),
+    ):  # fmt: skip
+        with h5py.File(tmp_path / "split" / f"iqtt-{name}.h5") as file:
+            images = file[group + "questions"]
+            assert images.shape == (count, 4, spec.height, spec.width, 3)
+            raw = {image.tobytes() for image in images[:].reshape(-1, *images.shape[2:])}
+            assert len(raw) == 4 * count, "all images differ"
+            if f"{group}answers" in file:
+                assert np.ptp(np.bincount(file[f"{group}answers"][:], minlength=3)) <= 1
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""Random shapes and the lists of all shapes, against published counts."""
+"""Random shapes, lists of all against published counts, moved cubes, and matched shapes."""
 
 import itertools
 

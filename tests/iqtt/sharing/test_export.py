@@ -1,4 +1,4 @@
-"""Exported questions, read by the loaders that people use: every pixel, answer and truth."""
+"""Exports, read by the loaders that people use, and cards: what they tell, and what they do not."""
 
 import hashlib
 import json

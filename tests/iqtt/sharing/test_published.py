@@ -1,4 +1,4 @@
-"""Which files of a split are handed out, and which folders are none of a split."""
+"""Which files of a split are handed out; none tells the answers of test questions."""
 
 import json
 import shutil

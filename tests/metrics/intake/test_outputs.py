@@ -1,4 +1,4 @@
-"""What models return becomes geometry in our conventions, or is refused with its name."""
+"""What models return becomes geometry in our conventions and size, or is refused by name."""
 
 import numpy as np
 import pytest

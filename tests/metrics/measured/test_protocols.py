@@ -33,42 +33,31 @@ def data(name, kind):
 def kept(name, true):
     """The scored pixels, as the code of the sources selects them."""
     height, width = true.shape
-    mask = np.nan_to_num(true) > 0
-    crop = np.zeros_like(mask)
+    crop = np.zeros(true.shape, bool)
+    benchmark = np.s_[height - 352 : height, (width - 1216) // 2 : (width - 1216) // 2 + 1216]
+
+    def shares(top, bottom, left, right, h=height, w=width):
+        return np.s_[int(top * h) : int(bottom * h), int(left * w) : int(right * w)]
+
+    eigen = 0.3324324, 0.91351351, 0.0359477, 0.96405229
     if "nyu" in name:
         crop[45:471, 41:601] = True
-    elif name in ("kitti-eigen-garg", "kitti-eigen-garg-median"):
-        crop[
-            int(0.40810811 * height) : int(0.99189189 * height),
-            int(0.03594771 * width) : int(0.96405229 * width),
-        ] = True
+    elif name.startswith("kitti-eigen-garg"):
+        crop[shares(0.40810811, 0.99189189, 0.03594771, 0.96405229)] = True
     elif name == "kitti-eigen":
-        crop[
-            int(0.3324324 * height) : int(0.91351351 * height),
-            int(0.0359477 * width) : int(0.96405229 * width),
-        ] = True
-    elif name in ("kitti-kb", "affine-depth-kitti"):
-        top, left = int(height - 352), int((width - 1216) / 2)
-        if name == "kitti-kb":
-            crop[top : top + 352, left : left + 1216] = True
-        else:
-            inner = np.zeros((352, 1216), bool)
-            inner[
-                int(0.3324324 * 352) : int(0.91351351 * 352),
-                int(0.0359477 * 1216) : int(0.96405229 * 1216),
-            ] = True
-            crop[top : top + 352, left : left + 1216] = inner
+        crop[shares(*eigen)] = True
+    elif name == "kitti-kb":
+        crop[benchmark] = True
+    elif name == "affine-depth-kitti":
+        crop[benchmark][shares(*eigen, 352, 1216)] = True
     else:
         crop[:] = True
-    low, high = {"nyu": (1e-3, 10.0), "kitti": (1e-3, 80.0)}.get(
-        name.split("-", maxsplit=1)[0], (0.0, np.inf)
-    )
-    low, high = (1e-3, 10.0) if name == "affine-depth-nyu" else (low, high)
-    low, high = (1e-5, 80.0) if name == "affine-depth-kitti" else (low, high)
-    low = 1e-5 if name == "affine-depth" else low
-    high = {"affine-disparity-10m": 10.0}.get(name, high)
+    ends = {"nyu": (1e-3, 10.0), "kitti": (1e-3, 80.0), "affine-depth": (1e-5, np.inf)}
+    ends |= {"affine-depth-nyu": (1e-3, 10.0), "affine-depth-kitti": (1e-5, 80.0)}
+    ends |= {"affine-disparity-10m": (0.0, 10.0)}
+    low, high = ends.get(name, ends.get(name.split("-", maxsplit=1)[0], (0.0, np.inf)))
     filled = np.nan_to_num(true)
-    return mask & crop & (filled > low) & (filled < high)
+    return crop & (filled > 0) & (filled > low) & (filled < high)
 
 
 def aligned(name, p, t):

@@ -1,4 +1,7 @@
-"""Edges of the measures, by hand; `scoring/test_definitions` has the formulas on whole files."""
+"""Edges of the measures, by hand, and guesses that must win nothing.
+
+`scoring/test_definitions` has the formulas on whole files.
+"""
 
 from typing import get_args
 
@@ -9,7 +12,7 @@ from hypothesis import strategies as st
 
 from metrics.measures.alignment import Alignment
 from metrics.measures.answers import ABSTAINED, answers_from_scores
-from metrics.measures.behind import MARGIN, hidden_from
+from metrics.measures.behind import MARGIN, behind_scores, hidden_from
 from metrics.measures.boundaries import RATIOS, boundary_scores
 from metrics.measures.checks import EmptyError, MeasureError, NonFiniteError
 from metrics.measures.depth import align, compare_depth, delta, depth_scores, silog
@@ -408,3 +411,12 @@ def test_where_there_is_no_interval():
     for scores, floors in (([0.1, 0.2], [0.0, 0.0]), ([0.1], [0.1, 0.2]), ([], [])):
         with pytest.raises(MeasureError):
             skill_interval(scores, floors, 0)
+
+
+def test_scores_of_what_is_hidden():
+    errors, nearest = np.linspace(0.0, 0.3, 16), np.repeat([0.01, 0.06], 8)
+    assert behind_scores(errors, nearest) == {
+        "behind_depth_error": pytest.approx(0.15),
+        "behind_recall_0.05": 0.5,
+    }
+    assert np.isnan(list(behind_scores(errors[1:], nearest[1:]).values())).all()

@@ -1,4 +1,4 @@
-"""Pictures of views: what their colours say, and values that are hard to draw."""
+"""Pictures and figures: which are shown, what they say, and values that are hard to draw."""
 
 import base64
 import io

@@ -1,4 +1,4 @@
-"""Tests of what the audit measures: by hand, and angles against the generator's."""
+"""What the audit measures of pictures and reads of stored frames, by hand."""
 
 from types import SimpleNamespace
 

@@ -1,4 +1,4 @@
-"""Angles between normals, and normals from depth on surfaces whose normals are known."""
+"""Normals from depth on known surfaces, their angles, and distances of point clouds."""
 
 import sys
 
@@ -136,3 +136,11 @@ def test_without_pykdtree_scipy_takes_over(monkeypatch):
     assert nearest_distances(a, b).forward == pytest.approx(expected.forward, rel=1e-12)
     with pytest.raises(ImportError):
         nearest_distances(a, b, "pykdtree")
+
+
+def test_rooms_face_the_viewer_and_edges_do_not_smear(room_depth):
+    depth = room_depth(1, 64)
+    normals, on_surface = normals_from_depth(depth, FOV)
+    assert ((normals * back_project(depth, FOV)).sum(axis=-1) < 0.0).all()
+    assert np.linalg.norm(normals, axis=-1) == pytest.approx(np.ones(depth.shape))
+    assert on_surface.mean() > 0.99
