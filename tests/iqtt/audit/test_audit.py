@@ -3,17 +3,25 @@
 import json
 import shutil
 from collections.abc import Callable
+from contextlib import contextmanager
 from typing import Any
 
 import h5py
 import numpy as np
 import pytest
 from audit_tables import audited
+from h5_edits import attribute, gone
+from refusals import refused
 
 from iqtt.audit.audit import to_json
+from iqtt.audit.proofs.images import content
 from iqtt.audit.report import markdown, table
+from iqtt.audit.strangers import RULES, audit_strangers
+from iqtt.audit.table import content_problems, open_paths, read_table
+from iqtt.files.reader import AnswersFile, QuestionsFile
 from iqtt.shapes.polycube import ROTATIONS, canonical, canonical_class, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.files.content import column_digest, row_digest, seal
 
 OF_IMAGES = ("answer places", "pixel values", "framing", "distinct images", "distinct questions")
 BY_CUBES = {
@@ -225,3 +233,201 @@ def test_only_questions_with_answers_are_measured(tmp_path):
     found = audited([tmp_path], probed=3)
     assert [(t.answers, t.probed) for t in found.tables] == [("stored", 3), ("unknown", 0)]
     assert {p.n for p in found.probes} == {3}
+
+
+FILES = ("iqtt-train.h5", "iqtt-val.h5", "iqtt-test.h5", "iqtt-test-answers.h5")
+
+
+@contextmanager
+def tables_of(*paths):
+    with open_paths(paths) as opened:
+        yield [read_table(*named, np.zeros(0, int)) for named in opened.items()]
+
+
+def judged(*paths):
+    """The proof of the content of some files, alone."""
+    with tables_of(*paths) as tables:
+        return content(tables)
+
+
+def places(path):
+    """Every attribute and every dataset of a file: (name, attribute or None)."""
+    with h5py.File(path) as file:
+        found = [("/", key) for key in file.attrs]
+
+        def add(name, item):
+            found.extend((name, key) for key in item.attrs)
+            if isinstance(item, h5py.Dataset):
+                found.append((name, None))
+
+        file.visititems(add)
+    return found
+
+
+def flipped(value, rng):
+    """The value with one bit changed, of a character or of a number."""
+    if isinstance(value, str):
+        at = int(rng.integers(len(value)))
+        return value[:at] + chr(ord(value[at]) ^ 1) + value[at + 1 :]
+    array = np.array(value)
+    if array.dtype.kind == "O":
+        array[0] = flipped(array[0], rng)
+        return array
+    raw = array.reshape(-1).view(np.uint8)
+    raw[rng.integers(raw.size)] ^= 1 << rng.integers(8)
+    return array
+
+
+@pytest.mark.parametrize("every", [27, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("name", FILES)
+def test_every_changed_bit_is_found(split_folder, tmp_path, name, every):
+    """Of one place in 27; the slow test changes all."""
+    rng = np.random.default_rng(7)
+    for one in FILES:
+        shutil.copy(split_folder / one, tmp_path)
+    assert judged(tmp_path / name).status == "ok"
+    whole, missed = (split_folder / name).read_bytes(), []
+    for where, key in places(split_folder / name)[::every]:
+        with h5py.File(tmp_path / name, "r+") as file:
+            if key is None:
+                file[where][...] = flipped(file[where][()], rng)
+            else:
+                file[where].attrs[key] = flipped(file[where].attrs[key], rng)
+        try:
+            if judged(tmp_path / name).status != "FAIL":
+                missed.append((where, key))
+        except FileFormatError:
+            pass
+        (tmp_path / name).write_bytes(whole)
+    assert missed == []
+
+
+def test_nothing_may_be_added_taken_away_or_renamed(damaged):
+    edits = {
+        "an attribute more": attribute("note", "mine"),
+        "a dataset more": lambda file: file.create_dataset("x", data=1),
+        "a name more": lambda file: file.__setitem__("zz", file["questions"]),
+        "no digest of a dataset": lambda file: file["answers"].attrs.__delitem__("sha256"),
+        "a group renamed": lambda file: file.move("truth", "lies"),
+    }
+    for name, edit in edits.items():
+        assert judged(damaged(edit)).status == "FAIL", name
+
+
+def test_a_forger_who_seals_again_has_another_digest_of_truth(damaged):
+    """That digest is what score files name."""
+
+    def forge(file):
+        file["answers"][:] = (file["answers"][:] + 1) % 3
+        file["answers"].attrs["sha256"] = column_digest(map(row_digest, file["answers"][:]))
+        seal(file)
+
+    path = damaged(forge)
+    with tables_of(path) as (table,):
+        assert table.truth_changed
+        assert len(content_problems([table])) == 1
+    with AnswersFile(path) as answers:
+        assert len(answers.problems()) == 1
+
+
+def test_released_files_have_no_digests_and_are_not_judged(split_folder, released):
+    without = released("x.h5")
+    assert judged(without).status == "skipped"
+    both = judged(without, split_folder / "iqtt-train.h5")
+    assert both.status == "ok"
+    assert without.name in both.detail
+
+
+def test_new_files_must_have_their_digests(damaged):
+    for name in ("content_digest", "truth_digest"):
+        with refused(FileFormatError, f"attribute {name!r}", "none"):
+            judged(damaged(gone(name)))
+
+
+L = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 1, 1]]  # chiral
+
+
+FLAT = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0]]  # its mirror image is itself
+
+
+TILTED = [[0.8, 0.0, 0.6], [0.36, 0.8, -0.48], [-0.48, 0.6, 0.64]]
+
+
+OTHER = [[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]]
+
+
+def mirrored(cubes):
+    return [[-x, y, z] for x, y, z in cubes]
+
+
+def view(cubes, rotation=TILTED):
+    return {"cubes": cubes, "rotation": rotation}
+
+
+def faults(tmp_path, *questions, **more):
+    path = tmp_path / "shapes.json"
+    path.write_text(json.dumps({"questions": questions, **more}))
+    return [set(found) for found in audit_strangers(path, lambda done: None)["faults"]]
+
+
+GOOD = {"reference": view(L), "answers": [view(L, OTHER), view(mirrored(L), OTHER)], "key": 0}
+
+
+CASES = [
+    (GOOD, set()),
+    ({**GOOD, "key": 1}, {"wrong key"}),
+    ({**GOOD, "key": 2}, {"wrong key"}),
+    ({**GOOD, "answers": GOOD["answers"][1:] * 2}, {"no right answer", "equal pictures"}),
+    (
+        {"reference": view(FLAT), "answers": [view(FLAT, OTHER), view(mirrored(FLAT), TILTED)]},
+        {"more than one right answer"},
+    ),
+    ({**GOOD, "answers": [view(L, OTHER), view(L[:4], OTHER)]}, {"unlike cube counts"}),
+    ({**GOOD, "answers": [view(L, OTHER), view([*L[:4], [5, 5, 5]])]}, {"more than one piece"}),
+    (
+        {**GOOD, "reference": view(L, np.eye(3).tolist())},
+        {"hidden cube"},  # the cube at [2, 1, 0] lies behind that at [2, 1, 1]
+    ),
+]
+
+
+@pytest.mark.parametrize(("question", "expected"), CASES)
+@pytest.mark.parametrize("more", [{}, {"camera_distance": 40.0}])
+def test_each_fault_is_named(tmp_path, question, expected, more):
+    assert faults(tmp_path, question, **more) == [expected]
+    assert expected <= set(RULES)
+
+
+def test_questions_of_ours_have_no_fault(split_folder, tmp_path):
+    with QuestionsFile(split_folder / "iqtt-val.h5") as file:
+        truths = [truth for row in range(len(file)) if (truth := file.truth(row)) is not None]
+        answers = [record.answer for record in file]
+    for truth, answer in zip(truths, answers, strict=True):
+        views = [
+            view(cubes.tolist(), rotation.tolist())
+            for cubes, rotation in zip(truth.cubes, truth.world_from_shape, strict=True)
+        ]
+        question = {"reference": views[0], "answers": views[1:], "key": answer}
+        distance = float(truth.camera.position[2])
+        assert faults(tmp_path, question, camera_distance=distance) == [set()]
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "nonsense", "[]", "{}", '{"questions": []}', '{"questions": [1]}',
+        '{"questions": [{"reference": {}, "answers": []}]}',
+        json.dumps({"questions": [{**GOOD, "reference": view([[0, 0]])}]}),
+        json.dumps({"questions": [{**GOOD, "reference": view([[0, 0, 0.5]])}]}),
+        json.dumps({"questions": [{**GOOD, "reference": view([*L, L[0]])}]}),
+        json.dumps({"questions": [{**GOOD, "answers": GOOD["answers"][:1]}]}),
+        json.dumps({"questions": [{**GOOD, "reference": view(L, np.diag([1, 1, -1]).tolist())}]}),
+        json.dumps({"questions": [GOOD], "camera_distance": 1.0}),
+        json.dumps({"questions": [GOOD], "camera_distance": -3}),
+    ],
+)  # fmt: skip
+def test_what_is_no_list_of_questions_is_refused(tmp_path, content):
+    path = tmp_path / "shapes.json"
+    path.write_text(content)
+    with pytest.raises(FileFormatError):
+        audit_strangers(path, lambda done: None)

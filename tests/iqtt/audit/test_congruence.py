@@ -72,6 +72,7 @@ def numbered(ids):
 
 def test_comparing_decides_where_invariants_collide(monkeypatch):
     monkeypatch.setattr(congruence, "shape_invariants", lambda cubes: np.zeros(len(cubes)))
+    monkeypatch.setattr(congruence, "_CHUNK", 7)
     classes = all_classes(5)
     rng = np.random.default_rng(0)
     shapes = np.concatenate([classes, mirror(classes), classes])
