@@ -7,12 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from scenegen.camera import (
-    Camera,
-    back_project,
-    intrinsics,
-    pixel_directions,
-)
+from scenegen.camera import Camera, back_project, intrinsics, pixel_directions
 from scenegen.common.errors import SpecError
 
 COORDINATE = st.floats(-9.0, 9.0)
