@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,7 @@ ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
 LARGEST_SIDE = {".webp": 16_383, ".jpg": 65_500, ".jpeg": 65_500, ".gif": 65_535}  # of the formats
 READ = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp", ".ppm", ".pgm")  # endings
 ORIENTATION = 0x0112  # of EXIF
-TURNS = {  # by its values, 1 for none: axes swapped first, then rows and columns reversed
-    2: (False, 1, -1), 3: (False, -1, -1), 4: (False, -1, 1),
-    5: (True, 1, 1), 6: (True, 1, -1), 7: (True, -1, -1), 8: (True, -1, 1),
-}  # fmt: skip
+SWAPPED = (5, 6, 7, 8)  # its values that swap the sides
 
 
 @contextmanager
@@ -53,35 +50,20 @@ def opened_picture(source: Path | IO[bytes], most: int) -> "Iterator[Image]":
         raise FileFormatError(where, f"a picture that cannot be read ({reason:.120})") from error
 
 
-def orientation_of(picture: "Image") -> int:
-    """Return how the EXIF data of a picture turn it, a key of TURNS or another number for not.
-
-    TIFF files are turned by Pillow.
-    """
-    return 1 if picture.format == "TIFF" else int(picture.getexif().get(ORIENTATION, 1))
-
-
-def upright(values: NDArray[Any], orientation: int) -> NDArray[Any]:
-    """Return the pixels of a picture, (H, W, ...), turned as `orientation_of` says."""
-    swapped, down, right = TURNS.get(orientation, (False, 1, 1))
-    turned: NDArray[Any] = values.swapaxes(0, 1) if swapped else values
-    return turned[::down, ::right]
-
-
 def picture_size(path: Path, most: int) -> tuple[int, int]:
     """Return height and width of a picture, from its head, as `read_picture` returns it.
 
     Raises as `opened_picture`.
     """
     with opened_picture(path, most) as picture:
-        swapped = TURNS.get(orientation_of(picture), (False,))[0]
+        is_turned_later = picture.format != "TIFF"  # whose head Pillow turns itself
+        swapped = is_turned_later and picture.getexif().get(ORIENTATION) in SWAPPED
         return picture.size if swapped else picture.size[::-1]
 
 
-def is_turned(path: Path, most: int) -> bool:
-    """Return whether a picture has EXIF data that turn it. Raises as `opened_picture`."""
-    with opened_picture(path, most) as picture:
-        return picture.getexif().get(ORIENTATION, 1) in TURNS
+def is_turned(picture: "Image") -> bool:
+    """Return whether a picture has EXIF data that turn it."""
+    return picture.getexif().get(ORIENTATION, 1) != 1
 
 
 def read_picture(path: Path, most: int) -> NDArray[np.uint8]:
@@ -124,14 +106,19 @@ def shares_of(picture: "Image", side: int) -> NDArray[np.float32]:
 
 def _turned(picture: "Image") -> "Image":
     """Return a picture turned as its EXIF data say; of 16 bits a channel in the mode "I"."""
-    from PIL import ImageOps
-
-    picture = ImageOps.exif_transpose(picture)
+    picture = upright(picture)
     if picture.mode.startswith("I"):  # of which `convert` to bytes would cut off what is white
         picture = picture.convert("I")
     if picture.mode == "F" or (picture.mode == "I" and np.asarray(picture).max() > 65_535):
         raise ValueError("numbers of 32 bits, expected 8 or 16")
     return picture
+
+
+def upright(picture: "Image") -> "Image":
+    """Return a picture turned as its EXIF data say."""
+    from PIL import ImageOps
+
+    return ImageOps.exif_transpose(picture)
 
 
 def pick_rows(

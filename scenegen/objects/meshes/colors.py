@@ -17,7 +17,13 @@ from scipy.spatial import cKDTree
 from scenegen.common.srgb import decoded
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.meshes.materials import MeshMaterial, Unread, glb_materials, mtl_material
+from scenegen.objects.meshes.materials import (
+    MeshMaterial,
+    Unread,
+    glb_material,
+    mtl_material,
+    plain_glb,
+)
 from scenegen.objects.meshes.readers.text import utf8
 
 Array = NDArray[Any]
@@ -72,11 +78,10 @@ def read_triangles(
     Raises BadMeshError where trimesh cannot read the file. `resolver` finds the files beside it.
     """
     triangles, pieces = [np.zeros((0, 3, 3))], list[Piece]()
-    materials: list[MeshMaterial] = []
+    materials: dict[int, MeshMaterial] = {}
     try:
         if suffix == ".glb":
-            beside = _nothing if resolver is None else resolver.get
-            data, materials = glb_materials(data, beside, unread)
+            data, lying = plain_glb(data, unread)
         elif suffix == ".obj":
             data = utf8(data)
             if LARGE_COLOR.search(data, 0, HEAD):
@@ -93,26 +98,24 @@ def read_triangles(
             if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
                 placed = trimesh.transform_points(mesh.triangles.reshape(-1, 3), matrix)
                 triangles.append(placed.reshape(-1, 3, 3))
-                pieces.append(_piece(mesh, materials, getattr(resolver, "is_linear", False)))
+                told, uv, made = mesh.visual, None, None
+                if told.kind == "texture":
+                    key = id(told.material)
+                    if key not in materials:
+                        materials[key] = (
+                            glb_material(told.material, lying[int(told.material.name)], unread)
+                            if suffix == ".glb"
+                            else mtl_material(told.material, getattr(resolver, "is_linear", False))
+                        )
+                    made = materials[key]
+                    uv = None if told.uv is None else made.moved(told.uv)
+                pieces.append(Piece(mesh, made, uv))
     except BadMeshError:
         raise
     except Exception as error:  # trimesh raises what its parsers meet
         problem = f"{type(error).__name__}: {error}"
         raise BadMeshError("colours", problem, hint="export it without them") from error
     return np.concatenate(triangles), pieces
-
-
-def _nothing(name: str) -> bytes:
-    raise FileNotFoundError(name)
-
-
-def _piece(mesh: trimesh.Trimesh, materials: list[MeshMaterial], is_linear: bool) -> Piece:
-    visual: Any = mesh.visual
-    if visual.kind != "texture":
-        return Piece(mesh, None, None)
-    told = visual.material
-    made = materials[int(told.name)] if materials else mtl_material(told, is_linear)
-    return Piece(mesh, made, None if visual.uv is None else made.moved(visual.uv))
 
 
 def matched(triangles: Array, up: str, vertices: Array, faces: Array) -> tuple[Array, Array, Array]:

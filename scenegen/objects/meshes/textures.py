@@ -2,6 +2,7 @@
 
 import io
 import os
+import sys
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -15,7 +16,6 @@ from scenegen.objects.furniture.furnishing import CLAMP, MIRROR, REPEAT, Paint, 
 from scenegen.objects.meshes.clean import MOST_COORDINATE
 from scenegen.objects.meshes.colors import Piece, colors_of, matched, read_triangles
 from scenegen.objects.meshes.materials import (
-    MOST_OPENED,
     OPTION,
     ROUGHNESS,
     MeshMaterial,
@@ -50,7 +50,7 @@ class _Beside(trimesh.resolvers.Resolver):  # type: ignore[misc]
                 data = utf8(data)
                 self.is_linear = data.startswith(b"# Blender")
             else:
-                with opened_picture(io.BytesIO(data), MOST_OPENED):
+                with opened_picture(io.BytesIO(data), sys.maxsize):
                     pass
         except Exception:  # trimesh goes on without it
             words = f"names {name!r}, which cannot be read; such models are plain"

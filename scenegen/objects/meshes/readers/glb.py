@@ -40,12 +40,12 @@ def read_glb(data: bytes) -> tuple[Array, Array]:
         BadMeshError: the file is no GLB file of version 2, is broken or compressed, needs other
             files or an unknown extension, or has more than MOST_FACES faces.
     """
-    document, binary = chunks_of(data)
+    document, binary = _chunks(data)
     for name in document.get("extensionsRequired", ()):
         if not name.startswith(_HARMLESS):
             found = f"compression by {name}" if name in _COMPRESSED else f"the extension {name}"
             raise BadMeshError("GLB file", found, "a file without it", "export it without this")
-    buffers = [buffer_bytes(buffer, binary) for buffer in document.get("buffers", ())]
+    buffers = [_buffer(buffer, binary) for buffer in document.get("buffers", ())]
 
     def table(index: int) -> Array:
         return _accessor(document, buffers, index)
@@ -82,8 +82,7 @@ def _moved(points: Array, matrix: Array) -> Array:
     return np.asarray(np.einsum("vab,vb->va", matrix[:, :3, :3], points) + matrix[:, :3, 3])
 
 
-def chunks_of(data: bytes) -> tuple[dict[str, Any], bytes]:
-    """Return the JSON document and the binary part of a file. Raises BadMeshError."""
+def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
     if data[:4] != b"glTF" or len(data) < 20:
         raise BadMeshError("GLB file", "a file that does not begin with glTF", "a binary glTF file")
     _, version, length = struct.unpack_from("<4sII", data)
@@ -103,8 +102,7 @@ def chunks_of(data: bytes) -> tuple[dict[str, Any], bytes]:
     return document, chunks.get(b"BIN\0", b"")
 
 
-def buffer_bytes(buffer: dict[str, Any], binary: bytes) -> bytes:
-    """Return the bytes of a buffer inside of a file. Raises BadMeshError for another file."""
+def _buffer(buffer: dict[str, Any], binary: bytes) -> bytes:
     uri = buffer.get("uri")
     if uri is None:
         return binary
