@@ -63,7 +63,7 @@ def picture_size(path: Path, most: int) -> tuple[int, int]:
 
 def is_turned(picture: "Image") -> bool:
     """Return whether a picture has EXIF data that turn it."""
-    return picture.getexif().get(ORIENTATION, 1) != 1
+    return bool(picture.getexif().get(ORIENTATION, 1) != 1)
 
 
 def read_picture(path: Path, most: int) -> NDArray[np.uint8]:
