@@ -163,7 +163,7 @@ def plain_glb(data: bytes, unread: Unread) -> tuple[bytes, list[Lying]]:
         image = document["images"][texture["source"]] if texture.get("source") is not None else {}
         name = image.get("uri", "data:")
         name = image.get("mimeType", "a picture") if name.startswith("data:") else name
-        along_u, along_v = (WRAPS.get(sampler.get(x), REPEAT) for x in ("wrapS", "wrapT"))
+        along_u, along_v = (WRAPS.get(sampler.get(x, 0), REPEAT) for x in ("wrapS", "wrapT"))
         transform = own.get(TRANSFORM, {})
         lying.append(Lying(name if base else "", transform, (along_u, along_v), gloss))
         sets.append(transform.get("texCoord", base.get("texCoord", 0)))
