@@ -1,15 +1,10 @@
 """`bench train` and `bench baseline` with trained baselines, as a user types them, and mistakes."""
 
-from dataclasses import dataclass
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import h5py
 import pytest
 from pix2shape_commands import bench, files_in, linked, pix2shape
-
-from baselines import commands
 
 SMALL = tuple(f"--set={one}" for one in ("width=4", "size=16", "batch=2"))
 DATA = "--data iqtt-train.h5"
@@ -20,28 +15,6 @@ def folder(pix2shape_files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     """Work in a folder that holds links to rooms and questions."""
     monkeypatch.chdir(tmp_path)
     return linked(pix2shape_files, tmp_path)
-
-
-@pytest.fixture
-def fake(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Put a baseline in the place of `cnn` that keeps what it is asked for."""
-    asked: dict[str, Any] = {}
-
-    @dataclass(frozen=True)
-    class Settings:
-        seed: int = 0
-        depth: int = 18
-
-    def train(home, data, run_folder, settings, machine, *, labels=5, resume=False, progress=None):
-        asked.update(labels=labels, resume=resume, **vars(settings))
-        asked.update(data=data.where, device=machine.device, minutes=machine.minutes)
-        progress(1, 1, {"loss": 0.25})
-        return Path(run_folder) / "w.safetensors"
-
-    home = SimpleNamespace(settings=Settings, options=("labels",), streamed=None)
-    monkeypatch.setattr(commands, "_baseline", lambda name: home)
-    monkeypatch.setattr("baselines.training.baseline.train", train)
-    return asked
 
 
 @pytest.mark.parametrize("name", ["cnn", "siamese"])
@@ -75,60 +48,14 @@ def test_two_runs_never_share_a_folder(name, folder):
     assert not Path("deep").exists()
 
 
-def test_settings_reach_the_baseline(fake, folder):
-    more = "--data iqtt-train.h5 iqtt-train.h5 --device cpu --minutes 5"
-    line = f"train cnn {more} --out run --set depth=50 --seed 7"
-    done = bench(*line.split())
-    assert done.exit_code == 0, done.output
-    assert fake == {
-        "data": "iqtt-train.h5, iqtt-train.h5", "labels": 5, "seed": 7, "depth": 50,
-        "device": "cpu", "minutes": 5.0, "resume": False,
-    }  # fmt: skip
-    assert "loss 0.25" in done.stdout
-    assert "run/w.safetensors" in done.stdout
-    assert bench(*f"train cnn {DATA} --out run --resume".split()).exit_code == 0
-    assert fake["resume"] is True
-
-
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ("--iterations 5", ("iterations",)),
-        ("--set device=cpu", ("--set", "'device'")),
-        ("--set machine=1", ("--set", "'machine'")),
-        ("--minutes 5 --seed 1 --device gpu", ("--device", "'gpu'")),
-        ("--minutes 0", ("--minutes", "0")),
-        ("--set colour=1", ("--set", "'colour'", "depth")),
-        ('--set depth="deep"', ("depth", "'deep'")),
-        ("--set depth=3 --set depth=3", ("--set", "'depth'")),
-        ("--set depth=true", ("depth", "True")),
-        ("--set resume=true", ("--set", "'resume'")),
-        ("--set progress=1", ("--set", "'progress'")),
-        ("--resume --seed 2", ("--resume",)),
-        ("--resume --set depth=50", ("--resume",)),
-    ],
-)
-def test_what_a_baseline_has_not_is_refused(fake, folder, line, words, check_refusal):
-    result = bench(*f"train cnn {DATA} --out run {line}".split())
-    check_refusal(result.exit_code, result.stdout, result.stderr, words)
-    assert fake == {}
-
-
 MISTAKES = [
     (f"train cnn {DATA} --out run --labels 4", ("--labels", "found 4", "1 to 3")),
-    ("train cnn --data rooms.h5 --out run", ("rooms.h5", "'pix2shape-bench/iqtt'")),
     ("train cnn --data iqtt-test.h5 --out run", ("iqtt-test.h5", "no training questions")),
-    ("train cnn --data nothing.h5 --out run", ("nothing.h5",)),
     (f"train cnn {DATA} --out run --set depth=34", ("depth", "18 or 50")),
-    (f"train cnn {DATA} --out run --set width=wide", ("width", "'wide'")),
     (f"train cnn {DATA} --out run", ("iqtt-train.h5", "32x32", "64")),
-    (f"train cnn {DATA} --out run --resume", ("run: ", "checkpoint")),
     (f"train ptm {DATA} --out run", ("ptm",)),
-    ("train cnn --data iqtt-train.h5 rooms.h5 --out run", ("rooms.h5", "questions")),
     (f"train cnn {DATA} --out run --minutes 5 --iterations 3", ("--minutes", "--iterations")),
     ("baseline cnn --data iqtt-test.h5", ("weights", "bench train cnn")),
-    ("baseline cnn --data iqtt-test.h5 --train rooms.h5", ("--train", "bench train cnn")),
-    ("baseline cnn --data iqtt-test.h5 --weights text.safetensors", ("text.safetensors",)),
     ("baseline cnn --data iqtt-test.h5 --weights rooms.safetensors", ("rooms.safetensors",)),
     ("baseline chance --data iqtt-test.h5 --weights rooms.safetensors", ("--weights", "chance")),
 ]
@@ -141,23 +68,3 @@ def test_a_mistake_is_one_line_and_leaves_nothing(line, words, folder, check_ref
     result = bench(*line.split())
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
     assert files_in(folder) == before
-
-
-@pytest.mark.parametrize("name", ["cnn", "rezende"])
-def test_no_gpu_is_one_line(name, folder, check_refusal):
-    if pytest.importorskip("torch").cuda.is_available():
-        pytest.skip("there is one")
-    result = bench(*f"train {name} {DATA} --out run --device cuda".split())
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("device", "cpu"))
-    assert not (folder / "run").exists()
-
-
-@pytest.mark.parametrize(
-    ("name", "data", "other"),
-    [("chance", "rooms.h5", "nearest"), ("empty-room", "iqtt-test.h5", "outline")],
-)
-def test_data_of_the_other_task_is_answered_with_baselines_of_it(name, data, other, folder):
-    refused = bench("baseline", name, "--data", data, "--out", "x.h5")
-    assert refused.exit_code == 2
-    assert other in refused.stderr.splitlines()[-1]
-    assert not (folder / "x.h5").exists()

@@ -1,17 +1,13 @@
 """Floors without 3D: masks from the shading alone, and what each submission is made of."""
 
-import h5py
 import numpy as np
 import pytest
-from refusals import refused
 
-from baselines.cut_outs import LEARNING, LIFT, NAMES, blob_balls, outline_features, write_cut_outs
+from baselines.cut_outs import LEARNING, LIFT, NAMES, blob_balls, write_cut_outs
 from baselines.picture import outline_mask
 from metrics.measures.relief import empty_room
 from metrics.scoring.evaluate import score
 from scenegen.camera import back_project, look_at, pixel_directions, transform_points
-from scenegen.common.errors import SpecError
-from scenegen.rooms.reader import RoomsFile
 
 CAMERA = look_at(np.array([2.3, 1.7, 2.1]), np.array([0.3, 0.25, 0.3]))
 FOV = 24.0
@@ -69,18 +65,6 @@ def test_a_cut_out_finds_its_floor_to_the_digit_and_all_find_outlines(submission
     }
 
 
-def test_what_is_not_in_the_mask_is_the_empty_room(submissions):
-    folder, truth, _ = submissions
-    with RoomsFile(truth) as rooms, h5py.File(folder / "picture-outline.h5") as file:
-        for row, depth in zip(file["row"][()], file["depth"][()], strict=True):
-            room = rooms[int(row)]
-            empty, _ = empty_room(room.world_from_camera, room.fov_y_degrees, *room.depth.shape)
-            lift = (empty - depth).round(5)
-            assert set(np.unique(lift)) <= {0.0, LIFT}
-    with h5py.File(folder / "nearest.h5") as file:
-        assert np.isfinite(file["depth"][()]).all()
-
-
 def test_a_ball_takes_the_place_of_its_blob():
     empty = np.full((64, 64), 2.0)
     rays = pixel_directions(64, 64, FOV)
@@ -91,30 +75,3 @@ def test_a_ball_takes_the_place_of_its_blob():
     assert -ball[2] == pytest.approx(middle)
     assert ball[:3] / -ball[2] == pytest.approx(centre / 1.9, abs=0.01)
     assert ball[3] / -ball[2] == pytest.approx(0.12 / 1.9, rel=0.03)
-
-
-def test_features_of_an_outline_by_hand():
-    mask = np.zeros((10, 10), bool)
-    mask[2:6, 3:5] = True
-    found = outline_features(mask, np.full((10, 10), 2.0))
-    assert found.shape == (8, 12)
-    first = [np.sqrt(8) / 10, 0.4, 0.2, 0.1, 1.0, 0.5, 0.0, 0.4, 2.0, 2.0, 2.0, 0.2]
-    assert found[0] == pytest.approx(first)
-    assert found[-1, [6, 7]] == pytest.approx([0.75, 0.1])
-
-
-@pytest.mark.parametrize(
-    ("name", "train", "where"),
-    [
-        ("flat", None, "baseline"),
-        ("nearest", None, "train"),
-        ("cut-out", {"seed": 5}, "train"),
-        ("outline-relief", {"seed": 3}, "train"),
-        ("nearest", {"seed": 5, "height": 40, "width": 40}, "train"),
-    ],
-)
-def test_what_would_be_unfair_is_refused(make_rooms, rooms_path, tmp_path, name, train, where):
-    path = make_rooms(tmp_path / "train.h5", 2, **train) if train else None
-    with refused(SpecError, where):
-        write_cut_outs(name, rooms_path, tmp_path / "x.h5", train=path)
-    assert not (tmp_path / "x.h5").exists()

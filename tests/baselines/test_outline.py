@@ -2,16 +2,9 @@
 
 import h5py
 import numpy as np
-import pytest
 from refusals import refused
 
-from baselines.outline import (
-    nearest_scores,
-    tree_scores,
-    write_outline,
-    write_outline_trees,
-)
-from iqtt.audit.features.outlines import DISTANCES, FEATURES, RINGS, outlines
+from baselines.outline import write_outline, write_outline_trees
 from scenegen.common.errors import SpecError
 
 
@@ -25,37 +18,6 @@ def boxes(count=80, seed=0):
             masks[row, 1 + k, 4 : 4 + sides[k], 6:17] = True
         masks[row, 0] = np.rot90(masks[row, 1 + right[row]])
     return masks, right
-
-
-def distances_of_another(mask):
-    """Distances from a mask to a square."""
-    square = np.zeros_like(mask)
-    square[10:26, 10:26] = True
-    return outlines(np.stack([mask, square])[None])[1][0, 0, 1]
-
-
-def test_a_turned_or_flipped_outline_is_the_same():
-    mask = np.zeros((48, 48), bool)
-    mask[8:30, 10:16], mask[24:30, 10:30] = True, True
-    four = np.stack([mask, np.rot90(mask), mask[:, ::-1], np.roll(mask, 7, axis=1)])
-    features, distances = outlines(four[None])
-    assert features.shape == (1, 4, len(FEATURES))
-    assert distances.shape == (1, 4, 4, len(DISTANCES))
-    plane = features[0, :, :-RINGS]  # the power spectrum keeps half the waves, so turns change it
-    assert plane == pytest.approx(np.repeat(plane[:1], 4, axis=0), abs=0.02)
-    assert (distances.max(axis=(0, 1, 2)) < 0.3 * distances_of_another(mask)).all()
-    assert outlines(np.zeros((1, 4, 16, 16), bool))[0].any() == False  # noqa: E712
-
-
-def test_nearest_outlines_and_trees_find_turned_boxes():
-    masks, right = boxes()
-    seen = outlines(masks)
-    assert (nearest_scores(seen).argmax(axis=1) == right).mean() > 0.95
-    other, answers = boxes(seed=1)
-    scores = tree_scores(seen, right, outlines(other))
-    assert (scores.argmax(axis=1) == answers).mean() > 0.8
-    again = tree_scores(seen, right, outlines(other))
-    assert (scores == again).all()
 
 
 def write(path, masks, right):
@@ -74,10 +36,7 @@ def test_submissions_and_what_is_refused(tmp_path):
     with h5py.File(tmp_path / "out.h5") as file:
         assert (file["scores"][:].argmax(axis=1) == right).mean() > 0.9
     write_outline_trees(data, tmp_path / "trees.h5", train, 20)
-    for training, labels, where in (
-        (data, None, "train"),
-        (train, 31, "labels"),
-    ):
+    for training, labels, where in ((data, None, "train"), (train, 31, "labels")):
         with refused(SpecError, where):
             write_outline_trees(data, tmp_path / "x.h5", training, labels)
         assert not (tmp_path / "x.h5").exists()

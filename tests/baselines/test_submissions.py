@@ -106,12 +106,6 @@ def test_cameras_are_read_and_nothing_of_the_truth(name, writers, turned_path, t
     assert not np.array_equal(found["depth"][4], expected["depth"][4])
 
 
-@of_rooms
-def test_larger_rooms_are_predicted_at_their_own_size(name, writers, make_rooms, tmp_path):
-    path = make_rooms(tmp_path / "large.h5", 2, height=64, width=64)
-    assert submitted(writers[0][name], path, tmp_path / "p.h5")["depth"].shape == (2, 64, 64)
-
-
 BAD_ROOMS: dict[str, tuple[Callable[[h5py.File], Any], str]] = {
     "camera": (put("camera/world_from_camera", (4, 1, 3), np.nan), "camera/world_from_camera, row"),
     "image": (damaged_chunk("image", 3), "image, row 3"),
@@ -164,13 +158,6 @@ def test_answers_are_valid_and_read_no_answers_lights_or_shapes(name, writers, t
         file["questions"][:] = questions["questions"][:] / np.float32(255)
     found = submitted(write, plain, tmp_path / "b.h5")["scores"]
     np.testing.assert_allclose(found, expected["scores"], rtol=2e-3, atol=1e-4)
-
-
-@pytest.mark.parametrize("name", ["pix2shape", "ptn"])
-def test_weights_for_rooms_answer_no_questions(name, writers, truths, tmp_path):
-    with pytest.raises(SceneGenError):
-        writers[0][name](truths.iqtt, tmp_path / "a.h5")
-    assert not (tmp_path / "a.h5").exists()
 
 
 @but_variants(QUESTIONS)

@@ -6,7 +6,7 @@ import pytest
 from scenegen import open_rooms
 from scenegen.camera import back_project, look_at, transform_points
 from scenegen.common.errors import SpecError
-from scenegen.derived import albedo, object_coordinates, optical_flow, project, seen_from
+from scenegen.derived import object_coordinates, optical_flow, project, seen_from
 from scenegen.objects.scene_mesh import scene_parts, world_from_object
 
 FOV = 40.0
@@ -104,10 +104,3 @@ def test_object_coordinates_are_undone_by_the_pose(views):
             )
     with pytest.raises(SpecError):
         object_coordinates(room.points_world, room.object_id, np.array(poses)[:0])
-
-
-def test_albedo_is_the_reflectance_of_the_ids():
-    rho = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]])
-    found = albedo(np.array([[-1, 0, 1]], np.int8), rho)
-    np.testing.assert_array_equal(found[0, 1:], rho)
-    assert np.isnan(found[0, 0]).all()

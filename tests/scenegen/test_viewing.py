@@ -12,7 +12,7 @@ from recordings import pixels_of, points_of, recorded
 from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.rooms.preview import normal_bytes, srgb_bytes
-from scenegen.viewing import FARTHEST, NO_OBJECT, Surfaces, room_scenes, room_view, scene_rows
+from scenegen.viewing import NO_OBJECT, room_scenes, room_view, scene_rows
 from scenegen.viewing import write_recording as write
 
 
@@ -50,39 +50,6 @@ def test_a_recording_holds_the_truth_of_each_view(path, tmp_path):
         (classes,) = there["/pixels"][step]["AnnotationContext:context"]
         labels = [part["class_description"]["info"]["label"] for part in classes]
         assert labels == ["the room", *(item.shape for item in room.scene.objects), "nothing"]
-
-
-def test_views_that_a_scene_lacks_are_cleared(make_rooms, tmp_path):
-    with open_rooms(make_rooms(tmp_path / "x.h5", 2, views=(0, 40))) as rooms:
-        write(tmp_path / "x.rrd", "x", room_scenes(rooms, [[0, 1], [2]]))
-    there = recorded(tmp_path / "x.rrd", "scene")
-    for name in ("/world/cameras/view_1", "/world/truth/view_1", "/pixels/view_1"):
-        assert there[name][1] == {"Clear:is_recursive": [True]}
-    assert not {name for name, steps in there.items() for values in steps.values()
-                if "view_0" in name and "Clear:is_recursive" in values}  # fmt: skip
-
-
-def test_cameras_see_the_points_where_their_pixels_are(make_rooms, tmp_path):
-    with open_rooms(make_rooms(tmp_path / "x.h5", 1, width=24)) as rooms:
-        write(tmp_path / "x.rrd", "x", room_scenes(rooms, [[0]]))
-    there = recorded(tmp_path / "x.rrd", "scene")
-    camera, (points, _) = (
-        there["/world/cameras/view_0"][0],
-        points_of(there["/world/truth/view_0"][0]),
-    )
-    rotation = np.reshape(camera["Transform3D:mat3x3"], (3, 3)).T  # by columns
-    local = (points - camera["Transform3D:translation"]) @ rotation
-    matrix = np.reshape(camera["Pinhole:image_from_camera"], (3, 3)).T
-    x, y, z = matrix @ (local * (1, -1, -1)).T
-    rows, columns = np.indices((32, 24)).reshape(2, -1)
-    np.testing.assert_allclose([x / z - 0.5, y / z - 0.5], [columns, rows], atol=1e-3)
-
-
-def test_pixels_without_a_depth_in_view_have_no_point():
-    points = np.full((1, 7, 3), 0.25)
-    points[0, :, 2] = np.nan, -np.inf, 0, 1, -FARTHEST * 1.1, -FARTHEST, -1
-    points[0, 6, 0] = -2 * FARTHEST
-    assert Surfaces(points, None).in_view.tolist() == [[False] * 5 + [True, False]]
 
 
 def test_rows_and_cameras_that_cannot_be_shown(rooms_path):

@@ -7,12 +7,8 @@ import pytest
 import torch
 
 from baselines.depth_match.answers import denials, least_denials, surface_points
-from baselines.depth_match.network import METHOD, seen_depth, symmetric
-from baselines.depth_match.training import BASELINE, read_pictures
-from baselines.training.checkpoint import load_weights
-from baselines.training.questions import question_images
+from baselines.depth_match.training import read_pictures
 from iqtt import QuestionsFile, SplitSpec, make_split, open_questions
-from scenegen.camera import back_project
 
 KINDS = ("mirror-pair", pytest.param("matched", marks=pytest.mark.slow))
 SIZE = 64
@@ -41,18 +37,6 @@ def test_true_depth_answers_hard_questions(questions):
     assert right(true_depth(questions), questions) >= 7
 
 
-@pytest.mark.slow
-def test_the_bundled_network_answers_half_of_them(questions):
-    """docs/results.md has 0.67 and 0.60 of 500; chance is 1/3."""
-    network, _ = load_weights(BASELINE.files / "depth-match.safetensors", METHOD)
-    with torch.inference_mode():
-        images = (torch.from_numpy(question_images(questions, row, SIZE)) for row in range(8))
-        depth = torch.stack([seen_depth(network, image) for image in images])
-    off = depth - true_depth(questions)
-    assert off[off.isfinite()].abs().mean() < 0.03  # camera distances; the mean height is 0.07
-    assert right(depth, questions) >= 4  # of 8
-
-
 def right(depth: Iterable[torch.Tensor], questions: QuestionsFile) -> int:
     """Return how many of the questions these surfaces answer right."""
     chosen = [int(least_denials(maps, 28.0).argmin()) for maps in depth]
@@ -74,25 +58,3 @@ def test_surfaces_lie_where_the_camera_sees_them(questions):
         assert (off < 0.1).mean() > 0.9
         assert denials(torch.from_numpy(points).float() / distance, torch.eye(3)[None],
                        depth[0], half) < 2e-3  # fmt: skip
-
-
-def test_points_are_those_of_the_camera():
-    depth = torch.full((8, 8), 2.0)
-    depth[0, 3], depth[5, 6] = torch.inf, 0.7
-    expected = back_project(depth.numpy(), 40.0)[np.isfinite(depth.numpy())] + [0, 0, 1]
-    points = surface_points(depth, float(np.tan(np.radians(20.0)))).numpy()
-    off = np.linalg.norm(points[:, None] - expected[None], axis=2)
-    assert off.min(axis=1).max() < 1e-5
-    assert off.min(axis=0).max() < 1e-5
-    assert surface_points(depth + torch.inf, 1.0).abs().max() == 0
-
-
-@pytest.mark.parametrize("form", range(8))
-def test_each_form_is_undone(form):
-    maps = torch.rand(2, 3, 4, 4)
-    torch.testing.assert_close(symmetric(symmetric(maps, form), -form), maps)
-
-
-def test_the_forms_are_all_different():
-    maps = torch.arange(9).view(1, 3, 3)
-    assert len({tuple(symmetric(maps, form).flatten().tolist()) for form in range(8)}) == 8

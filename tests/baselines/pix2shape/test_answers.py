@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import torch
-from pix2shape_models import made, of_questions, released
+from pix2shape_models import made, of_questions
 
 from baselines.pix2shape import predict as module
 from baselines.pix2shape.predict import answers_of
@@ -66,28 +66,3 @@ def test_the_nearest_scene_is_the_answer(answerer, truths, tmp_path):
     assert done == [(1, 6)] * 6
     assert [p for p in validate(tmp_path / "a.h5") if not p.is_hint] == []
     assert score([tmp_path / "a.h5"]).method == "pix2shape"
-
-
-def test_the_view_has_no_say(answerer, truths, tmp_path):
-    before = answered(answerer, truths.iqtt, tmp_path / "a.h5")
-    spec = answerer.config.networks
-    assert spec.z_view == 10
-    with torch.no_grad():
-        answerer.encoder.last.weight[spec.z_scene :] *= 100
-    after = answered(answerer, truths.iqtt, tmp_path / "a.h5")
-    np.testing.assert_array_equal(after[1], before[1])
-    with torch.no_grad():
-        answerer.encoder.last.weight[: spec.z_scene] *= 2
-    assert not np.array_equal(answered(answerer, truths.iqtt, tmp_path / "a.h5")[1], before[1])
-
-
-@pytest.mark.parametrize("size", [32, 96])
-def test_the_same_image_is_the_answer_and_a_tie_abstains(answerer, tmp_path, size):
-    """Files as released: images and nothing beside; larger ones are reduced."""
-    right = [2, 0, 1, -1, 2, -2, 0]
-    path = released(tmp_path / "released.h5", right, size)
-    answers, scores = answered(answerer, path, tmp_path / "a.h5")
-    assert answers == [max(answer, -1) for answer in right]
-    assert scores[3, 0] == scores[3, 2] > scores[3, 1]
-    with h5py.File(tmp_path / "a.h5") as file:
-        assert file.attrs["truth_fingerprint"] == ""

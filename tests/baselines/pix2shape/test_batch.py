@@ -36,19 +36,3 @@ def test_a_turned_picture_is_that_of_the_turned_surface(quarters, mirror):
     if quarters or mirror:
         wrong = replace(found.views, scene=batch.views.scene)
         assert (shaded(Surfels(there), wrong) - found.image).abs().max() > 1e-2
-
-
-def test_each_image_turns_by_its_own_angle():
-    _, batch = surface()
-    scene = replace(
-        batch.views.scene, light_position=batch.views.scene.light_position.repeat(2, 1, 1)
-    )
-    both = replace(
-        batch, image=batch.image.repeat(2, 1, 1, 1), views=replace(batch.views, scene=scene)
-    )
-    found = turned(both, torch.tensor([0.0, math.pi / 6]), torch.tensor([False, False]))
-    assert torch.allclose(found.image[0], both.image[0], atol=1e-5)
-    before, after = (one.views.scene.light_position[1] for one in (both, found))
-    angle = torch.atan2(after[:, 1], after[:, 0]) - torch.atan2(before[:, 1], before[:, 0])
-    assert (angle % (2 * math.pi)).tolist() == pytest.approx([math.pi / 6] * 2, abs=1e-5)
-    assert torch.equal(before[:, 2], after[:, 2])

@@ -1,9 +1,5 @@
 """The reference model's commands as a user types them, with and without torch; mistakes, too."""
 
-import importlib.util
-import os
-import shutil
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -11,11 +7,8 @@ from typing import Any
 
 import h5py
 import pytest
-from h5_edits import damaged_chunk
-from pix2shape_commands import bench, files_in, invoke, linked, pix2shape, train
-from pix2shape_models import edited
+from pix2shape_commands import bench, files_in, linked, pix2shape, train
 
-import cli
 from baselines.pix2shape.commands import PACKAGES
 
 ROOMS, LARGE = "--data rooms.h5", "--data large.h5 --out run --workers 0"
@@ -72,109 +65,22 @@ def test_pictures(folder, line, name):
     assert (refused.exit_code, name in refused.stderr) == (2, True)
 
 
-def test_questions(folder):
-    done = pix2shape("predict", "--weights", "questions.safetensors", "--data", "iqtt-test.h5")
-    assert done.exit_code == 0, done.output
-    assert "iqtt_accuracy" in bench("score", "predictions.h5").stdout
-
-
-def test_who_interrupts_is_told_how_to_go_on(folder, monkeypatch):
-    from baselines.pix2shape.training import run
-
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(run, "train_run", interrupted)
-    result = train("--set=iterations=2")
-    assert result.exit_code == 1
-    assert "--resume" in result.stdout
-    assert "Aborted" in result.stderr
-
-
-@pytest.mark.slow
-def test_a_process_that_is_killed_ends_the_other_with_one_line(folder, check_refusal):
-    """Started as on two machines, of which both ends are here."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        port = str(probe.getsockname()[1])
-    meeting = {"MASTER_ADDR": "127.0.0.1", "MASTER_PORT": port}
-    line = f"train {LARGE} --device cpu --nodes 2 --every 1 --set networks.width=0.05"
-    command = [sys.executable, "-W", "ignore", "-c", "import cli; cli.pix2shape()", *line.split()]
-    first, second = (
-        subprocess.Popen(
-            command,
-            env={**os.environ, **meeting, "NODE_RANK": rank},
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        for rank in "01"
-    )
-    assert first.stdout.readline().startswith("1 of")
-    first.kill()
-    _, told = second.communicate(timeout=60)
-    first.communicate()
-    check_refusal(second.returncode, "", told.splitlines()[-1], ("process", "--resume"))
-
-
-def test_bundled_weights_go_by_name(folder, monkeypatch, check_refusal):
-    from baselines.pix2shape import weights
-
-    monkeypatch.setattr(weights, "FOLDER", folder / "none")
-    assert weights.names() == []
-    result = pix2shape("sample")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("'shapes-rays'",))
-    result = bench("baseline", "pix2shape", "--data", "rooms.h5")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("rooms.h5", "pix2shape train"))
-    assert "are bundled" not in result.stderr
-    (folder / "none").mkdir()
-    for name in ("shapes-paper", "shapes-rays"):
-        shutil.copy("rooms.safetensors", f"none/{name}.safetensors")
-    made = bench("baseline", "pix2shape", "--data", "rooms.h5")
-    assert "weights shapes-paper, on rooms.h5" in made.stdout, made.output
-    given = ("--data", "rooms.h5", "--weights", "shapes-paper", "--out", "other.h5")
-    result = bench("baseline", "pix2shape-compact", *given)
-    check_refusal(
-        result.exit_code, result.stdout, result.stderr, ("--weights", "pix2shape-compact")
-    )
-    assert pix2shape("sample", "--weights", "shapes-rays", "--n", 1).exit_code == 0
-    result = pix2shape("sample", "--weights", "chairs", "--overwrite")
-    words = ("'chairs'", "shapes-paper, shapes-rays")
-    check_refusal(result.exit_code, result.stdout, result.stderr, words)
-
-
 MISTAKES = [
-    (f"predict {WITH} --data nothing.h5", ("nothing.h5",)),
     (f"predict {ROOMS} --weights rooms.h5", ("'rooms.h5'", ".safetensors")),
     (f"predict {ROOMS} --weights text.safetensors", ("text.safetensors",)),
-    (f"predict {WITH} {ROOMS} --out rooms.h5 --overwrite", ("rooms.h5", "not an input")),
     (f"predict {WITH} --data damaged.h5", ("damaged.h5", "image, row 5")),
     (f"train {LARGE} --device cpu --devices 3", ("--devices", "32 images")),
     (f"sample {WITH} --class mug", ("class", "'mug'")),
     ("sample --weights classes.safetensors --class sofa", ("'sofa'", "mug, bowl")),
     ("sample --weights questions.safetensors", ("weights",)),
-    (f"sample {WITH} --seed 99999999999999999999", ("seed", "99999999999999999999")),
-    (f"sample {WITH} --out x.gif", ("out", "'x.gif'")),
     (f"interpolate {WITH} {ROOMS} --items 0,8", ("items", "8")),
-    (f"interpolate {WITH} {ROOMS} --items 0-2", ("--items", "3 rows")),
-    (f"interpolate {WITH} --data iqtt-test.h5", ("iqtt-test.h5",)),
     (f"interpolate --weights questions.safetensors {ROOMS}", ("weights",)),
-    (f"rotate {WITH} {ROOMS} --items 3-9", ("items", "8")),
     (f"rotate {WITH} {ROOMS} --frames 2 --out x.png", ("out", "'x.png'")),
-    ("train --data rooms.h5 --out run", ("rooms.h5", "32x32", "64")),
-    (f"train {LARGE} --set batch=many", ("batch", "'many'")),
     (f"train {LARGE} --set batch", ("--set", "'batch'", "batch=8")),
     (f"train {LARGE} --set batch=2 --set batch=4", ("--set", "'batch'")),
-    (f"train {LARGE} --set seed=2 --seed 2", ("--set", "'seed'")),
     (f"train {LARGE} --set batch={'[' * 100_000}", ("--set",)),
-    (f"train {LARGE} --set turned=true", ("turned", "True")),
-    ("train --data iqtt-train.h5 --out run --set depth=2", ("depth", "2.0")),
-    (f"train {LARGE} --start rooms.safetensors", ("start", "networks.size", "64")),
-    (f"train {LARGE} --set batch=1000000000", ("batch", "1000000000")),
     (f"train {LARGE} --set networks.sise=32", ("sise",)),
     (f"train {LARGE} --set networks.classes=3", ("classes", "--conditional")),
-    (f"train {LARGE} --set networks.camera=false", ("camera",)),
-    (f"train {LARGE} --resume", ("run: ", "checkpoint")),
     (f"train {LARGE} --resume --seed 3", ("--resume",)),
 ]
 BASELINE_MISTAKES = [
@@ -195,43 +101,6 @@ def test_a_mistake_is_one_line_and_leaves_nothing(command, line, words, folder, 
     result = command(*line.split())
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
     assert files_in(folder) == before
-
-
-@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
-def test_a_damaged_file_is_one_line_also_from_another_process(folder, check_refusal):
-    edited(folder / "large.h5", folder / "bad.h5", damaged_chunk("image", 1))
-    result = train("--workers", 1, "--set=batch=2", "--set=iterations=5", data="bad.h5")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("bad.h5", "image, row 1"))
-
-
-@pytest.mark.parametrize("line", [f"predict {WITH} {ROOMS}", f"train {LARGE}"])
-def test_no_gpu_is_one_line(line, folder, check_refusal):
-    if pytest.importorskip("torch").cuda.is_available():
-        pytest.skip("there is one")
-    result = pix2shape(*line.split(), "--device", "cuda")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("device", "--device cpu"))
-    assert not (folder / "run").exists()
-
-
-LINES = [
-    ("pix2shape", ["train", "--data", "x.h5", "--out", "y"]),
-    ("pix2shape", ["sample"]),
-    ("bench", ["baseline", "pix2shape", "--data", "x.h5"]),
-    ("bench", ["train", "cnn", "--data", "x.h5", "--out", "y"]),
-    ("bench", ["baseline", "siamese", "--data", "x.h5"]),
-]
-
-
-@pytest.mark.parametrize("gone", [PACKAGES, ("safetensors",)], ids=len)
-@pytest.mark.parametrize(("group", "line"), LINES, ids=str)
-def test_without_the_optional_packages(group, line, gone, tmp_path, monkeypatch, check_refusal):
-    find, util = importlib.util.find_spec, importlib.util
-    monkeypatch.setattr(util, "find_spec", lambda name: None if name in gone else find(name))
-    monkeypatch.chdir(tmp_path)
-    result = invoke(getattr(cli, group), *line)
-    needed = gone[:1] if line[1:2] in (["cnn"], ["siamese"]) else gone
-    words = (*needed, "pip install '.[model]'")
-    check_refusal(result.exit_code, result.stdout, result.stderr, words)
 
 
 def test_without_torch_the_other_baselines_work(truths, tmp_path, check_refusal):

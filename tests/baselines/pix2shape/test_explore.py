@@ -1,40 +1,20 @@
 """Samples, interpolations and rotations: the cameras, lights and codes that are shown."""
 
-import itertools
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
-import pytest
 import torch
-from pix2shape_models import card_of, made, room_source, tiny
+from pix2shape_models import room_source
 from torch.utils.data import default_collate
 
-from baselines.pix2shape import pictures as explore
-from baselines.pix2shape.network.surfels import render
-from baselines.pix2shape.pictures import (
-    drawn,
-    image_tiles,
-    rotation_frames,
-    sample_sheet,
-    sheet,
-    turned_camera,
-)
+from baselines.pix2shape.pictures import drawn, image_tiles, rotation_frames, sheet, turned_camera
 from scenegen.camera import look_at
 from scenegen.description.presets import PAPER_VIEWS
 from scenegen.description.specs import DatasetSpec
-from scenegen.rooms.reader import RoomsFile
 from scenegen.sampling.cameras import sample_cameras
-from scenegen.sampling.lights import sample_lights
 
 SPEC = DatasetSpec(height=32, width=32)
-CLASSES = ("bag", "bowl", "mug")
-
-
-@pytest.fixture(scope="session")
-def conditional() -> Any:
-    return made(tiny(classes=3))
 
 
 def reconstructions(model: Any, source: Any, rows: list[int], seen_as: list[int]) -> Any:
@@ -66,69 +46,6 @@ def test_turned_by_the_files_angles_is_the_files_views():
     assert 5 < sum(sides) < 25
 
 
-def test_what_is_known_of_views_is_what_training_was_told(several_path):
-    source = room_source(several_path, tiny())
-    expected = source.as_batch(default_collate([source[row] for row in range(9)])).views
-    with RoomsFile(several_path) as rooms:
-        spec, depth = rooms.spec, torch.tensor(rooms.read("depth", slice(None)))
-    positions = sample_cameras(spec, np.arange(3)).reshape(9, 3)
-    count, *lights = (np.repeat(own, 3, axis=0) for own in sample_lights(spec, np.arange(3)))
-    assert len(set(count.tolist())) > 1
-    found = explore.unrendered_views(spec, positions, *lights, np.zeros((9, 0)))
-    assert found.scene.fov_y_degrees == expected.scene.fov_y_degrees
-    slots = found.scene.light_color.shape[1]
-    there = (found.scene.light_color != 0).any(dim=2)
-    assert there.sum(dim=1).tolist() == count.tolist()
-    assert not expected.scene.light_color[:, slots:].any()
-    close = partial(torch.testing.assert_close, rtol=1e-6, atol=1e-6)
-    close(found.condition, expected.condition)
-    close(found.scene.light_color, expected.scene.light_color[:, :slots])
-    close(found.scene.light_position[there], expected.scene.light_position[:, :slots][there])
-    for name in ("ambient", "attenuation", "reflectance"):
-        close(getattr(found.scene, name), getattr(expected.scene, name))
-    image = render(depth, found.scene)
-    torch.testing.assert_close(image, render(depth, expected.scene), rtol=1e-5, atol=1e-6)
-
-
-def test_samples_are_seen_as_training_images_were(conditional, monkeypatch):
-    seen: list[Any] = []
-    monkeypatch.setattr(explore, "drawn", lambda *given: seen.append(given) or drawn(*given))
-    conditional.prior.mean.fill_(7)
-    several = replace(SPEC, views=PAPER_VIEWS)  # of which samples need the first alone
-    card = card_of(conditional.config, data=several.to_json(), classes=CLASSES)
-    try:
-        sample_sheet(conditional, card, 5, 6)
-    finally:
-        conditional.prior.mean.zero_()
-    ((_, code, views),) = seen
-    spec = replace(SPEC, seed=6, views=(0.0,))
-    places = sample_cameras(spec, np.arange(5))[:, 0]
-    np.testing.assert_allclose(views.condition[:, :3], places, rtol=1e-6)
-    colors = sample_lights(spec, np.arange(5))[2].sum(axis=1)
-    np.testing.assert_allclose(views.scene.light_color.sum(dim=1), colors, rtol=1e-5)
-    assert 6 < float(code.mean()) < 8, "codes are the prior's"
-    assert views.condition[:, 3:].argmax(dim=1).tolist() == [0, 1, 2, 0, 1], "each in turn"
-    sample_sheet(conditional, card, 5, 6, "bowl")
-    assert seen[1][2].condition[:, 3:].tolist() == [[0, 1, 0]] * 5
-    sample_sheet(conditional, card, 5, 7)
-    assert not torch.isclose(seen[2][1], seen[1][1]).any(), "codes are the seed's"
-
-
-def test_an_interpolation_ends_in_the_two_reconstructions(model, several_path):
-    source = room_source(several_path, model.config)
-    found = pixels(explore.interpolation_sheet(model, source, 3, 7, 5))
-    ends, given = reconstructions(model, source, [3, 7], [3, 3]), inputs(source, [3, 7])
-    blank = np.full_like(given[0], 250)
-    frames = [given, [blank, blank], [blank, blank]]
-    first = pixels(sheet([[f[0], e[0]] for f, e in zip(frames, ends, strict=True)]))
-    last = pixels(sheet([[e[1], f[1]] for f, e in zip(frames, ends, strict=True)]))
-    assert np.abs(found[:, : first.shape[1]] - first).max() <= 2
-    assert np.abs(found[:, -last.shape[1] :] - last).max() <= 2
-    assert found.shape == (3 * 134 + 6, 7 * 134 + 6, 3)
-    steps = [found[:134, 6 + 134 * k : 134 * (k + 1)] for k in range(1, 6)]
-    assert all((one != other).any() for one, other in itertools.pairwise(steps))
-
-
 def test_a_rotation_turns_from_the_reconstructions_to_the_files_other_views(model, several_path):
     source, rows = room_source(several_path, model.config), [6, 0, 3]
     frames = [pixels(frame) for frame in rotation_frames(model, source, rows, [0.0, 35.0, 80.0])]
@@ -137,11 +54,3 @@ def test_a_rotation_turns_from_the_reconstructions_to_the_files_other_views(mode
         expected = reconstructions(model, source, rows, [row + view for row in rows])
         assert np.abs(frame - pixels(sheet([given, *expected]))).max() <= 2
     assert (frames[0] != frames[1]).any()
-
-
-def test_a_rotation_tells_the_class(single_path):
-    model = made(tiny(classes=2))
-    source, rows = room_source(single_path, model.config), [0, 1, 2, 3]
-    (frame,) = rotation_frames(model, source, rows, [0.0])
-    expected = sheet([inputs(source, rows), *reconstructions(model, source, rows, rows)])
-    assert np.abs(pixels(frame) - pixels(expected)).max() <= 2

@@ -61,16 +61,6 @@ def test_a_model_of_rays_is_another_method_and_says_what_it_is_told(several_path
         assert (depth < walls - 0.02).any()
 
 
-def test_a_model_of_depth_maps_is_another_method_and_says_so(rooms_path, tmp_path):
-    written_by(made(tiny(depth=1.0)), rooms_path, tmp_path / "p.h5")
-    written(tmp_path / "w.safetensors", tiny(), earlier_depth=True)
-    predict_file(tmp_path / "w.safetensors", rooms_path, tmp_path / "earlier.h5", device="cpu")
-    for name in ("p.h5", "earlier.h5"):
-        with open_predictions(tmp_path / name) as predictions:
-            assert predictions.method == "pix2shape-depth"
-            assert "true depth maps" in predictions.notes
-
-
 def predicted(model: Any, path: Path, out: Path) -> Fields:
     written_by(model, path, out)
     with h5py.File(out) as file:
@@ -104,16 +94,6 @@ def test_planes_stay_planes_when_enlarged(size):
     np.testing.assert_allclose(normal[0].permute(1, 2, 0).numpy() - slant, 0, atol=1e-5)
 
 
-def test_enlarged_depth_stays_near_what_was_predicted():
-    """At steps beside the border, too, where it is extrapolated."""
-    torch.manual_seed(0)
-    depth = torch.where(torch.rand(2, 32, 32) < 0.5, 0.2, 2.1)
-    large, normal = enlarged(depth, 50.0, 128)
-    assert 0.05 < float(large.min()) < float(large.max()) <= 2 * 2.1 + 1e-3
-    assert normal.isfinite().all()
-    np.testing.assert_allclose(normal.norm(dim=1), 1, rtol=1e-5)
-
-
 @pytest.mark.parametrize(
     ("data", "settings", "words"),
     [
@@ -130,21 +110,3 @@ def test_models_that_do_not_suit_are_refused(data, settings, words, truths, tmp_
         predict_file(weights, data, tmp_path / "p.h5")
     assert error.value.found.startswith(words)
     assert not (tmp_path / "p.h5").exists()
-
-
-def test_answers_say_what_training_was_told(truths, tmp_path):
-    config = tiny(encoder="polar", camera=False, spherical=True)
-    weights = written(tmp_path / "w.safetensors", config, labels=2, earlier_labels=3)
-    predict_file(weights, truths.iqtt, tmp_path / "p.h5")
-    with open_predictions(tmp_path / "p.h5") as found:
-        assert found.method == "pix2shape-views"
-        assert "answers of 5 questions" in found.notes
-
-
-def test_a_path_that_cannot_be_written_is_refused_at_once(rooms_path, tmp_path, monkeypatch):
-    weights, out = written(tmp_path / "w.safetensors", tiny()), tmp_path / "p"
-    out.write_text("mine")
-    monkeypatch.setattr(predict, "views_of", lambda *_, **__: pytest.fail("found too late"))
-    for path, kind in ((out, FileExistsError), (tmp_path / "none" / "p.h5", FileNotFoundError)):
-        with pytest.raises(kind):
-            predict_file(weights, rooms_path, path)

@@ -2,7 +2,6 @@
 
 import math
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +9,14 @@ import h5py
 import numpy as np
 import pytest
 import torch
-from h5_edits import put
-from pix2shape_models import edited, question_source, released, suited, tiny
+from pix2shape_models import question_source, released, suited, tiny
 from refusals import refused
 from torch.utils.data import default_collate
 
 from baselines.pix2shape.network.surfels import render
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import SpecError
 
 SPEC = SplitSpec(
     seed=5, train=7, labeled=4, val=2, test=1, cubes=(5, 7), lights=(1, 3), height=64, width=64,
@@ -54,28 +52,6 @@ def scales(file: h5py.File) -> np.ndarray:
     return distance / file["truth/unlabeled/camera_distance"][:]
 
 
-def test_items_are_the_four_images_and_batches_four_after_four(train_path):
-    source = question_source(train_path, "unlabeled", TINY)
-    assert len(source) == 3
-    batch = batch_of(source)
-    with h5py.File(train_path) as file:
-        questions = file["unlabeled/questions"][:]
-        scale = scales(file)
-        colors = file["truth/unlabeled/light_color"][:] * scale[:, None, None, None] ** 2
-    parts = [questions[:, :, i::2, j::2] for i in (0, 1) for j in (0, 1)]
-    means = np.moveaxis(sum(parts) / 4, -1, 2)
-    assert source[0]["image"].shape == (4, 3, 32, 32)
-    assert batch.image.shape == (12, 3, 32, 32)
-    assert batch.views.condition.shape == (12, 0)
-    for row in range(3):
-        assert all(v.dtype == np.float32 and len(v) == 4 for v in source[row].values())
-        np.testing.assert_allclose(source[row]["image"], means[row], rtol=1e-6)
-        for place in range(4):
-            np.testing.assert_allclose(batch.image[4 * row + place], means[row, place], rtol=1e-6)
-            light = batch.views.scene.light_color[4 * row + place]
-            np.testing.assert_allclose(light, colors[row, place], rtol=1e-6)
-
-
 def test_the_truth_shaded_with_what_is_told_is_the_image(train_path):
     """Where the neighbours lie in one plane, so that normals of the depth map are exact."""
     source = question_source(train_path, "unlabeled", TINY)
@@ -97,19 +73,6 @@ def test_the_truth_shaded_with_what_is_told_is_the_image(train_path):
     difference = np.abs(np.moveaxis(image.numpy(), 1, -1) - expected)[flat]
     assert difference.max() < 2e-3
     assert np.ptp(expected[flat], axis=0).min() > 0.1, "not the ambient light alone"
-
-
-def test_answers_are_those_of_the_labelled_part(train_path, folder):
-    labelled = question_source(train_path, "labeled", TINY)
-    with h5py.File(train_path) as file:
-        answers = file["labeled/answers"][:].tolist()
-    assert [labelled[row]["answer"] for row in range(4)] == answers
-    assert labelled.has_answers
-    assert batch_of(labelled).image.shape == (16, 3, 32, 32), "the answer is no part of the batch"
-    unlabelled = question_source(train_path, "unlabeled", TINY)
-    assert not unlabelled.has_answers
-    assert "answer" not in unlabelled[0]
-    assert question_source(folder / "iqtt-val.h5", None, TINY).has_answers
 
 
 def test_shapes_and_rotations_are_never_read(train_path, tmp_path):
@@ -139,49 +102,3 @@ def test_files_without_lights_are_refused(folder, tmp_path):
                 call(path, None, TINY)
     with refused(SpecError, "networks"):
         question_source(folder / "iqtt-val.h5", None, tiny())
-
-
-def test_damaged_lights_are_refused(folder, tmp_path):
-    path = edited(
-        folder / "iqtt-val.h5", tmp_path / "bad.h5", put("truth/light_color", (1, 2), np.nan)
-    )
-    with refused(FileFormatError, f"{path}: row 1", "light_color"):
-        question_source(path, None, TINY)
-
-
-def test_no_questions_and_odd_sizes_are_refused(tmp_path):
-    path = tmp_path / "split" / "iqtt-train.h5"
-    for size, part, found in (
-        ((48, 64), "unlabeled", "images of 48x64"),
-        ((32, 32), "labeled", "0 questions with"),
-    ):
-        spec = replace(SPEC, train=1, labeled=0, val=0, test=0, height=size[0], width=size[1])
-        make_split(path.parent, spec, overwrite=True)
-        with refused(SpecError, str(path), found):
-            question_source(path, part, TINY)
-
-
-def test_the_polar_encoder_needs_a_white_background(train_path):
-    """By which it tells shape from background; otherwise all pixels would count as shape."""
-    with refused(SpecError, str(train_path)):
-        suited(tiny(camera=False, encoder="polar"), train_path)
-
-
-def test_the_configuration_for_questions(train_path):
-    plain = tiny(classes=7, camera=False, batch=12, seed=9)
-    config = suited(plain, train_path)
-    spec = config.networks
-    assert (spec.camera, spec.classes, spec.z_view, spec.z) == (False, 0, 10, plain.networks.z)
-    assert (spec.size, spec.width, config.batch, config.seed) == (32, 0.05, 12, 9)
-    assert config.opacity
-    distance = 64 / 62 * SPEC.max_radius / math.sin(math.radians(SPEC.fov_degrees) / 2)
-    assert config.depth_middle == pytest.approx(distance)
-    assert config.depth_reach == pytest.approx(SPEC.max_radius / config.depth_middle)
-    with h5py.File(train_path) as file:
-        depth = file["truth/unlabeled/depth"][:] * scales(file)[:, None, None, None]
-        depth /= config.depth_middle
-    assert 1 - config.depth_reach < np.nanmin(depth) < np.nanmax(depth) < 1 + config.depth_reach
-    for change in ({"z_scene": 10}, {"z_view": 32}):
-        with pytest.raises(SpecError) as error:
-            suited(tiny(**change), train_path, "labeled")
-        assert error.value.where.replace(" ", "_") in change

@@ -14,8 +14,6 @@ from torch.utils.data import default_collate
 
 from baselines.pix2shape.network.surfels import render
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.description.presets import VESSELS
-from scenegen.rooms.reader import RoomsFile
 
 TOLD = {"light_position", "light_color", "ambient", "attenuation", "reflectance"}
 
@@ -30,27 +28,6 @@ def views_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPat
     return make_rooms(path, 3, **size, **look, views=(0.0, 35.0), image_dtype="float32")
 
 
-@pytest.fixture(scope="session")
-def vessels_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return a file of 5 rooms with one object of seven classes."""
-    path = tmp_path_factory.mktemp("data") / "vessels.h5"
-    return make_rooms(path, 5, source="families", shapes=VESSELS, objects=(1, 1))
-
-
-def test_images_are_means_of_blocks_of_linear_radiance(views_path, rooms_path):
-    source = room_source(views_path, tiny())
-    with RoomsFile(views_path) as rooms:
-        for row, room in enumerate(rooms):
-            image = source[row]["image"]
-            parts = [room.radiance[i::2, j::2] for i in (0, 1) for j in (0, 1)]
-            assert (image.shape, image.dtype) == ((3, 32, 32), np.float32)
-            np.testing.assert_allclose(image, np.moveaxis(sum(parts) / 4, -1, 0), rtol=1e-6)
-    eight_bits = room_source(rooms_path, tiny())[2]["image"]
-    with h5py.File(rooms_path) as file:
-        stored = np.moveaxis(file["image"][2], -1, 0)
-    np.testing.assert_allclose(255 * eight_bits, stored, rtol=1e-6)
-
-
 def test_the_truth_shaded_with_what_is_told_is_the_image(views_path):
     """Lights, camera and material are those of the image: the renderer's own hits prove it."""
     source = room_source(views_path, tiny())
@@ -61,23 +38,6 @@ def test_the_truth_shaded_with_what_is_told_is_the_image(views_path):
     assert (batch.views.scene.light_color != 0).any(dim=2).sum(dim=1).unique().numel() > 1
     image = render(depth, batch.views.scene, normal.permute(0, 3, 1, 2)).permute(0, 2, 3, 1)
     np.testing.assert_allclose(image, expected, rtol=4e-5, atol=4e-5)
-
-
-@pytest.mark.parametrize("camera", [True, False])
-def test_the_class_is_one_hot_behind_the_camera(vessels_path, camera):
-    source = room_source(vessels_path, tiny(classes=7, camera=camera))
-    assert source.classes == VESSELS
-    with h5py.File(vessels_path) as file:
-        models = file["object/model"].asstr()[:, 0]
-        places = file["camera/world_from_camera"][:, :3, 3]
-    assert len({model.split("/")[0] for model in models}) > 1
-    for row, model in enumerate(models):
-        condition = source[row]["condition"]
-        assert condition.shape == (10 if camera else 7,)
-        if camera:
-            np.testing.assert_allclose(condition[:3], places[row], rtol=1e-6)
-        assert sorted(condition[-7:]) == [0] * 6 + [1]
-        assert VESSELS[int(condition[-7:].argmax())] == model.split("/")[0]
 
 
 @pytest.mark.parametrize(
@@ -101,13 +61,6 @@ def test_what_networks_cannot_be_told_is_refused(name, place, value, make_rooms,
     path = edited(path, tmp_path / "bad.h5", put(name, place, value))
     with refused(FileFormatError, f"{path}: {name}, row 2"):
         room_source(path, tiny())[2]
-
-
-@pytest.mark.parametrize("number", [-1, 99])
-def test_a_class_that_is_none_is_refused(number, vessels_path, tmp_path):
-    path = edited(vessels_path, tmp_path / "bad.h5", put("object/shape", (2, 0), number))
-    with refused(FileFormatError, f"{path}: object/shape, row 2"):
-        room_source(path, tiny(classes=len(VESSELS)))
 
 
 def test_depth_is_read_only_for_supervision(views_path, tmp_path):

@@ -5,21 +5,16 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-import torch
 from refusals import refused
 
-from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.predict import predict_file
 from baselines.pix2shape.weights import FOLDER, names, open_weights, suited
-from baselines.training.checkpoint import load_tensors, save_tensors
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from metrics.measures.relief import empty_room
 from metrics.submissions.reader import open_predictions
-from scenegen.camera import look_at
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import SpecError
 from scenegen.description.presets import preset_spec
-from scenegen.description.specs import request_from_json
 from scenegen.rooms.make import make_dataset
 from scenegen.rooms.reader import RoomsFile
 
@@ -32,17 +27,6 @@ def test_they_are_small_and_each_has_its_card() -> None:
         if card.settings.decay:  # else a run that ended early is one that asked for less
             assert card.iteration == card.settings.iterations
         assert card.settings.depth == 0, "they learned without depth maps"
-
-
-def test_settings_that_are_gone_may_be_off_in_a_card_and_no_more(tmp_path: Path) -> None:
-    tensors, notes = load_tensors(FOLDER / "iqtt.safetensors")
-    ((content, text),) = notes.items()
-    assert '"swap":0.0' in text
-    save_tensors(
-        tmp_path / "w.safetensors", tensors, {content: text.replace('"swap":0.0', '"swap":1.0')}
-    )
-    with refused(FileFormatError, "settings", "swap"):
-        open_weights(tmp_path / "w.safetensors")
 
 
 CLASSES = "shapenet-single-classes"  # told what is there, so that it predicts nothing
@@ -74,27 +58,6 @@ def test_they_predict_rooms(name: str, tmp_path: Path) -> None:
     if rays:
         floor = 0.85 * ((empty - truth) ** 2).mean()
     assert error < floor, (error, floor)
-
-
-def test_samples_of_a_class_have_its_proportions(tmp_path: Path) -> None:
-    """Of the same codes, cameras and lights; and what is told the class predicts no submission."""
-    model, card = open_weights(CLASSES)
-    spec, noise = request_from_json(card.data), np.random.default_rng(0).normal(size=(32, 128))
-    camera = torch.from_numpy(look_at(np.array([[1.2, 1.0, 1.2]]), np.array(spec.camera_target)))
-    cameras = Cameras(camera.float().expand(32, 4, 4), spec.fov_y_degrees)
-    width_to_height = {}
-    for name in ("bottle", "bowl"):
-        label = torch.eye(len(card.classes))[card.classes.index(name)].expand(32, -1)
-        condition = torch.cat([cameras.world_from_camera[:, :3, 3], label], dim=1)
-        with torch.inference_mode():
-            codes = model.prior(torch.from_numpy(noise).float(), condition)
-            raised = model.relief(codes, condition) > 0.05
-        wide, high = (raised.any(dim=d).sum(dim=1).float().mean() for d in (1, 2))
-        width_to_height[name] = wide / high
-    assert width_to_height["bowl"] > 1.3 * width_to_height["bottle"]
-    make_dataset(tmp_path / "rooms.h5", preset_spec("shapenet-single", seed=77), 1)
-    with pytest.raises(SpecError):
-        predict_file(CLASSES, tmp_path / "rooms.h5", tmp_path / "predictions.h5")
 
 
 def test_they_answer_questions(tmp_path: Path) -> None:

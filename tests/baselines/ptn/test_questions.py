@@ -1,6 +1,5 @@
 """Batches of polycubes: silhouettes are those of the file's own images, and of turned shapes."""
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +7,6 @@ import numpy as np
 import pytest
 import torch
 from ptn_models import cubes_volume, tiny
-from refusals import refused
 
 from baselines.ptn.projection import silhouettes
 from baselines.ptn.questions import TrainingShapes, meets_cubes
@@ -16,7 +14,6 @@ from iqtt.files.make import make_split
 from iqtt.files.reader import open_questions
 from iqtt.questions.specs import SplitSpec
 from scenegen.camera import pixel_directions
-from scenegen.common.errors import SpecError
 
 
 @pytest.fixture(scope="module")
@@ -64,14 +61,3 @@ def test_volumes_of_the_truth_have_the_batchs_silhouettes(split):
         assert len(batch.origin[item].unique(dim=0)) == 3  # cameras
         found = silhouettes(cubes_volume(model, cubes, turn, radius), model.box, *rays, 96)[0] > 0.5
         assert (found != (batch.silhouette[item] > 0)).float().mean() < 0.03
-
-
-def test_files_that_tell_no_shapes_and_odd_sizes_are_refused(split):
-    settings = tiny("questions").settings
-    with open_questions(split / "iqtt-test.h5") as questions, refused(SpecError, "iqtt-test.h5"):
-        TrainingShapes(questions, settings)
-    with (
-        open_questions(split / "iqtt-train.h5", "unlabeled") as questions,
-        refused(SpecError, "iqtt-train.h5", "48x48", "32"),
-    ):
-        TrainingShapes(questions, replace(settings, size=32))

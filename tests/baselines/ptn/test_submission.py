@@ -1,19 +1,11 @@
 """Submissions: what a volume looks like, files that can be scored, and refusals."""
 
-import h5py
 import numpy as np
 import pytest
-from ptn_models import TINY, tiny, volume_of, voxel_centres
+from ptn_models import tiny, volume_of, voxel_centres
 
-from baselines.ptn.network import Settings
 from baselines.ptn.rooms import RoomImages
 from baselines.ptn.submission import seen
-from baselines.ptn.training import BASELINE
-from baselines.training.baseline import train
-from baselines.training.data import TrainingFiles
-from baselines.training.submission import write_submission
-from iqtt.files.make import make_split
-from iqtt.questions.specs import SplitSpec
 from metrics.measures.relief import empty_room
 from scenegen.rooms.reader import RoomsFile
 
@@ -43,29 +35,3 @@ def test_a_true_volume_gives_the_truths_depth_and_normals_in_every_view(make_roo
                 cosine = (normal * room.normal).sum(axis=-1)[both]
                 assert np.degrees(np.arccos(np.clip(cosine, -1, 1))).mean() < 8
                 assert depth[~inside] == pytest.approx(room.depth[~inside], abs=0.2)
-
-
-@pytest.fixture(scope="module")
-def questions(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("ptn") / "split"
-    spec = SplitSpec(train=6, labeled=4, val=0, test=3, height=32, width=32, min_cube_pixels=0)
-    make_split(folder, spec)
-    return folder
-
-
-def test_answers_follow_labels_and_names(questions, tmp_path):
-    train_file, test_file = (questions / f"iqtt-{name}.h5" for name in ("train", "test"))
-    weights = train(
-        BASELINE, TrainingFiles(train_file), tmp_path / "none", Settings(**TINY, iterations=2)
-    )
-    told = train(
-        BASELINE, TrainingFiles(train_file), tmp_path / "told", networks=str(weights), labels=4
-    )
-    untold = train(BASELINE, TrainingFiles(train_file), tmp_path / "untold", networks=str(told))
-    scores = {}
-    for name, path in (("volumes", weights), ("told", told), ("untold", untold)):
-        write_submission(BASELINE, test_file, tmp_path / f"{name}.h5", path)
-        with h5py.File(tmp_path / f"{name}.h5") as file:
-            scores[name] = file["scores"][:]
-    assert not np.allclose(scores["volumes"], scores["told"])
-    assert np.array_equal(scores["volumes"], scores["untold"]), "its card says 0 labels"

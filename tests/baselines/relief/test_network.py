@@ -3,11 +3,9 @@
 import pytest
 import torch
 
-from baselines.pix2shape.matching.search import reliefs
-from baselines.pix2shape.network.architecture import contrast
 from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
-from baselines.relief.depth_completed import THICK, Completion
-from baselines.relief.network import Card, Settings, UNet, predicted_depth, relief_network
+from baselines.relief.depth_completed import Completion
+from baselines.relief.network import Card, Settings, predicted_depth, relief_network
 
 
 def cameras(*positions: tuple[float, float, float]) -> Cameras:
@@ -41,29 +39,3 @@ def test_depth_lies_between_the_walls_and_the_open_sides(kind, size):
             assert (depth >= entry).all()
     assert (depth == walls).any()
     assert (depth == entry).any()
-
-
-def test_a_unet_sees_with_the_images_own_camera_alone():
-    network = UNet(small(32))
-    with pytest.raises(ValueError, match="own camera"):
-        network(torch.rand(2, 3, 32, 32), OWN, OTHER)
-
-
-def test_a_completion_is_told_how_far_points_lie_behind_what_is_seen(monkeypatch):
-    """Seen from its own camera, the surface lies at the relief that the first network gives."""
-    network, told = Completion(Card("x", small(32))).eval(), []
-    monkeypatch.setattr(network.seen, "forward", lambda *_: torch.full((2, 32, 32), 0.1))
-    monkeypatch.setattr(network.completed, "relief", told.append)
-    for targets in (OWN, OTHER):
-        network(torch.rand(2, 3, 32, 32), OWN, targets)
-    behind = told[0][:, : len(reliefs(told[0])), 1:-1, 1:-1]
-    expected = (0.1 - reliefs(behind)) / THICK
-    torch.testing.assert_close(behind.mean(dim=(0, 2, 3)), expected.clamp(-1, 1), atol=1e-3, rtol=0)
-    assert not torch.allclose(*told)
-
-
-def test_contrast_is_blind_to_what_is_even():
-    even = torch.full((1, 3, 16, 16), 0.3)
-    torch.testing.assert_close(contrast(even), torch.zeros_like(even), atol=1e-5, rtol=0)
-    even[0, 0, 8, 8] += 0.81
-    assert float(contrast(even)[0, 0, 8, 8]) == pytest.approx(8 * 0.8)

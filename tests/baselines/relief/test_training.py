@@ -7,18 +7,15 @@ import numpy as np
 import pytest
 import torch
 from h5_edits import put, values
-from pix2shape_models import edited, in_memory
+from pix2shape_models import edited
 from refusals import refused
 from safetensors.torch import load_file
 
 from baselines.pix2shape.matching.relief import FOLDER
-from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms
-from baselines.relief import depth_supervised, training, view_pairs
-from baselines.relief.depth_completed import views_of_scenes
-from baselines.relief.network import Settings, predicted_depth
-from baselines.relief.training import SLOPE, learning_rate, shape_loss, windows
+from baselines.relief import depth_supervised, view_pairs
+from baselines.relief.network import Settings
+from baselines.relief.training import SLOPE, shape_loss
 from baselines.training.baseline import train
-from baselines.training.checkpoint import load_weights
 from baselines.training.data import TrainingFiles
 from scenegen.common.errors import FileFormatError, SpecError
 
@@ -33,24 +30,6 @@ UNSEEN = (
 def same(one, other):
     found, expected = load_file(one), load_file(other)
     return all(torch.equal(found[name], expected[name]) for name in expected)
-
-
-@pytest.mark.slow
-def test_a_unet_learns_nine_images_by_heart(turned_path, tmp_path, monkeypatch):
-    monkeypatch.setattr(training, "WARM_UP", 10)
-    monkeypatch.setattr(training, "WHOLE", 0.5)
-    settings = replace(SMALL, iterations=320, batch=9, learning_rate=0.01)
-    path = train(depth_supervised.BASELINE, TrainingFiles(turned_path), tmp_path, settings)
-    network, card = load_weights(path, depth_supervised.METHOD)
-    rooms = in_memory(turned_path, 32, depth=True)
-    cameras = Cameras(rooms.world_from_camera, rooms.fov_y_degrees)
-    with torch.no_grad():
-        depth = predicted_depth(network, rooms.image.float(), cameras, cameras)
-    walls = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, 32)[0]
-    error, before = ((guess - rooms.depth).abs().mean() for guess in (depth, walls))
-    assert error < before / 2, "the empty room is left far behind"
-    assert (card.iteration, card.fingerprint) == (320, rooms.fingerprint)
-    assert card.seconds > 0
 
 
 def test_pixels_without_a_surface_teach_nothing(turned_path, tmp_path):
@@ -85,38 +64,6 @@ def test_view_pairs_reads_nothing_but_images_and_cameras(near_path, tmp_path):
     assert not same(
         train(view_pairs.BASELINE, TrainingFiles(other), tmp_path / "three", SMALL), expected
     )
-
-
-def test_each_row_is_seen_from_the_cameras_of_its_own_scene(turned_path):
-    rooms = in_memory(turned_path, 32)
-    assert rooms.depth is None
-    assert rooms.rounded
-    found = [rows.tolist() for rows in views_of_scenes(rooms)]
-    assert found == [[row - row % 3 + k for k in range(3)] for row in range(9)]
-    mixed = replace(rooms, scene=torch.tensor([2, 0, 1, 0, 2, 2, 1, 0, 1]))
-    assert views_of_scenes(mixed)[3].tolist() == [1, 3, 7]
-
-
-def test_the_learning_rate_rises_and_falls_to_nothing():
-    settings = Settings(iterations=1000, learning_rate=0.1)
-    rates = [learning_rate(settings, i) for i in range(1000)]
-    assert 0 < rates[0] < 0.001
-    assert 0.085 < max(rates) == rates[199] < 0.1
-    assert rates[199:] == sorted(rates[199:], reverse=True)
-    assert rates[-1] < 1e-5
-
-
-def test_a_window_is_the_same_of_all_maps_and_shows_an_object():
-    rng = np.random.default_rng(0)
-    places = torch.arange(2 * 64).view(2, 1, 8, 8)
-    shown = torch.zeros(2, 8, 8, dtype=torch.bool)
-    shown[0, 7, 0] = True  # in a corner; the second image shows nothing
-    for _ in range(20):
-        place = torch.from_numpy(rng.random(2))
-        one, other, seen = windows((places, places[:, 0], shown), shown, 4, place)
-        assert torch.equal(one[:, 0], other)
-        assert (one[..., 1:] - one[..., :-1] == 1).all()
-        assert seen.flatten(1).any(dim=1).tolist() == [True, False]
 
 
 INSIDE = torch.tensor([[[1, 1, 0, 2], [1, 1, 0, 2]], [[1, 1, 0, 0], [0, 0, 0, 0]]])

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import torch
 
-from baselines.rezende.estimator import sampled_gradient, with_gradient
+from baselines.rezende.estimator import sampled_gradient
 
 PAIRS = 20_000
 
@@ -38,22 +38,3 @@ def test_a_step_without_any_derivative_gives_the_density_at_the_step():
     density = math.exp(-0.5 * (0.1 / width) ** 2) / (width * math.sqrt(2 * math.pi))
     assert abs(found - density) < 4.5 * error
     assert error < 0.02 * density
-
-
-def test_each_item_has_its_own_gradient_and_losses_are_asked_for_no_gradient():
-    mean = torch.tensor([[1.0, 0.0], [0.0, -2.0]], requires_grad=True)
-
-    def loss(x):
-        assert not x.requires_grad
-        assert x.shape == (6, 2, 2)
-        return (x**2).sum(dim=2) * torch.tensor([1.0, 0.0])  # the second item's loss is constant
-
-    found = sampled_gradient(loss, mean, 0.01, 3, torch.Generator().manual_seed(0))
-    assert found[0].abs().sum() > 0
-    np.testing.assert_array_equal(found[1], 0)
-
-
-def test_a_given_gradient_flows_back():
-    weight = torch.tensor([2.0, 3.0], requires_grad=True)
-    with_gradient(weight**2, torch.tensor([1.0, -1.0])).backward()
-    np.testing.assert_allclose(weight.grad, [4.0, -6.0])

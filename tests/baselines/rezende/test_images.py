@@ -1,12 +1,10 @@
 """Images of question files, and what is told with them."""
 
 import numpy as np
-from refusals import refused
 
 from baselines.rezende import images
 from baselines.rezende.rasteriser import rasterise
 from iqtt import open_questions
-from scenegen.common.errors import SpecError
 from scenegen.objects.basic_shapes import unit_shape
 
 
@@ -43,20 +41,3 @@ def test_true_shapes_drawn_with_what_is_told_are_the_images(split):
                 both = np.isfinite(depth[0]) & np.isfinite(true)
                 assert np.isclose(depth[0][both], true[both], atol=0.01).mean() > 0.98
                 assert np.median(abs(image[0] - wanted)[both]) < 0.02  # light differs in a cube
-
-
-def test_images_are_reduced_and_their_questions_limited(split, monkeypatch):
-    large = read_question_pictures(split / "iqtt-train.h5", 64, "unlabeled")
-    monkeypatch.setattr("baselines.rezende.images.MOST_QUESTIONS", 2)
-    small = read_question_pictures(split / "iqtt-train.h5", 16, "unlabeled")
-    assert (len(large), len(small)) == (20, 8)
-    blocks = large.image[:8].reshape(8, 3, 16, 4, 16, 4).mean(axis=(3, 5))
-    np.testing.assert_allclose(small.image, blocks, atol=1e-5)
-    np.testing.assert_array_equal(small.views.light_position, large.views.light_position[:8])
-
-
-def test_what_tells_no_lights_or_has_another_size_is_refused(split):
-    with refused(SpecError, "iqtt-test.h5", "2 questions without"):
-        read_question_pictures(split / "iqtt-test.h5", 32)
-    with refused(SpecError, "iqtt-val.h5", "64x64", "48"):
-        read_question_pictures(split / "iqtt-val.h5", 48)

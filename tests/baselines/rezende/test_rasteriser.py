@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation
 from baselines.rezende.rasteriser import Views, rasterise
 from baselines.rezende.sphere import icosphere
 from scenegen.camera import pixel_directions
-from scenegen.rendering.shading import shade
 
 SIZE, FOV, DISTANCE = 48, 28.0, 4.5
 RNG = np.random.default_rng(4)
@@ -85,49 +84,6 @@ def test_crumpled_meshes_are_those_of_another_ray_caster():
         agree = np.isclose(found.ravel(), true, atol=1e-3)
         assert agree.mean() > 0.99  # rays through an edge may hit either side
         assert np.isfinite(true).mean() > 0.3
-
-
-def test_pixels_have_the_shading_of_their_triangle():
-    vertices, faces, _, _ = box(1)
-    these = views(1)
-    image, depth = rasterise(vertices[None], faces, these)
-    corners = vertices[faces]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    wanted = shade(
-        corners.mean(axis=1), normals, these.reflectance, these.light_position[0],
-        these.light_color[0], these.ambient, np.array(these.attenuation),
-    )  # fmt: skip
-    shown = np.isfinite(depth[0])
-    np.testing.assert_array_equal(image[0][~shown], np.float32([[1.0, 0.9, 0.8]] * (~shown).sum()))
-    distance = abs(image[0][shown][:, None] - wanted).max(axis=2)
-    assert distance.min(axis=1).max() < 1e-4
-    assert len(np.unique(distance.argmin(axis=1))) >= 3
-
-
-def test_a_mesh_in_a_batch_has_the_bits_that_it_has_alone():
-    meshes, faces = crumpled(5)
-    these = views(5)
-    together = rasterise(meshes, faces, these)
-    for row in range(5):
-        own = Views(
-            **{
-                **vars(these),
-                "light_position": these.light_position[row : row + 1],
-                "light_color": these.light_color[row : row + 1],
-            }
-        )
-        for whole, alone in zip(together, rasterise(meshes[row : row + 1], faces, own)):
-            np.testing.assert_array_equal(whole[row], alone[0])
-
-
-def test_of_a_mesh_turned_inside_out_the_far_side_shows():
-    vertices, faces = icosphere(2)
-    _, front = rasterise(vertices[None], faces, views(1))
-    _, back = rasterise(vertices[None], faces[:, ::-1], views(1))
-    assert front.min() < DISTANCE - 0.9
-    assert back.min() > DISTANCE - 0.3
-    assert (np.isfinite(front) == np.isfinite(back)).mean() > 0.98
 
 
 def test_what_is_behind_the_camera_or_too_near_does_not_show():

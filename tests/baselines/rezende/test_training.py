@@ -85,17 +85,3 @@ def test_errors_are_summed_in_the_windows_of_vertices(one_box):
         wanted = squared[:, item, top:bottom, left:right].sum(axis=(1, 2))
         np.testing.assert_allclose(found[:, item, vertex], wanted, rtol=1e-4)
         assert bottom - top in (0, 5, 6) or min(top, 16 - bottom) == 0
-
-
-def test_the_far_side_is_charged_with_nothing_and_the_middle_keeps_its_depth(one_box):
-    pictures, _ = one_box
-    model = state_of().network
-    offsets = torch.zeros(8, 162, 3)
-    sums = near_vertices(np.ones((1, 8, 16, 16), np.float32), windows(model, offsets, pictures))
-    height = model.sphere[:, 2].numpy()
-    assert (sums[0][:, height < -0.4] == 0).all()
-    assert (sums[0][:, height > 0.4] > 8).all()
-    offsets[:, :, 2] = torch.randn(8, 162) + 3
-    moved = model.vertices(offsets)
-    torch.testing.assert_close(moved[:, :, 2].mean(dim=1), torch.zeros(8), rtol=0, atol=1e-5)
-    torch.testing.assert_close(moved[:, :, :2], model.sphere[:, :2].expand(8, -1, -1))

@@ -5,13 +5,7 @@ import torch
 from pix2shape_models import in_memory
 from refusals import refused
 
-from baselines.pix2shape.network.empty_rooms import empty_rooms
-from baselines.relief import depth_supervised
-from baselines.relief.network import Settings
-from baselines.training.baseline import train
-from baselines.training.checkpoint import load_weights
 from baselines.training.data import TrainingFiles, only, requests
-from baselines.training.machine import Machine
 from baselines.training.rooms import read_rooms
 from scenegen.common.errors import FileFormatError, SpecError
 
@@ -49,30 +43,3 @@ def test_several_files_are_one_set_of_rows_and_a_card_lists_them(turned_path, ma
     marks = f"{parts[0].fingerprint} {parts[1].fingerprint}"
     assert told["fingerprint"] == together.fingerprint == marks
     assert told["data"].split("\n") == [file.spec.to_json() for file in files]
-
-
-def test_rows_of_files_that_differ_have_their_own_field_of_view(turned_path, make_rooms, tmp_path):
-    """Each row's rays meet floor and walls where they do in its own file."""
-    wide = make_rooms(
-        tmp_path / "wide.h5", 2, views=(0.0, 10.0), min_visible_pixels=2, fov_degrees=40.0
-    )
-    with TrainingFiles(turned_path, wide) as data:
-        files = data.rooms()
-        together = read_rooms(files, 32)
-        one, other = (read_rooms([file], 32) for file in files)
-        card = train(
-            depth_supervised.BASELINE,
-            data,
-            tmp_path / "run",
-            Settings(size=32, width=0.1, iterations=2, batch=13),
-            Machine("cpu"),
-        )
-    assert (one.fov_y_degrees, other.fov_y_degrees) == (28.0, 40.0)
-    rows = torch.tensor([10, 2])
-    expected = [
-        empty_rooms(part.world_from_camera[[row]], part.fov_y_degrees, 32)[0]
-        for part, row in ((other, 1), (one, 2))
-    ]
-    found = empty_rooms(together.world_from_camera[rows], together.fov_of(rows), 32)[0]
-    torch.testing.assert_close(found, torch.cat(expected), rtol=1e-5, atol=1e-6)
-    assert load_weights(card, depth_supervised.METHOD)[1].fingerprint == together.fingerprint

@@ -1,10 +1,7 @@
 """Images as networks take them, the order of rows, and files that forked processes read."""
 
-import os
-import pickle
 import time
 from dataclasses import dataclass
-from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -14,10 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 
-from baselines.training.data import Opened
-from baselines.training.images import Draws, channels_first, check_reducible, read_ahead, reduced
-from scenegen import open_rooms
-from scenegen.common.errors import FileFormatError, SpecError
+from baselines.training.images import Draws, channels_first, read_ahead, reduced
+from scenegen.common.errors import FileFormatError
 
 
 def test_images_are_means_of_blocks_channels_first():
@@ -35,24 +30,6 @@ def test_radiance_that_networks_cannot_take_is_refused(value):
     image[1, 2, 0] = value
     with refused(FileFormatError, "row 7"):
         channels_first(image, 4, "row 7")
-
-
-@pytest.mark.parametrize(("height", "width"), [(48, 64), (50, 50), (16, 16)])
-def test_images_of_other_sizes_are_refused(height, width):
-    with refused(SpecError, "rooms.h5", f"images of {height}x{width}", "32"):
-        check_reducible("rooms.h5", height, width, 32)
-
-
-def test_every_process_opens_the_file_for_itself(rooms_path):
-    opened = Opened(partial(open_rooms, rooms_path))
-    assert opened.file is opened.file
-    child = os.fork()
-    if not child:
-        os._exit(0 if opened.file.read("image", 7).shape == (32, 32, 3) else 1)
-    assert os.waitpid(child, 0)[1] == 0
-    again = pickle.loads(pickle.dumps(opened))
-    assert again.file is not opened.file
-    assert (again.file.read("image", 3) == opened.file.read("image", 3)).all()
 
 
 @settings(deadline=None, max_examples=40)
@@ -98,14 +75,3 @@ def test_batches_for_a_gpu_are_read_ahead_in_their_order(device, ahead):
     rest = list(found)
     assert [len(batch.image) for batch in rest] == [1, 2, 3, 4, 5]
     assert {batch.image.device.type for batch in rest} == {device}
-
-
-def test_what_goes_wrong_while_reading_ahead_is_raised():
-    def batches():
-        yield Batch(torch.zeros(1))
-        raise FileFormatError("rooms.h5", "damage", "none")
-
-    found = read_ahead(batches(), torch.device("meta"))
-    next(found)
-    with pytest.raises(FileFormatError):
-        next(found)

@@ -93,11 +93,7 @@ def test_an_environment_that_torchrun_does_not_make_is_refused(here, world, monk
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "name"),
-    [
-        *((kind, "2") for kind in CONFIGS),
-        ("rooms", "2 then 1"),
-        ("rooms", "1 then 2"),
-    ],
+    [*((kind, "2") for kind in CONFIGS), ("rooms", "2 then 1"), ("rooms", "1 then 2")],
 )
 def test_several_processes_learn_what_one_learns(kind, name, folder):
     """The losses of every iteration, the weights, batch statistics and moments at the end."""

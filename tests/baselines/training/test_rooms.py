@@ -5,11 +5,9 @@ import numpy as np
 import pytest
 import torch
 from pix2shape_models import edited, in_memory, of_rows
-from refusals import refused
 
 from baselines.training.rooms import input_views, room_images
 from scenegen import open_rooms
-from scenegen.common.errors import FileFormatError
 
 
 def test_rooms_in_memory_are_those_of_the_file(near_path):
@@ -29,16 +27,6 @@ def test_rooms_in_memory_are_those_of_the_file(near_path):
     with open_rooms(near_path) as file:
         some = room_images(file, np.array([5, 2]), 32)
     torch.testing.assert_close(some, rooms.image[[5, 2]].float(), rtol=1e-3, atol=0)
-
-
-def test_an_image_without_a_surface_is_refused_where_depth_is_asked_for(near_path, tmp_path):
-    def hole(file: h5py.File) -> None:
-        file["depth"][3] = np.nan
-
-    path = edited(near_path, tmp_path / "hole.h5", hole)
-    assert in_memory(path, 32).depth is None
-    with refused(FileFormatError, "depth, row 3", "no surface"):
-        in_memory(path, 32, depth=True)
 
 
 def test_the_input_of_a_scene_is_its_view_0_or_its_first(turned_path, tmp_path):

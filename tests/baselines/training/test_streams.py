@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 import torch
 from click.testing import CliRunner
@@ -11,35 +10,20 @@ from refusals import refused
 from safetensors.torch import load_file
 
 import cli
-from baselines.depth_match import training as depth_match
 from baselines.pix2shape.training.run import train_run
 from baselines.pix2shape.weights import METHOD
-from baselines.relief import depth_supervised, view_pairs
+from baselines.relief import depth_supervised
 from baselines.relief.network import Settings
 from baselines.training.baseline import train
 from baselines.training.checkpoint import load_weights
 from baselines.training.machine import Machine
 from baselines.training.streams import TrainingStreams
-from scenegen import RoomStream
 from scenegen.common.errors import SpecError
 from scenegen.description.specs import request_from_json
-from scenegen.rooms.make import MAX_COUNT
 
 HERE = Machine("cpu", workers=0)
 SMALL = Settings(size=32, width=0.25, iterations=2, batch=4, seed=7)
 SHAPES = TrainingStreams("shapes")
-
-
-def test_blocks_are_rows_beyond_those_of_any_file():
-    shown = SHAPES.shown(32, 7)
-    block = next(shown.blocks(8, 4, 0))
-    spec = request_from_json(shown.card()["data"])
-    start = MAX_COUNT + 8
-    (rows,) = RoomStream(spec, fields=["image", "depth"], batch=4, start=start, stop=start + 4)
-    assert block.read("scene_index", slice(None)).tolist() == list(range(start, start + 4))
-    for name, values in rows.items():
-        np.testing.assert_array_equal(block.read(name, slice(None)), values)
-    assert (spec.seed, len(block), block.height) == (7, 4, 32)
 
 
 def test_networks_learn_from_streams_and_their_cards_tell_it(tmp_path):
@@ -64,24 +48,6 @@ def test_networks_learn_from_streams_and_their_cards_tell_it(tmp_path):
     assert all(torch.equal(found[name], expected[name]) for name in expected)
     with refused(SpecError, "shapes", "fingerprint"):
         train(depth_supervised.BASELINE, SHAPES, tmp_path / "part", SMALL, HERE, resume=True)
-
-
-@pytest.mark.slow
-def test_view_pairs_are_of_whole_scenes(tmp_path):
-    settings = replace(SMALL, iterations=1, batch=10)
-    weights = train(view_pairs.BASELINE, SHAPES, tmp_path / "run", settings, HERE)
-    assert load_weights(weights, view_pairs.BASELINE.method)[1].rows == 18
-    assert {path.name for path in (tmp_path / "run").iterdir()} == {
-        "checkpoint.safetensors", "weights.safetensors"
-    }  # fmt: skip
-
-
-@pytest.mark.slow
-def test_depth_match_learns_from_a_stream(tmp_path):
-    settings = depth_match.Settings(size=32, width=0.25, iterations=1, batch=6)
-    streams = TrainingStreams("near")
-    weights = train(depth_match.BASELINE, streams, tmp_path / "run", settings, HERE)
-    assert load_weights(weights, depth_match.METHOD)[1].rows == 2
 
 
 @pytest.mark.parametrize(

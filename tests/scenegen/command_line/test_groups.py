@@ -64,12 +64,6 @@ def test_an_argument_with_a_nul_is_refused(check_refusal):
     check_refusal(done.exit_code, done.stdout, done.stderr, (r"x\x00",))
 
 
-@pytest.mark.parametrize("batch", ["", " --batch 8", " --batch=8", " --batch 8 --batch=9"])
-def test_the_batch_is_not_recorded(monkeypatch, batch):
-    monkeypatch.setattr(sys, "argv", ["/x/scenegen", *f"render{batch} --n 5".split()])
-    assert creation_command("scenegen") == "scenegen render --n 5"
-
-
 def test_a_recorded_command_can_be_pasted(monkeypatch):
     words = ["render", "--out", "my rooms.h5", "--objects-root", "it's $HOME; rm *", "--seed", "1"]
     monkeypatch.setattr(sys, "argv", ["/x/scenegen", *words])

@@ -3,15 +3,7 @@
 import click
 import pytest
 
-from scenegen.command_line.options import (
-    MOST_ITEMS,
-    Color,
-    Items,
-    Names,
-    Numbers,
-    Range,
-    Size,
-)
+from scenegen.command_line.options import MOST_ITEMS, Color, Items, Names, Numbers, Range, Size
 
 READ = [
     (Range(int), "3", (3, 3)),

@@ -8,13 +8,7 @@ from click.testing import CliRunner
 
 from scenegen.command_line.groups import PackageCommands
 from scenegen.command_line.options import MESH_FILES
-from scenegen.command_line.paths import (
-    InputPath,
-    OutputFolder,
-    OutputPath,
-    refuse_command_inputs,
-)
-from scenegen.objects.meshes.listing import SUFFIXES
+from scenegen.command_line.paths import InputPath, OutputFolder, OutputPath, refuse_command_inputs
 
 
 @click.command()
@@ -75,7 +69,3 @@ def test_an_output_is_no_input(files, check_refusal, line, words):
         assert done.exit_code == 0, done.output
     else:
         check_refusal(done.exit_code, done.stdout, done.stderr, words)
-
-
-def test_every_kind_of_mesh_is_known():
-    assert set(MESH_FILES) == set(SUFFIXES)

@@ -13,29 +13,19 @@ import pytest
 RENDER = ("render", "--n", "2", "--size", "32", "--min-visible-pixels", "3", "--out", "o.h5")
 # Options, and what the line must say: the option's name, what was found, what was expected.
 RENDER_MISTAKES = [
-    ("--n 0", "n: found 0", "from 1 to"),
     (f"--n {2**70}", f"found {2**70}", "expected"),
     ("--size 4096", "batch: found 64", "at most 16 images of this size"),
     ("--shapes box,", "shapes: found ''", "box, sphere, cone"),
-    ("--batch 0", "batch: found 0", "1 to 4096"),
     ("--object-radius 0.5", "item 0", "objects", "smaller --object-radius"),
     ("--min-visible-pixels 1024", "item ", "1024 pixels", "--min-visible-pixels"),
     ("--preset nosuch", "preset: found 'nosuch'", "shapes-single", "views"),
-    ("--shininess 32", "shininess: found no specular"),
-    ("--classes MUG", "classes: found 'MUG'", "mug"),
     ("--shapes box --classes mug", "--shapes beside --classes", "one of them"),
-    ("--shapes box --objects-root .", "--shapes beside", "folder of meshes", "one of them"),
     ("--object-split train", "--object-split: found train", "'all' for shapes"),
     ("--shapenet-root . --objects-root .", "--shapenet-root and --objects-root", "one of them"),
     ("--shapenet-root . --up z", "up: found 'z'", "expected 'y' with --shapenet-root"),
-    ("--up z", "without a folder of meshes"),
     ("--objects-root nosuch", "nosuch: no such folder"),
-    ("--shapenet-root .", "found no ShapeNet", "--objects-root"),
-    ("--objects-root empty", "an empty folder"),
     ("--out .", "is a folder"),
     ("--out ''", "empty path"),
-    ("--out none/x.h5", "none: ", "does not exist"),
-    ("--out text/x.h5", "text: ", "not a folder"),
     ("--out /proc/x.h5", "/proc"),
     (f"--out {'a' * 300}.h5", "too long"),
 ]
@@ -43,22 +33,15 @@ PREVIEW_MISTAKES = [
     ("--items 0-500", "items: found 8", "0 to 7"),
     (f"--items {'9' * 30}", "items: found 999", "0 to 7"),
     ("--items 0 --random 2", "items", "random", "one of them"),
-    ("--random 2 --seed -1", "seed: found -1"),
-    ("--out folder.png", "folder.png: ", "is a folder"),
     ("--out s.xyz", "'s.xyz'", "sheet.png"),
-    ("--out rooms.h5", "'rooms.h5'", "sheet.png"),
-    ("--out ''", "empty path"),
 ]
 EXPORT_MISTAKES = [
     ("--items 8", "items: found 8", "0 to 7"),
-    ("--out none/deep", "none", "o such file"),
     ("--out text", "text: ", "not a folder"),
     ("--out /proc", "/proc"),
     ("--objects-root .", "objects: found the folder .", "built in"),
 ]
-VERIFY_MISTAKES = [
-    ("--objects-root .", "objects: found the folder .", "built in"),
-]
+VERIFY_MISTAKES = [("--objects-root .", "objects: found the folder .", "built in")]
 MISTAKES = [
     *((RENDER, *case) for case in RENDER_MISTAKES),
     *((("preview", "FILE"), *case) for case in PREVIEW_MISTAKES),
@@ -70,25 +53,15 @@ MISTAKES = [
 @pytest.mark.parametrize("case", MISTAKES, ids=lambda case: f"{case[0][0]} {case[1]:.30}")
 def test_a_mistake_is_told_in_one_line(refuses, tmp_path, rooms_path, case):
     (tmp_path / "text").write_text("mine")
-    (tmp_path / "folder.png").mkdir()
-    (tmp_path / "empty").mkdir()
     command, options, *words = case
     given = [rooms_path if part == "FILE" else part for part in command]
     line = refuses(*given, *shlex.split(options), words=tuple(words))
     assert ".partial" not in line, "the user's name for it, not that of a temporary file"
 
 
-def test_the_longest_name_that_a_disk_takes(run, tmp_path):
-    """Where the final name is possible, no hidden longer one may get in the way."""
-    name = "b" * 252 + ".h5"
-    assert run(*RENDER[:-1], name).exit_code == 0
-    assert [path.name for path in tmp_path.iterdir()] == [name]
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="sets Linux's limit of memory")
 @pytest.mark.parametrize(
-    "options",
-    ["render --n 1000000000000 --size 32", "preview FILE --items 0-9999999999"],
+    "options", ["render --n 1000000000000 --size 32", "preview FILE --items 0-9999999999"]
 )
 def test_huge_numbers_do_not_fill_the_memory(tmp_path, check_refusal, rooms_path, options):
     """With 4 GB of address space, so that a failing test harms nobody."""

@@ -29,13 +29,6 @@ def test_refused_exports(refuses, rooms_path):
     refuses("export", rooms_path, "--format", "parquet", "--items", 8, words=("--items", "0 to 7"))
 
 
-def test_card(run, rooms_path, tmp_path):
-    told = run("card", rooms_path, *WHO)
-    assert told.stdout == "README.md: 8 images\n"
-    page = (tmp_path / "README.md").read_text().splitlines()
-    assert {"license: cc-by-4.0", "# rooms"} < set(page)
-
-
 def test_refused_cards(run, refuses, meshes, rooms_path, tmp_path):
     (tmp_path / "README.md").write_text("mine")
     refuses("card", rooms_path, *WHO, words=("README.md", "--overwrite"))

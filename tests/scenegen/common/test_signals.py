@@ -3,7 +3,6 @@
 import signal
 import subprocess
 import sys
-import threading
 import time
 
 import pytest
@@ -108,15 +107,3 @@ def test_signals_that_wait_come_to_whoever_answers_them():
         assert seen == [signal.SIGTERM]
     finally:
         signal.signal(signal.SIGTERM, before)
-
-
-def test_signals_wait_only_in_the_main_thread():
-    def work():
-        with held_back():
-            handlers.append(signal.getsignal(signal.SIGINT))
-
-    handlers = []
-    thread = threading.Thread(target=work)
-    thread.start()
-    thread.join()
-    assert handlers == [signal.default_int_handler]

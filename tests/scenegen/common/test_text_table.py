@@ -8,15 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenegen.common.text_table import (
-    by_number,
-    distinct,
-    markdown,
-    number,
-    plain,
-    printable,
-    with_interval,
-)
+from scenegen.common.text_table import distinct, markdown, number, plain, printable
 
 ANY_TEXT = st.text(st.characters(exclude_categories=()), max_size=30)
 
@@ -73,11 +65,6 @@ def test_numbers(value, ends, shown):
     assert number(value, ends or (None, None)) == shown
 
 
-def test_a_value_has_the_decimals_of_its_interval():
-    assert with_interval(0.5969, 0.5377, 0.6413) == ("0.60", "[0.54, 0.64]")
-    assert with_interval(0.5969, None, 0.6413) == ("0.5969", "-")
-
-
 @given(st.floats(1e-5, 1e6, exclude_max=True))
 def test_four_digits_are_kept(value):
     assert math.isclose(float(number(value)), value, rel_tol=5.1e-4)
@@ -89,8 +76,3 @@ def test_names_that_are_alike_are_told_apart():
     assert distinct(["a", "b", "a"], ["x", "y", "z"]) == ["a [x]", "b", "a [z]"]
     assert distinct(["a", "a"], ["", "x"]) == ["a [(unnamed)]", "a [x]"]
     assert distinct(["a", "a\n", "b"], ["x", "x", "x"]) == ["a [x] #1", "a [x] #2", "b"]
-
-
-def test_keys_are_sorted_by_their_first_number():
-    keys = ["other", "120-150", "30-60", "5", "mirror", "٣"]
-    assert by_number(keys) == ["٣", "5", "30-60", "120-150", "mirror", "other"]

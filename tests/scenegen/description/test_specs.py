@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
 from scenegen.description.names import SHAPE_NAMES
-from scenegen.description.presets import preset_spec
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec, request_from_json
 from scenegen.sampling.scenes import sample_scene
@@ -217,28 +216,3 @@ def test_every_setting_with_a_range_is_tried_above():
         "own_reflectance",
         "truth",
     }
-
-
-def test_slots_hold_the_most_and_are_never_none():
-    full = DatasetSpec(objects=(1, 5), lights=(0, 4))
-    assert (full.object_slots, full.light_slots) == (5, 4)
-    empty = DatasetSpec(objects=(0, 0), lights=(0, 0))
-    assert (empty.object_slots, empty.light_slots) == (1, 1)
-
-
-@pytest.mark.parametrize(
-    ("settings", "alike"),
-    [
-        ({"fov_degrees": 28}, {"fov_degrees": 28.0}),
-        ({"attenuation": (0, 1)}, {"attenuation": (0.0, 1.0)}),
-        ({"ambient": (0.0, -0.0, 0.0)}, {"ambient": (0.0, 0.0, 0.0)}),
-    ],
-)
-def test_equal_requests_have_equal_texts(settings, alike):
-    assert DatasetSpec(**settings).to_json() == DatasetSpec(**alike).to_json()
-
-
-def test_a_size_means_what_the_option_means() -> None:
-    assert DatasetSpec(height=64, width=64) == preset_spec("shapes", height=64, width=64)
-    assert DatasetSpec(height=64, width=64).min_visible_pixels == 12
-    assert DatasetSpec(height=64, width=64, min_visible_pixels=0).min_visible_pixels == 0

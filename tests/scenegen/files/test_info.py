@@ -4,12 +4,10 @@ import json
 import re
 
 import h5py
-import numpy as np
 import pytest
 
 from iqtt.files import info as of_questions
 from iqtt.files.make import make_split
-from iqtt.questions.kinds import DISTRACTOR_KINDS
 from iqtt.questions.specs import SplitSpec
 from scenegen import open_rooms
 from scenegen.rooms import info as of_rooms
@@ -87,55 +85,3 @@ def test_ranges_of_rooms(float_path):
     assert all(f"{name} {shapes.count(name)}" in text for name in set(shapes))
     [(size, unit)] = re.findall(r"([\d.]+) (kB|MB)", value(text, "scene"))
     assert float(size) * {"kB": 1e3, "MB": 1e6}[unit] == pytest.approx(texts, abs=60)
-
-
-def test_counts_of_questions(split):
-    text = of_questions.describe(split / "iqtt-train.h5")
-    assert text.startswith(f"{split / 'iqtt-train.h5'}: 9 questions, ")
-    assert value(text, "answers") == "to 3 of them (33.3%)"
-    _, *tables = re.split(r"^  (?=\w+: \d+ questions)", text, flags=re.MULTILINE)
-    for table, part, count in zip(tables, ("labeled", "unlabeled"), (3, 6), strict=True):
-        assert table.startswith(f"{part}: {count} questions of 4 images of 32x32, uint8")
-        assert ("answers  " in table) == (part == "labeled")
-        with h5py.File(split / "iqtt-train.h5") as raw:
-            truth, images = raw["truth"][part], raw[part]["questions"][:]
-            for k, name in enumerate(DISTRACTOR_KINDS):
-                kinds = (truth["distractor_kind"][:] == k).sum()
-                told = value(table, "distractors").split(", ")
-                assert any(text.startswith(f"{name}: {kinds}") for text in told) == (kinds > 0)
-            quartiles = np.quantile(truth["angle_degrees"][:], np.linspace(0, 1, 5))
-            assert re.findall(r"\d+", value(table, "angle")) == [f"{q:.0f}" for q in quartiles]
-            sizes = truth["cube_count"][:].tolist()
-            expected = ", ".join(f"{n}: {sizes.count(n)}" for n in sorted(set(sizes)))
-            assert value(table, "cubes a shape") == expected
-            low, high = map(float, re.findall(r"[\d.]+", value(table, "radiance"))[:2])
-            ends = (images.min() / 255, images.max() / 255)
-            assert (low, high) == pytest.approx(ends, rel=1e-3)
-
-
-def test_where_the_answers_are(split, released, tmp_path):
-    text = of_questions.describe(split / "iqtt-test.h5")
-    assert value(text, "answers") == "in iqtt-test-answers.h5"
-    assert not re.search("distractors|angle|cubes", text.split(" questions of ")[1])
-    known = of_questions.describe(split / "iqtt-test-answers.h5")
-    assert (value(known, "seed"), value(known, "command")) == ("5", "tests")
-    assert value(known, "fingerprint") == value(text, "fingerprint")
-    assert not re.search(r"^ +radiance ", known, re.MULTILINE)
-    path = released("a.h5", {"labeled": (2, [2, 0]), "unlabeled": (6, None)})
-    text = of_questions.describe(path)
-    assert value(text, "answers") == "to 2 of them (25.0%)"
-    assert "fingerprint" not in text
-    assert "over 6 questions" in text
-    empty = released("b.h5", {"labeled": (0, np.zeros(0, int)), "unlabeled": (1, None)})
-    assert value(of_questions.describe(empty), "answers") == "none"
-    assert ": 0 questions, " in of_questions.describe(released("c.h5", {"": (0, None)}))
-
-
-def test_unknown_pixels_do_not_spoil_the_ranges(damaged):
-    def edit(file):
-        file["depth"][0, :4] = np.nan
-        file["object_id"][0, :4] = -1
-
-    text = of_rooms.describe(damaged(edit))
-    assert "nan" not in text
-    assert re.search(r"object_id +-1 to", text)

@@ -164,13 +164,6 @@ def test_chunks_that_cannot_be_compressed_and_texts_that_are(path):
         assert StoredArray(file["scene"])[0] == texts[0].encode()
 
 
-def test_some_chunks_that_were_never_written(path):
-    with h5py.File(path, "w") as file:
-        file.create_dataset("depth", (4, 9), "f4", chunks=(1, 9))[1] = 1.0
-    with open_unchecked(path, "file") as file:
-        assert [f.found[0] for f in faults(file)] == ["3"]
-
-
 def test_a_stack_of_filters(path):
     """Each stage could multiply the size by a thousand."""
     with h5py.File(path, "w") as file:
@@ -214,13 +207,6 @@ def test_values_are_those_that_h5py_reads(
         assert np.array_equal(found, expected)
         with pytest.raises(IndexError):
             ours[6]
-
-
-def test_one_value_without_rows(path):
-    with h5py.File(path, "w") as file:
-        file["count"] = 3
-    with open_file(path, "file") as file:
-        assert StoredArray(file["count"])[()] == 3
 
 
 def test_what_is_said_of_a_damaged_chunk_can_be_sent_to_another_process(path):

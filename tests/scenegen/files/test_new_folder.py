@@ -124,17 +124,6 @@ def test_what_others_put_there_meanwhile_is_not_lost(tmp_path):
     assert sorted(os.listdir(folder)) == ["a", "b", "c", "notes"]
 
 
-def test_a_run_that_writes_into_the_folder_is_a_stranger(tmp_path):
-    folder = tmp_path / "split"
-    write(folder, "old")
-    with (
-        folder_written_beside(folder / "inner", NAMES),
-        pytest.raises(FileExistsError, match="partial"),
-    ):
-        write(folder, "new")
-    assert texts(folder) == whole("old")
-
-
 @pytest.mark.parametrize(
     ("path", "kind"),
     [

@@ -13,7 +13,6 @@ import pytest
 
 from iqtt import QuestionsDataset, QuestionsFile
 from iqtt.files.make import make_split
-from iqtt.files.reader import open_tables
 from iqtt.questions.specs import SplitSpec
 from scenegen import RoomsDataset, RoomsFile
 from scenegen.common.errors import FileFormatError, SpecError
@@ -110,14 +109,6 @@ def test_rows_and_indices(whole, task):
         assert (error.value.where, error.value.found) == ("field", "'cube'")
 
 
-def test_a_closed_file_says_so(whole, task):
-    file = READERS[task](whole)
-    file.close()
-    file.close()
-    with pytest.raises((FileFormatError, ValueError), match=whole.name):
-        file[0]
-
-
 def test_digests_are_those_of_the_values(whole, task):
     with READERS[task](whole) as file, h5py.File(whole) as raw:
         digests = file.stored_digests()
@@ -130,17 +121,6 @@ def test_digests_are_those_of_the_values(whole, task):
         assert file.stored_truth_digest == joint_digest(scored) == raw.attrs["truth_digest"]
         assert file.problems() == []
         assert file.compression() == "gzip"
-
-
-def test_sizes_on_disk(whole, task):
-    with READERS[task](whole) as file, h5py.File(whole) as raw:
-        sizes = file.stored_bytes()
-        assert list(sizes) == list(file.fields)
-        image = raw[IMAGES[task]]
-        assert sizes[IMAGES[task]] == (image.id.get_storage_size(), image.nbytes)
-        assert 0 < sizes[IMAGES[task]][0] < sizes[IMAGES[task]][1]
-        assert sizes[NUMBERS[task]][1] == 7 * 8
-        assert sum(stored for stored, _ in sizes.values()) <= whole.stat().st_size
 
 
 def test_a_set_reads_as_one_file(sets, task):
@@ -253,16 +233,6 @@ def test_items_of_a_data_set(whole, task):
     assert (error.value.where, error.value.found) == ("field", "'depht'")
 
 
-def test_a_data_set_pickles_as_its_path(whole, task):
-    data = DATASETS[task](whole)
-    first = data[0]
-    again = pickle.loads(pickle.dumps(data))
-    for name, values in again[0].items():
-        np.testing.assert_array_equal(values, first[name])
-    assert (again.fingerprint, len(again)) == (data.fingerprint, 7)
-    assert len(pickle.dumps(data)) < 4000
-
-
 @pytest.fixture
 def openings(monkeypatch):
     """Return the list of processes that open a file from now on, one for each time."""
@@ -276,15 +246,6 @@ def openings(monkeypatch):
     return processes
 
 
-def test_each_process_opens_the_file_once(whole, task, openings, monkeypatch):
-    data = DATASETS[task](whole)
-    del openings[:]
-    for process in (1, 1, 2, 2):
-        monkeypatch.setattr("os.getpid", lambda process=process: process)
-        data[0], data[1]
-    assert openings == [1, 2]
-
-
 def test_an_open_file_is_not_opened_again(whole, task, openings):
     """Until it is closed: then the data set opens it for itself."""
     with READERS[task](whole) as file:
@@ -294,26 +255,6 @@ def test_an_open_file_is_not_opened_again(whole, task, openings):
     np.testing.assert_array_equal(data[0][IMAGES[task]], first[IMAGES[task]])
     np.testing.assert_array_equal(again[0][IMAGES[task]], first[IMAGES[task]])
     assert len(openings) == 3
-
-
-def test_tables_of_one_file_share_its_opening(split_of_two, openings):
-    labeled, unlabeled = open_tables(split_of_two)
-    assert openings == [os.getpid()]
-    assert (labeled.part, unlabeled.part) == ("labeled", "unlabeled")
-    assert labeled.table("unlabeled").fingerprint == unlabeled.fingerprint
-    with labeled:
-        assert (len(labeled), len(unlabeled)) == (2, 3)
-        data = [QuestionsDataset(table) for table in (labeled, unlabeled)]
-        assert [list(one[1]) for one in data] == [["questions", "answers"], ["questions"]]
-        assert openings == [os.getpid()]
-
-
-@pytest.fixture(scope="module")
-def split_of_two(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("two")
-    spec = SplitSpec(train=5, labeled=2, val=0, test=0, height=32, width=32, min_cube_pixels=2)
-    make_split(folder / "split", spec)
-    return folder / "split" / "iqtt-train.h5"
 
 
 @pytest.mark.parametrize(

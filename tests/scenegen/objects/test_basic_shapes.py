@@ -2,22 +2,17 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 from scipy.spatial.transform import Rotation
 from shape_checks import check_body, check_size, unit_vectors
 
-from scenegen.camera import Camera
-from scenegen.common.errors import SpecError
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.names import SHAPE_NAMES
-from scenegen.description.scenes import PlacedObject, SceneSpec
 from scenegen.description.shapes import BASIC_SHAPES
 from scenegen.objects import basic_hulls
 from scenegen.objects.basic_shapes import unit_shape
-from scenegen.objects.scene_mesh import room_mesh, scene_parts, welded, world_from_object
+from scenegen.objects.scene_mesh import welded, world_from_object
 
-Array = NDArray[np.float64]
 SOLID = [shape for shape in BASIC_SHAPES if shape.volume]  # the teapot has no seam at its lid
 CURVED = [shape.name for shape in SOLID if shape.curved]
 TESSELLATION = 4.5e-5  # the most that a unit mesh may lie off its smooth surface
@@ -114,12 +109,6 @@ def test_bodies_stay_on_every_resting_side(name):
         assert nnls(rows, np.append(foot, 10.0))[1] < 2e-6, down
 
 
-def test_unknown_shapes_are_refused():
-    with pytest.raises(SpecError) as refused:
-        unit_shape("cube")
-    assert (refused.value.where, refused.value.found) == ("shape", "'cube'")
-
-
 def test_rotations_are_scipys():
     turns = Rotation.random(20, rng=1)
     for turn, (x, y, z, w) in zip(turns.as_matrix(), turns.as_quat(), strict=True):
@@ -127,36 +116,6 @@ def test_rotations_are_scipys():
         matrix = world_from_object((1.0, 2.0, 3.0), (w, x, y, z), 0.5)
         np.testing.assert_allclose(matrix[:3], np.c_[0.5 * turn, [1, 2, 3]], atol=1e-12)
         np.testing.assert_array_equal(matrix[3], [0, 0, 0, 1])
-
-
-def test_the_room_is_three_unit_squares_facing_inwards():
-    room = room_mesh()
-    axes = room.face_normals[::2].argmax(axis=1)
-    assert sorted(axes) == [0, 1, 2]
-    np.testing.assert_array_equal(room.face_normals, np.repeat(np.eye(3)[axes], 2, axis=0))
-    for axis, square in zip(axes, room.triangles.reshape(3, 6, 3), strict=True):
-        assert (square[:, axis] == 0).all()
-        assert len(np.unique(np.delete(square, axis, axis=1), axis=0)) == 4
-    assert room.bounds.tolist() == [[0, 0, 0], [1, 1, 1]]
-
-
-def test_the_parts_of_a_scene_are_the_room_and_every_object_in_its_place():
-    half = 0.5**0.5
-    objects = (
-        PlacedObject("box", (0.5, 0.25, 0.5), (half, 0.0, half, 0.0), 0.1, (1, 1, 1)),
-        PlacedObject("cone", (0.2, 0.3, 0.7), (half, half, 0.0, 0.0), 0.2, (1, 1, 1)),
-    )
-    camera = Camera((1.0, 1.0, 1.0), (0.0, 0.0, 0.0), 30.0)
-    scene = SceneSpec(0, (camera,), objects, (), (0, 0, 0), (1, 1), (1, 1, 1))
-    corners = np.concatenate([part.mesh.triangles for part in scene_parts(scene)])
-    assert len(corners) == 6 + 12 + len(unit_shape("cone").triangles)
-    np.testing.assert_array_equal(corners[:6], room_mesh().triangles)
-    side = 0.1 / 3**0.5
-    box = corners[6:18].reshape(-1, 3) - objects[0].position
-    np.testing.assert_allclose(abs(box), side, atol=1e-12)
-    cone = corners[18:].reshape(-1, 3) - objects[1].position
-    tip = cone[cone[:, 2].argmax()]  # a quarter turn about x takes y to z
-    np.testing.assert_allclose(tip, [0, 0, 0.2 * half], atol=1e-12)
 
 
 @pytest.mark.parametrize("name", SHAPE_NAMES)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from scenegen.objects import cache
-from scenegen.objects.cache import DiskCache, default_cache_dir
+from scenegen.objects.cache import DiskCache
 
 NAMES = ("points", "text")
 ARRAYS = {"points": np.arange(3000.0).reshape(-1, 3), "text": np.array("a text")}
@@ -34,15 +34,6 @@ def test_an_entry_comes_back_as_it_was(tmp_path):
     first = (folder / "key.arrays").read_bytes()
     DiskCache(folder).write("key", ARRAYS)
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == {"key.arrays": first}
-
-
-def test_without_a_folder_nothing_is_kept(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    none = DiskCache(None)
-    none.check_folder()
-    none.write("key", ARRAYS)
-    assert none.read("key", NAMES) is None
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_damaged_entries_count_as_missing(tmp_path):
@@ -148,15 +139,3 @@ DiskCache({str(tmp_path)!r}).write("key", {{"points": numpy.zeros(3)}})
     DiskCache(tmp_path).write("key", ARRAYS)
     assert same(DiskCache(tmp_path).read("key", NAMES))
     assert {path.name for path in tmp_path.iterdir()} == {left.name, "key.arrays"}
-
-
-def test_where_the_cache_lies(monkeypatch, tmp_path):
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
-    assert default_cache_dir() == tmp_path / "pix2shape-bench" / "meshes"
-    monkeypatch.setenv("HOME", str(tmp_path / "home"))
-    for unset in ("", "not/absolute"):
-        monkeypatch.setenv("XDG_CACHE_HOME", unset)
-        assert default_cache_dir() == tmp_path / "home/.cache/pix2shape-bench/meshes"
-    assert list(tmp_path.iterdir()) == [], "nothing is made before it is needed"
-    monkeypatch.setattr(Path, "expanduser", Mock(side_effect=RuntimeError("no home")))
-    assert default_cache_dir() is None

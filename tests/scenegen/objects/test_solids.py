@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scenegen.objects.solids import face_outwards, resting_directions
+from scenegen.objects.solids import resting_directions
 
 CUBE = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 
@@ -27,18 +27,3 @@ def test_rest_is_about_the_centre_of_mass_not_of_the_corners():
     body = np.concatenate([CUBE, crowd])  # a cube under a thin leaning spire
     assert (resting_directions(body) == [0, -1, 0]).all(axis=1).any()
     assert abs(body.mean(axis=0)[0] - 0.5) > 0.5, "the corners' mean is off the base"
-
-
-def test_winding_is_turned_with_its_normals_and_slivers_are_dropped():
-    up = np.tile([0.0, 0.0, 1.0], (3, 1))
-    counter_clockwise = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0)], float)
-    sliver = np.array([(0, 0, 0), (1, 0, 0), (1, 0, 0)], float)
-    tagged = up + np.outer([0, 1, 2], [0.01, 0, 0])
-    triangles, normals = face_outwards(
-        np.stack([counter_clockwise, counter_clockwise[::-1], sliver]),
-        np.stack([tagged, tagged[::-1], up]),
-    )
-    assert len(triangles) == 2
-    for corners, corner_normals in zip(triangles, normals, strict=True):
-        np.testing.assert_array_equal(corners, counter_clockwise)
-        np.testing.assert_array_equal(corner_normals, tagged)

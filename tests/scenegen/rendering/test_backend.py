@@ -5,7 +5,6 @@ import ctypes.util
 import importlib.metadata
 import os
 import platform
-import subprocess
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -32,23 +31,6 @@ OLD = sorted(
 NO_LLVM = ["/nowhere/libLLVM.so", ctypes.util.find_library("c") or "libc.so.6", *OLD]
 WITH_WHEEL = sys.platform == "linux" and platform.machine() == "x86_64"
 
-TINY_RENDER = """
-import warnings
-from scenegen.description.specs import DatasetSpec
-from scenegen.rendering.packing import pack
-from scenegen.rendering.renderer import render
-from scenegen.sampling.scenes import sample_scene
-spec = DatasetSpec(height=8, width=8, objects=(1, 1), shapes=("teapot",), min_visible_pixels=0)
-scene = next(s for i in range(9) if (s := sample_scene(spec, i)))
-with warnings.catch_warnings(record=True) as caught:
-    warnings.simplefilter("always")
-    truth, again = render(pack(spec, [scene])), render(pack(spec, [scene]))
-assert truth.depth.tobytes() == again.depth.tobytes()
-assert (truth.object_id >= 0).all() and truth.depth.min() > 0.3, truth
-import mitsuba
-print(mitsuba.variant(), *(warning.category.__name__ for warning in caught))
-"""
-
 
 @pytest.fixture(autouse=True)
 def forgetful(monkeypatch):
@@ -71,35 +53,12 @@ def no_library(name):
     raise OSError(name)
 
 
-class FakeLibrary:
-    """A library that tells a version, as LLVM 16 and later do."""
-
-    def __init__(self, major):
-        self.major = major
-
-    def LLVMGetVersion(self, major, minor, patch):
-        major._obj.value, minor._obj.value, patch._obj.value = self.major, 7, 9
-
-
 @pytest.mark.parametrize("library", NO_LLVM)
 def test_a_library_without_a_version_is_no_llvm(library, monkeypatch):
     assert llvm_version(library) == (0, 0, 0)
     monkeypatch.setenv(LLVM_VARIABLE, library)
     assert find_llvm() is None
     assert os.environ[LLVM_VARIABLE] == library, "the user's setting is left alone"
-
-
-@pytest.mark.parametrize(("major", "good"), [(15, False), (16, True), (23, True)])
-def test_the_version_decides(major, good, monkeypatch):
-    monkeypatch.setattr(ctypes, "CDLL", lambda name: FakeLibrary(major))
-    monkeypatch.setenv(LLVM_VARIABLE, "/some/libLLVM.so")
-    assert llvm_version("/some/libLLVM.so") == (major, 7, 9)
-    assert find_llvm() == ("/some/libLLVM.so" if good else None)
-    if good:
-        assert select_variant("cpu") == "llvm_ad_rgb"
-    else:
-        with pytest.raises(BackendError):
-            select_variant("cpu")
 
 
 @pytest.mark.skipif(not WITH_WHEEL, reason="the wheel is for Linux x86-64")
@@ -151,17 +110,6 @@ def test_devices(monkeypatch):
     assert select_variant("cuda") == "cuda_ad_rgb"
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("library", [NO_LLVM[0], *OLD[:1]])
-def test_rendering_goes_on_without_llvm_and_says_so_once(library):
-    environment = os.environ | {LLVM_VARIABLE: library}
-    done = subprocess.run(
-        [sys.executable, "-c", TINY_RENDER], env=environment, capture_output=True, text=True,
-        check=True, cwd=Path(backend.__file__).parents[2], timeout=120,
-    )  # fmt: skip
-    assert done.stdout.split() == ["scalar_rgb", "SlowFallbackWarning"]
-
-
 @pytest.mark.parametrize(("version", "good"), [((15, 0, 7), False), ((23, 1, 4), True)])
 def test_a_drjit_imported_first_keeps_its_llvm(version, good, monkeypatch):
     """It binds its LLVM at import; to point it elsewhere afterwards would end in an abort."""
@@ -172,24 +120,3 @@ def test_a_drjit_imported_first_keeps_its_llvm(version, good, monkeypatch):
     else:
         with pytest.raises(BackendError):
             select_variant("cpu")
-
-
-def test_versions_before_and_after_drjit_is_imported(monkeypatch):
-    code = """
-import sys
-from scenegen.rendering.backend import VERSION_ATTRIBUTES, select_variant, versions
-select_variant("auto")
-before = versions()
-assert "drjit" not in sys.modules and "mitsuba" not in sys.modules
-import mitsuba, drjit
-assert before["mitsuba_version"] == mitsuba.__version__
-assert before["drjit_version"] == drjit.__version__
-assert versions() == before and tuple(before) == VERSION_ATTRIBUTES
-print(before["llvm_version"])
-"""
-    printed = subprocess.check_output([sys.executable, "-c", code], text=True).strip()
-    library = find_llvm()
-    assert printed == (".".join(map(str, llvm_version(library))) if library else "unknown")
-    monkeypatch.setattr(importlib.metadata, "version", no_package)
-    monkeypatch.setenv(LLVM_VARIABLE, "/nowhere/libLLVM.so")
-    assert set(backend.versions().values()) == {"unknown"}

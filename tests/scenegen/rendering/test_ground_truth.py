@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from scenegen.rendering.ground_truth import decode_image, encode_image, visible_pixels
+from scenegen.rendering.ground_truth import decode_image, encode_image
 
 
 def test_eight_bits_by_hand():
@@ -24,9 +24,3 @@ def test_floats_keep_radiance_beyond_one(dtype, rtol):
 def test_every_stored_byte_comes_back():
     every = np.arange(256, dtype=np.uint8)
     np.testing.assert_array_equal(encode_image(decode_image(every), "uint8"), every)
-
-
-def test_visible_pixels_counts_objects_only():
-    object_id = np.array([[[0, 1, 1], [-1, 3, 0]], [[2, 2, 2], [2, 2, 4]]], np.int8)
-    assert visible_pixels(object_id, 4).tolist() == [[2, 0, 1, 0], [0, 5, 0, 1]]
-    assert visible_pixels(object_id, 1).tolist() == [[2], [0]]

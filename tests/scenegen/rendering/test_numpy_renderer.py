@@ -1,7 +1,6 @@
 """The kernel against Embree, on whole scenes and through the numpy renderer."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import objects_of
 from scenegen.rendering.numpy_renderer import render_in_numpy
 from scenegen.rendering.packing import pack
-from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.renderer import render
 
 FLOAT = DatasetSpec(image_dtype="float32", seed=11)
@@ -42,8 +40,7 @@ def check_against_whole_scenes(spec, scenes, objects=None):
 
 
 @pytest.mark.parametrize(
-    "name",
-    ["shapes", "shapenet", "folder", pytest.param("furniture-256", marks=pytest.mark.slow)],
+    "name", ["shapes", "shapenet", "folder", pytest.param("furniture-256", marks=pytest.mark.slow)]
 )
 def test_whole_scenes_agree_with_another_engine(name, model_folder):
     if name == "folder":
@@ -52,14 +49,6 @@ def test_whole_scenes_agree_with_another_engine(name, model_folder):
         spec = replace(preset_spec(name), image_dtype="float32", seed=11)
         objects = objects_of(spec)
     check_against_whole_scenes(spec, some_scenes(spec, objects, 4), objects)
-
-
-@pytest.mark.slow
-def test_a_hundred_whole_scenes_agree_with_another_engine(scenes_of):
-    spec = replace(FLOAT, seed=0, pose="any")
-    check_against_whole_scenes(spec, scenes_of(spec, 50))
-    spec = replace(FLOAT, seed=1, width=160, height=96, allow_cropped=True, objects=(1, 5))
-    check_against_whole_scenes(spec, scenes_of(spec, 50))
 
 
 def compare(ours, theirs):
@@ -80,8 +69,7 @@ KINDS = {"box", "sphere", "torus", "teapot"}  # others are polyhedra, or alike
 
 
 @pytest.mark.parametrize(
-    "name",
-    [n if n in KINDS else pytest.param(n, marks=pytest.mark.slow) for n in SHAPE_NAMES],
+    "name", [n if n in KINDS else pytest.param(n, marks=pytest.mark.slow) for n in SHAPE_NAMES]
 )
 def test_each_shape_agrees_in_depth_normal_and_image(name, scenes_of, embree_cast):
     spec = replace(SMALL, shapes=(name,), pose="any", shadows=True)
@@ -106,62 +94,3 @@ def test_normals_face_the_viewer_inside_open_shapes_too(embree_cast):
     assert inside.sum() > 100
     expected = render_in_numpy(batch, embree_cast).normal[0]
     assert (abs(truth.normal[0] - expected).max(axis=-1)[inside] < 1e-3).mean() > 0.95
-
-
-def test_scenes_without_a_room_agree_and_show_their_background(scenes_of, embree_cast):
-    sky = (0.2, 0.3, 0.4)
-    floating = [
-        replace(scene, room_reflectance=None, background=sky) for scene in scenes_of(SMALL, 4)
-    ]
-    batch = pack(replace(SMALL, shadows=True), floating)
-    truth = render(batch)
-    compare(truth, render_in_numpy(batch, embree_cast))
-    missed = truth.object_id == -1
-    assert set(np.unique(truth.object_id)) == {-1, 1, 2, 3}
-    assert np.isnan(truth.depth[missed]).all()
-    assert not truth.normal[missed].any()
-    np.testing.assert_array_equal(truth.image[missed], np.float32(sky) * np.ones((missed.sum(), 1)))
-
-
-def test_shadows_agree_and_are_there(scenes_of, embree_cast):
-    scenes = scenes_of(SMALL, 5)
-    lit, shadowed = (render(pack(replace(SMALL, shadows=s), scenes)) for s in (False, True))
-    dark = (lit.image - shadowed.image).max(axis=-1) > 0.01
-    assert dark.mean() > 0.01
-    assert (shadowed.image <= lit.image).all()
-    assert lit.depth.tobytes() == shadowed.depth.tobytes()
-    expected = render_in_numpy(pack(replace(SMALL, shadows=True), scenes), embree_cast)
-    wrong = abs(shadowed.image - expected.image).max(axis=-1) > 1e-3
-    assert wrong.mean() < 2e-3, "but for some pixels on the shadows' borders"
-
-
-def test_samples_start_at_the_centre_and_cover_the_pixel():
-    assert sample_positions(1).tolist() == [[0.5, 0.5]]
-    many = sample_positions(256)
-    np.testing.assert_array_equal(many[:16], sample_positions(16))
-    cells = np.floor(many * 8).astype(int) @ [8, 1]
-    assert np.bincount(cells, minlength=64).min() >= 2, "four a cell on average"
-
-
-def test_supersampling_agrees_sample_by_sample(scenes_of, embree_cast):
-    batch = pack(replace(SMALL, spp=5), scenes_of(SMALL, 2))
-    compare(render(batch), render_in_numpy(batch, embree_cast))
-
-
-def test_supersampling_converges_and_leaves_the_truth_alone(scenes_of):
-    """To the mean of 8 x 8 pixels of an image eight times as large."""
-    spec = replace(SMALL, height=32, width=48)
-    scenes = scenes_of(spec, 4)
-    large = render(pack(replace(spec, height=256, width=384), scenes)).image
-    expected = large.reshape(4, 32, 8, 48, 8, 3).mean(axis=(2, 4))
-    error = []
-    for spp in (1, 4, 16, 64):
-        truth = render(pack(replace(spec, spp=spp), scenes))
-        error.append(float(np.sqrt(np.mean((truth.image - expected) ** 2))))
-        if spp == 1:
-            first = truth
-        assert truth.depth.tobytes() == first.depth.tobytes()
-        assert truth.normal.tobytes() == first.normal.tobytes()
-        assert truth.object_id.tobytes() == first.object_id.tobytes()
-    assert all(after < 0.65 * before for before, after in pairwise(error))
-    assert error[-1] < 3e-3

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scenegen.camera import Camera, pixel_size
+from scenegen.camera import Camera
 from scenegen.common.errors import SpecError
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.scene_mesh import world_from_object
 from scenegen.rendering.packing import pack
 
 SPEC = DatasetSpec(objects=(0, 3), lights=(0, 2), shapes=("cone", "box"), height=50, width=80)
@@ -26,54 +25,6 @@ FULL = SceneSpec(
 )
 BARE = replace(FULL, index=5, objects=(), lights=(), room_reflectance=None)
 LAST = replace(FULL, index=6, objects=(CONE,), lights=(LAMP,))
-
-
-def test_every_number_is_in_its_slot():
-    batch = pack(SPEC, [FULL, BARE, LAST])
-    assert len(batch) == 3
-    assert batch.object_count.tolist() == [2, 0, 1]
-    assert batch.light_count.tolist() == [2, 0, 1]
-    assert batch.shape.tolist() == [[1, 0, -1], [-1, -1, -1], [0, -1, -1]]
-    assert batch.object_scale.tolist() == [[0.05, 0.15, 0], [0, 0, 0], [0.15, 0, 0]]
-    for row, slot, item in ((0, 0, BOX), (0, 1, CONE), (2, 0, CONE)):
-        expected = world_from_object(item.position, item.rotation, item.scale)
-        np.testing.assert_array_equal(batch.world_from_object[row, slot], expected)
-        assert batch.reflectance[row, 1 + slot].tolist() == list(item.reflectance)
-    assert not batch.world_from_object[batch.shape < 0].any()
-    assert batch.reflectance[:, 0].tolist() == [[0.7, 0.8, 0.9], [0, 0, 0], [0.7, 0.8, 0.9]]
-    assert not batch.reflectance[1, 1:].any()
-    assert batch.has_room.tolist() == [True, False, True]
-    assert batch.background.tolist() == [[1, 2, 3]] * 3
-    assert batch.ambient.tolist() == [[0.1, 0.2, 0.3]] * 3
-    assert batch.attenuation.tolist() == [[0.5, 0.6]] * 3
-    lit = [[True, True], [False, False], [True, False]]
-    assert batch.light_position[lit].tolist() == [[1, 2, 3]] * 3
-    assert batch.light_color[lit].tolist() == [[4, 5, 6]] * 3
-    assert not batch.light_color[np.logical_not(lit)].any()
-
-
-@pytest.mark.parametrize("view", [0, 1])
-def test_the_view_asked_for_is_the_one_packed(view):
-    batch = pack(SPEC, [FULL, LAST], (view,))
-    expected = VIEWS[view].world_from_camera
-    np.testing.assert_array_equal(batch.world_from_camera, [expected, expected])
-    assert batch.fov_y_degrees.tolist() == [VIEWS[view].fov_y_degrees] * 2
-
-
-def test_several_views_follow_scene_after_scene():
-    shiny = replace(LAST, objects=(replace(CONE, specular=0.25, shininess=7.0),))
-    batch = pack(SPEC, [FULL, BARE, shiny], (1, 0))
-    assert len(batch) == 6
-    assert batch.index.tolist() == [4, 4, 5, 5, 6, 6]
-    assert batch.view.tolist() == [1, 0] * 3
-    assert batch.fov_y_degrees.tolist() == [33.0, 28.0] * 3
-    assert batch.gloss[4:, 1].tolist() == [[0.25, 7.0]] * 2
-    assert batch.gloss[:4].tolist() == [[[0.0, 1.0]] * 4] * 4, "matte, unused slots too"
-    one = [pack(SPEC, [FULL, BARE, shiny], (view,)) for view in (1, 0)]
-    for name, values in vars(batch).items():
-        if isinstance(values, np.ndarray):
-            for first, alone in enumerate(one):
-                np.testing.assert_array_equal(values[first::2], getattr(alone, name), err_msg=name)
 
 
 @pytest.mark.parametrize("start", range(4))
@@ -118,22 +69,6 @@ def test_models_are_known_by_class_and_number():
         pack(spec, [replace(FULL, objects=(replace(CONE, shape="bowl/0001"),))])
 
 
-def test_a_folders_models_need_the_folder():
-    spec = replace(SPEC, source="folder", shapes=("mug",), listing="0" * 64)
-    for source, option in (("folder", "--objects-root"), ("shapenet-v1", "--shapenet-root")):
-        with pytest.raises(SpecError) as refused:
-            pack(replace(spec, source=source), [BARE])
-        assert source in refused.value.found
-        assert option in refused.value.expected
-
-
-def test_empty_rooms_alone_can_be_packed():
-    batch = pack(replace(SPEC, objects=(0, 0), lights=(0, 0)), [BARE])
-    assert batch.world_from_object.shape == (1, 1, 4, 4)
-    assert batch.light_position.shape == (1, 1, 3)
-    assert batch.shape.tolist() == [[-1]]
-
-
 @pytest.mark.parametrize(
     ("change", "where", "found"),
     [
@@ -146,8 +81,3 @@ def test_a_scene_beyond_the_request_is_refused(change, where, found):
     with pytest.raises(SpecError) as refused:
         pack(SPEC, [BARE, replace(FULL, **change)])
     assert (refused.value.where, refused.value.found) == (where, found)
-
-
-def test_pixel_size_at_depth_one():
-    sizes = [pixel_size(10, fov) for fov in (90.0, 60.0)]
-    np.testing.assert_allclose(sizes, [0.2, 0.2 / 3**0.5])

@@ -4,18 +4,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scenegen.common.errors import BackendError, FileFormatError, SpecError
-from scenegen.description.interiors import Interior, Opening
-from scenegen.description.presets import preset_spec
-from scenegen.objects.catalogue import objects_of
+from scenegen.common.errors import FileFormatError
 from scenegen.rendering.backend import point_to_llvm
 from scenegen.rendering.materials.material import Material
-from scenegen.rendering.packing import pack_arrays
-from scenegen.rendering.pictures import denoiser
-from scenegen.rendering.pictures.development import develop, tone
-from scenegen.rendering.pictures.places import ASSETS
-from scenegen.rooms.verify import _same_picture
-from scenegen.sampling.proposals import ProposalQueue
+from scenegen.rendering.pictures.development import develop
 
 point_to_llvm()  # before Mitsuba is imported here
 RADIANCE = np.random.default_rng(0).gamma(2.0, 0.1, (24, 24, 3))
@@ -41,20 +33,6 @@ def test_white_balance_moves_light_towards_grey():
 def test_floating_point_pictures_hold_the_radiance():
     picture, _ = develop(RADIANCE, ALBEDO, INSIDE, "float16", None)
     np.testing.assert_array_equal(picture, RADIANCE.astype(np.float16))
-
-
-def test_the_tone_curve_rises_to_white():
-    levels = np.linspace(0, 5, 100)[:, None]
-    values = tone(levels, 5.0)[:, 0]
-    assert values[0] == 0
-    assert values[-1] == pytest.approx(1)
-    assert (np.diff(values) >= 0).all()
-
-
-def test_a_missing_denoiser_is_told(monkeypatch):
-    monkeypatch.setattr(denoiser, "has_denoiser", lambda: False)
-    with pytest.raises(BackendError):
-        denoiser.denoised(RADIANCE, ALBEDO, ALBEDO)
 
 
 def write_environment(path, values):
@@ -119,45 +97,6 @@ def test_large_surroundings_keep_the_light_of_a_small_sun(tmp_path, monkeypatch)
     assert made.shape == (3, 6, 3)
     np.testing.assert_allclose(made[0, 1] / made[0, 0], (8 + 90) / 9, rtol=1e-5)
     assert made[:1].mean() == pytest.approx(assets.MEAN, rel=1e-5)
-
-
-def test_what_a_file_names_must_be_told():
-    from scenegen.rendering.pictures.assets import environment_of, materials_of
-
-    ASSETS.use(None, None)
-    spec = preset_spec("interiors", materials="0" * 16, environment="1" * 16)
-    for asset in (materials_of, environment_of):
-        with pytest.raises(SpecError):
-            asset(spec)
-
-
-@pytest.mark.slow
-def test_one_moved_object_changes_the_picture_more_than_noise_does():
-    from scenegen.rendering.renderer import launch_fields, trace
-
-    spec = preset_spec("interiors", seed=5, height=96, width=96, spp=8)
-    objects = objects_of(spec)
-    drawn = ProposalQueue(spec, range(1), objects).take(1, 1)
-    batch = pack_arrays(spec, drawn, (0,), objects)
-    ids = launch_fields(batch, ("object_id",))()["object_id"][0]
-    shown = np.bincount(ids[ids > 0].ravel(), minlength=2)
-    names = ("image", "exposure")
-    first = trace(batch, names)
-    again = trace(batch, names)
-    assert all(_same_picture(name, first[name][0], again[name][0]) for name in names)
-    batch.world_from_object[0, int(shown.argmax()) - 1, 0, 3] += 0.3
-    moved = trace(batch, names)
-    assert not _same_picture("image", first["image"][0], moved["image"][0])
-
-
-def test_windows_are_where_their_openings_are():
-    from scenegen.rendering.pictures.tracer import windows_of
-
-    opening = Opening("window", "east", 1.0, 2.5, 0.9, 2.0)
-    (window,) = windows_of(Interior((4.0, 2.5, 3.0), (opening,), (), 12.0, 0.0, True))
-    assert window.along_z
-    assert window.at > 4.0
-    assert window[2:] == (1.0, 2.5, 0.9, 2.0)
 
 
 REFLECTANCE = 0.5

@@ -7,9 +7,8 @@ from model_rooms import FAMILIES
 from other_engines import render_by_the_fallback
 
 from scenegen.description.specs import DatasetSpec
-from scenegen.rendering import renderer
-from scenegen.rendering.packing import SceneBatch, pack
-from scenegen.rendering.renderer import launch, render
+from scenegen.rendering.packing import pack
+from scenegen.rendering.renderer import render
 
 TINY = DatasetSpec(
     height=18, width=22, objects=(2, 3), image_dtype="float32", shadows=True, spp=2, seed=1,
@@ -46,20 +45,3 @@ def test_the_scalar_fallback_agrees_with_the_wavefront(spec, scenes_of):
     aligned = abs(fast.normal - slow.normal).max(axis=-1) < 1e-3
     assert aligned[same].mean() > (0.999 if fine else 0.99)
     assert (abs(fast.image - slow.image).max(axis=-1) < 1e-3).mean() > (0.99 if fine else 0.985)
-
-
-def test_without_llvm_the_work_is_done_when_fetched(monkeypatch, scenes):
-    made: list[SceneBatch] = []
-    truth = render(pack(TINY, scenes))
-
-    def reference(batch, cast):
-        made.append(batch)
-        return truth
-
-    monkeypatch.setattr(renderer, "select_variant", lambda device: "scalar_rgb")
-    monkeypatch.setattr(renderer, "render_in_numpy", reference)
-    batch = pack(TINY, scenes)
-    fetch = launch(batch)
-    assert made == []
-    assert fetch().image is truth.image
-    assert made == [batch]

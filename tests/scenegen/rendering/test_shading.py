@@ -1,16 +1,25 @@
-"""The shading equation against numbers worked out by hand, and its symmetries."""
+"""The shading equation against numbers worked out by hand, with and without Phong's lobe."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from scenegen.camera import Camera
+from scenegen.description.scenes import Light, PlacedObject, SceneSpec
+from scenegen.description.specs import DatasetSpec
+from scenegen.rendering.packing import pack
+from scenegen.rendering.renderer import render
 from scenegen.rendering.shading import shade
 
 ORIGIN = np.zeros((1, 3))
 UP = np.array([[0.0, 1.0, 0.0]])
-WHITE = np.ones(3)
-DARK = np.zeros(3)
-NO_LIGHT = np.zeros((0, 3))
+DARK, WHITE = np.zeros(3), np.ones(3)
 K = np.array([0.5, 0.25])
+GLOSSY = DatasetSpec(
+    height=40, width=56, objects=(2, 3), lights=(0, 4), specular=(0.2, 1.0), shininess=(2.0, 60.0),
+    image_dtype="float32", min_visible_pixels=0, seed=8, random_reflectance=True,
+)  # fmt: skip
 
 
 def test_light_overhead():
@@ -34,15 +43,58 @@ def test_light_from_behind_takes_nothing_away(normal, light):
     np.testing.assert_allclose(result, 0.1)
 
 
-def test_lights_add_up():
-    rng = np.random.default_rng(1)
-    points, normals = rng.standard_normal((2, 4, 5, 3))
-    normals /= np.linalg.norm(normals, axis=-1, keepdims=True)
-    rho, lights, colors = rng.random((4, 5, 3)), rng.standard_normal((3, 3)) * 5, rng.random((3, 3))
-    one_by_one = sum(
-        shade(points, normals, rho, lights[j : j + 1], colors[j : j + 1], DARK, K) for j in range(3)
+def shine(light, viewpoint, shininess, normal=UP):
+    """Return the radiance of a black surface at the origin with k_s = 1 and light colour 1."""
+    lights, black = np.array([light], float), np.zeros(3)
+    one = shade(ORIGIN, normal, black, lights, np.ones((1, 3)), DARK, K, 1.0, shininess,
+                np.array(viewpoint, float))  # fmt: skip
+    assert (one == one[0, 0]).all()
+    return float(one[0, 0])
+
+
+def test_a_mirror_by_hand():
+    """3-4-5 triangles on both sides: d = 5, cosine 4/5, k_l d + k_q d^2 = 8.75, lobe 1."""
+    light, color = np.array([[3.0, 4.0, 0.0]]), np.array([[8.75, 17.5, 0.0]])
+    for shininess in (1.0, 30.0):
+        found = shade(ORIGIN, UP, np.array([0.5, 0.25, 1.0]), light, color, np.full(3, 0.1), K,
+                      0.3, shininess, np.array([-6.0, 8.0, 0.0]))  # fmt: skip
+        np.testing.assert_allclose(found, [[0.45 + 0.3, 0.025 + 0.4 + 0.6, 0.1]])
+
+
+@pytest.mark.parametrize("degrees", [0.0, 10.0, 30.0, 45.0])
+def test_beside_the_mirror_it_falls_with_a_power_of_the_cosine(degrees):
+    """Seen from above, a light at distance 2 (k_l d + k_q d^2 = 2)."""
+    angle = np.radians(degrees)
+    light = 2 * np.array([np.sin(angle), np.cos(angle), 0.0])
+    for shininess in (1.0, 7.5, 200.0):
+        expected = np.cos(angle) ** shininess / 2
+        assert shine(light, (0, 9, 0), shininess) == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_light_below_the_surface_has_no_highlight_though_the_lobe_reaches_it():
+    viewpoint = (-10.0, 0.5, 0.0)  # the mirrored ray all but grazes
+    assert shine((10.0, 0.1, 0.0), viewpoint, 5.0) > 0
+    assert shine((10.0, -0.1, 0.0), viewpoint, 5.0) == 0
+    assert shine((10.0, 0.0, 0.0), viewpoint, 5.0) == 0
+    assert shine((-10.0, 0.1, 0.0), viewpoint, 5.0) == 0, "nor one behind the mirrored ray"
+
+
+@pytest.mark.parametrize("blocked", [False, True])
+def test_a_highlight_by_hand_and_in_the_shadow(blocked):
+    """A box's top, seen and lit at 3-4-5 triangles from either side; a ball before the light."""
+    box = PlacedObject(
+        "box", (0.5, 0.2, 0.5), (1.0, 0, 0, 0), 0.2 * 3**0.5, (0.5, 0.25, 1.0), 0.4, 12.0
     )
-    together = shade(points, normals, rho, lights, colors, DARK, K)
-    assert together.shape == (4, 5, 3)
-    assert together.max() > 0
-    np.testing.assert_allclose(together, one_by_one, atol=1e-14)
+    ball = PlacedObject("sphere", (-0.1, 1.2, 0.5), (1.0, 0, 0, 0), 0.05, (1.0,) * 3)
+    camera = Camera((1.7, 2.0, 0.5), (0.5, 0.4, 0.5), 20.0)
+    lamp = Light((-0.7, 2.0, 0.5), (2.0, 4.0, 1.0))
+    objects = (box, ball) if blocked else (box,)
+    scene = SceneSpec(0, (camera,), objects, (lamp,), (0.1,) * 3, (0.5, 0.25), (0.8,) * 3)
+    spec = replace(GLOSSY, height=33, width=33, objects=(1, 2), lights=(1, 1), shadows=True)
+    truth = render(pack(spec, [scene]))
+    assert truth.object_id[0, 16, 16] == 1
+    rho, color = np.array(box.reflectance), np.array(lamp.color)
+    expected = rho * (0.1 + 0.8 * color / 2) + 0.4 * color / 2  # d = 2: k_l d + k_q d^2 = 2
+    np.testing.assert_allclose(
+        truth.image[0, 16, 16], 0.1 * rho if blocked else expected, rtol=1e-4
+    )

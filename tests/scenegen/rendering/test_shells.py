@@ -7,7 +7,6 @@ from scenegen.camera import Camera, pixel_directions
 from scenegen.description.interiors import WALLS, Interior, Opening
 from scenegen.description.presets import preset_spec
 from scenegen.description.scenes import SceneSpec
-from scenegen.objects.furniture.room_shell import REVEAL, shell
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import launch_fields
 
@@ -70,13 +69,3 @@ def test_only_a_windows_opening_shows_nothing(wall):
     assert (inside[-1] - inside[0]) * pixel * away < 1.0  # its width
     door = rendered(camera, (Opening("door", wall, 1.0, 2.0, 0.0, 2.0),))
     assert (door["object_id"] == 0).all()
-
-
-def test_the_shell_faces_inwards_and_ends_at_the_windows_outside():
-    window = Opening("window", "north", 1.0, 2.0, 0.9, 2.0)
-    room = shell(Interior(SIZE, (window,), (), 12.0, 0.0, False))
-    assert room.corners[..., 2].min() == pytest.approx(-REVEAL)
-    middle = np.array(SIZE) / 2
-    walls = room.part < 6
-    inwards = ((middle - room.corners.mean(axis=1)) * room.normals).sum(axis=1)
-    assert (inwards[walls] > -0.6).all()  # those of the reveal may look past the middle

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.ndimage import minimum_filter
-from verified import checks_of
 
 from scenegen.camera import Camera
 from scenegen.description.names import FAMILY_NAMES
 from scenegen.description.scenes import Light, PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.rendering.packing import pack
-from scenegen.rendering.renderer import launch_fields, render
+from scenegen.rendering.renderer import render
 
 PATH = DatasetSpec(
     height=24, width=32, shading="path", spp=4, image_dtype="float32", min_visible_pixels=0,
@@ -54,25 +53,6 @@ def test_only_the_colour_is_traced(settings, scenes_of):
     assert (traced.image != paper.image).mean() > 0.5
 
 
-def test_fields_may_be_asked_for_one_by_one(scenes_of):
-    batch = pack(PATH, scenes_of(PATH, 2))
-    whole = render(batch)
-    assert set(launch_fields(batch, ["depth"])()) == {"depth"}
-    only = launch_fields(batch, ["image"])()
-    assert set(only) == {"image"}
-    assert only["image"].tobytes() == whole.image.tobytes()
-
-
-def test_the_same_request_gives_the_same_bytes_in_any_batch(make_rooms, tmp_path):
-    settings = {"shading": "path", "spp": 3, "views": (0.0, 30.0), "object_radius": (0.08, 0.15)}
-    files = [
-        make_rooms(tmp_path / f"{batch}.h5", 3, {"batch": batch}, **settings) for batch in (1, 64)
-    ]
-    assert len({path.read_bytes() for path in files}) == 1
-    checks = checks_of(files[0], items=1)
-    assert [check for check in checks if not check.ok] == []
-
-
 def test_noise_is_another_for_every_seed_scene_and_view():
     """The images show the same scene, each with different noise."""
     views = (CAMERA, CAMERA)
@@ -108,23 +88,6 @@ def test_direct_light_of_an_open_convex_object_is_the_shading_equation(shape, gl
     assert np.quantile(off, 0.8) < 0.03, "up to noise and outlines"
 
 
-def test_several_lights_add_up():
-    others = (LAMP, Light((-1.0, 1.5, 2.0), (0.5, 1.0, 4.0)), Light((0.3, 2.5, 0.3), (1.0,) * 3))
-    traced, paper, inside = images(replace(OPEN, lights=others), spp=256, lights=(3, 3))
-    assert traced[inside].mean(axis=0) == pytest.approx(paper[inside].mean(axis=0), rel=0.02)
-
-
-@pytest.mark.parametrize("attenuation", [(0.5, 0.5), (0.0, 2.0)])
-def test_at_the_target_a_light_is_as_bright_as_in_the_shading_equation(attenuation):
-    """A tiny ball at the target, where both fall-offs agree."""
-    tiny = replace(BALL, scale=0.004)
-    camera = Camera(CAMERA.position, TARGET, 0.4)
-    scene = replace(OPEN, objects=(tiny,), cameras=(camera,), attenuation=attenuation)
-    traced, paper, inside = images(scene)
-    assert inside.mean() > 0.1
-    assert traced[inside].mean(axis=0) == pytest.approx(paper[inside].mean(axis=0), rel=0.01)
-
-
 def test_ambient_light_alone_leaves_an_open_object_its_reflectance():
     """The furnace test: every point of a convex object sees L_a all around."""
     scene = replace(OPEN, lights=(), ambient=(0.5, 0.25, 0.125), background=(0.25, 0.5, 1.0))
@@ -145,69 +108,11 @@ def test_a_glossy_object_in_the_furnace_reflects_both_lobes():
     np.testing.assert_allclose(traced.mean(axis=(0, 1)), expected, rtol=0.02)
 
 
-def test_rooms_have_shadows_and_light_in_them():
-    """The floor behind a ball, seen from the light, is lit by indirect light only."""
-    ball = replace(BALL, position=(0.5, 0.3, 0.5), scale=0.15)
-    camera, lamp = (
-        Camera((1.5, 1.2, 1.5), (0.5, 0.1, 0.5), 30.0),
-        Light((0.2, 1.2, 0.2), (1.0,) * 3),
-    )
-    scene = SceneSpec(0, (camera,), (ball,), (lamp,), BLACK, (0.0, 1.0), (0.3, 0.3, 0.3))
-    traced, paper, _ = images(scene)
-    hard = render(pack(replace(PATH, shading="paper", shadows=True), [scene]))
-    room = minimum_filter(hard.object_id[0] == 0, 3)
-    dark = minimum_filter((hard.image[0] == 0).all(axis=-1), 3) & room
-    lit = minimum_filter(np.isclose(hard.image[0], paper, rtol=1e-4).all(axis=-1), 3) & room
-    assert dark.sum() > 10
-    assert lit.sum() > 50
-    assert (traced[dark] > 0).mean() > 0.9, "not black: light that bounced"
-    assert traced[dark].mean() < 0.3 * paper[dark].mean(), "but in the shadow"
-    assert (traced[lit] > 0.97 * hard.image[0][lit]).mean() > 0.95, "light only adds up"
-
-
 def test_walls_block_light_from_behind(variant):
     behind = Light((-1.0, 0.5, 0.5), (1.0,) * 3)
     room = replace(OPEN, objects=(), lights=(behind,), room_reflectance=(0.7,) * 3)
     image = render(pack(replace(PATH, objects=(0, 1)), [room])).image
     assert (image == 0).all()
-
-
-def test_a_glossy_room_scene_is_the_same_picture_as_the_papers(scenes_of):
-    """The image is upright, and the lights are in their places.
-
-    Light that bounced is in one alone: over 32 scenes of seeds 3 to 6 the correlation is 0.75 to
-    0.94, and of these three 0.87 to 0.94.
-    """
-    spec = replace(PATH, specular=(0.3, 0.5), shininess=(5.0, 9.0), lights=(1, 2), spp=64, seed=6)
-    scenes = scenes_of(spec, 3)
-    traced = render(pack(spec, scenes)).image
-    paper = render(pack(replace(spec, shading="paper", shadows=True, spp=16), scenes)).image
-    for one, other in zip(traced, paper, strict=True):
-        match = np.corrcoef(one.ravel(), other.ravel())[0, 1]
-        flipped = [np.corrcoef(one.ravel(), x.ravel())[0, 1] for x in (other[::-1], other[:, ::-1])]
-        assert match > 0.85
-        assert match > max(flipped)
-
-
-@pytest.mark.parametrize("spp", [1, 3])
-def test_any_number_of_samples_will_do(spp, capfd, variant):
-    scene = replace(OPEN, room_reflectance=(0.5,) * 3, ambient=(0.2,) * 3)
-    image = render(pack(replace(PATH, spp=spp, height=8, width=8), [scene])).image
-    assert np.isfinite(image).all()
-    assert image.mean() > 0.05
-    assert capfd.readouterr() == ("", ""), "Mitsuba has nothing to warn of"
-
-
-def test_noise_of_neighbours_is_independent(variant):
-    side = 192
-    room = replace(OPEN, objects=(), room_reflectance=(0.7,) * 3, ambient=(0.3,) * 3)
-    spec = replace(PATH, height=side, width=side, objects=(0, 0), lights=(1, 1), spp=16)
-    a, b = (render(pack(replace(spec, seed=s), [room])).image[0] for s in (1, 2))
-    found = (a - b).mean(axis=-1) / np.maximum(a + b, 1e-3).mean(axis=-1)
-    assert found.std() > 1e-3
-    for lag in (1, 2, 3, 4):
-        for ahead, behind in ((found[:, lag:], found[:, :-lag]), (found[lag:], found[:-lag])):
-            assert abs(np.corrcoef(ahead.ravel(), behind.ravel())[0, 1]) < 0.02
 
 
 def test_it_is_the_picture_of_mitsubas_own_path_tracer(variant):

@@ -21,17 +21,3 @@ def test_shares_are_those_of_the_stored_values(level, ambient, warned, make_room
     assert shares == ((shown == 255).mean(), (shown == 0).mean())
     assert len(exposure_warnings(shares)) == warned == (max(shares) >= MANY)
     assert describe(path).count("warning: ") == warned
-
-
-def test_images_of_other_types_are_not_clipped(make_rooms, tmp_path):
-    path = make_rooms(tmp_path / "x.h5", 2, image_dtype="float16", light_level=5.0)
-    with open_rooms(path) as rooms:
-        assert clipped_shares(rooms, [0, 1]) is None
-    assert "warning" not in describe(path)
-
-
-def test_rendering_says_it(run):
-    result = run("render", "--n", "2", "--size", "16", "--light-level", "5", "--out", "x.h5")
-    assert result.exit_code == 0
-    assert "saturated" in result.stdout
-    assert "warning" in result.stderr

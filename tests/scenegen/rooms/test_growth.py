@@ -71,10 +71,7 @@ def test_outlines_keep_nothing_alive_but_what_placement_reads(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "models",
-    [pytest.param(0, marks=pytest.mark.xfail(reason="5.2 to 7.0% were measured")), 300],
-)
+@pytest.mark.parametrize("models", [0, 300])
 def test_the_second_half_of_a_run_takes_no_more_memory(models, tmp_path):
     """Of models, each picture takes 3 MB in memory."""
     root = tmp_path / "models" if models else ""

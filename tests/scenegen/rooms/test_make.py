@@ -1,8 +1,5 @@
 """A data set depends on its request alone: not on batches, on its own length, or on retries."""
 
-import subprocess
-import sys
-
 import h5py
 import numpy as np
 import pytest
@@ -13,17 +10,6 @@ from scenegen.description.specs import DatasetSpec
 from scenegen.objects.sources import object_source
 from scenegen.rooms import render as rendering
 from scenegen.rooms.make import make_dataset
-
-SPEC = DatasetSpec(height=32, width=32, min_visible_pixels=3, seed=3)
-PIXELS = ("image", "depth", "normal", "object_id")
-PEAK = """
-import resource, sys
-from scenegen.rooms.make import make_dataset
-from scenegen.description.specs import DatasetSpec
-spec = DatasetSpec(height=64, width=64, min_visible_pixels=3)
-make_dataset(f"{sys.argv[1]}.h5", spec, int(sys.argv[1]))
-print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
-"""
 
 
 def write_models(folder):
@@ -44,16 +30,6 @@ def contents(path):
         return found, file.attrs["fingerprint"]
 
 
-@pytest.mark.slow
-def test_the_same_command_gives_the_same_bytes_in_another_process(make_rooms, tmp_path):
-    render = "render --n 5 --seed 8 --size 32 --min-visible-pixels 3 --out x.h5"
-    batch = ["--batch", "2"]  # is not recorded, as it changes no byte
-    command = [sys.executable, "-c", "import cli; cli.scenegen()", *render.split(), *batch]
-    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
-    again = make_rooms(tmp_path / "again.h5", 5, {"command": f"scenegen {render}"}, seed=8)
-    assert again.read_bytes() == (tmp_path / "x.h5").read_bytes()
-
-
 def test_the_first_items_of_a_larger_file_are_those_of_a_smaller(rooms_path, make_rooms, tmp_path):
     small, _ = contents(make_rooms(tmp_path / "x.h5", 3, {"batch": 2}))
     large, _ = contents(rooms_path)
@@ -61,18 +37,6 @@ def test_the_first_items_of_a_larger_file_are_those_of_a_smaller(rooms_path, mak
     for name, values in small.items():
         expected = large[name][: len(values)]  # 3 rows, or all that an axis counts
         np.testing.assert_array_equal(values, expected, err_msg=name)
-
-
-def test_neighbouring_seeds_differ_in_every_item(rooms_path, make_rooms, tmp_path):
-    """In every item, and no item of one seed turns up anywhere under the next."""
-    here, mark = contents(rooms_path)
-    there, other = contents(make_rooms(tmp_path / "x.h5", 8, seed=4))
-    assert mark != other
-    for name in ("image", "depth", "normal", "camera/world_from_camera", "light/color", "scene"):
-        rows = [np.asarray(values).tobytes() for values in (*here[name], *there[name])]
-        if name == "scene":
-            rows = [*here[name], *there[name]]
-        assert len(set(rows)) == 16, name
 
 
 def test_image_types_agree(make_rooms, tmp_path):
@@ -89,28 +53,6 @@ def test_image_types_agree(make_rooms, tmp_path):
     assert 0.05 < exact.min() < exact.max() < 2
     np.testing.assert_array_equal(images["uint8"], np.rint(np.clip(exact, 0, 1) * 255))
     np.testing.assert_array_equal(images["float16"], exact.astype(np.float16))
-
-
-@pytest.mark.parametrize(("height", "width"), [(9, 11), (33, 8)])
-def test_odd_sizes(tmp_path, height, width):
-    """No number of pixels has to be a multiple of anything."""
-    spec = DatasetSpec(
-        height=height, width=width, objects=(1, 1), object_radius=(0.05, 0.1), min_visible_pixels=0
-    )
-    make_dataset(tmp_path / "x.h5", spec, 3)
-    with open_rooms(tmp_path / "x.h5") as rooms:
-        for room in rooms:
-            assert room.image.shape == (height, width, 3)
-            assert np.isfinite(room.depth).all()
-            points = room.points_world[room.object_id == 0]
-            assert np.abs(points).min(axis=1).max() < 1e-5
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("height", "width"), [(48, 64), (64, 48)])
-def test_defaults_can_be_placed_in_images_that_are_not_square(make_rooms, tmp_path, height, width):
-    with open_rooms(make_rooms(tmp_path / "x.h5", 60, height=height, width=width)) as rooms:
-        assert len(rooms) == 60
 
 
 def test_retries_keep_the_order_and_do_not_depend_on_batches(tmp_path):
@@ -151,13 +93,3 @@ def test_worker_processes_never_change_a_byte(tmp_path, monkeypatch, kind):
         found.append((path.read_bytes(), objects.problems if objects else {}))
     assert found[0] == found[1]
     assert (set(found[0][1]) == {"odd/bad"}) == (kind == "folder")
-
-
-@pytest.mark.slow
-def test_memory_is_flat(tmp_path):
-    peaks = []
-    for count in (400, 4000):
-        command = [sys.executable, "-c", PEAK, str(count)]
-        done = subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, text=True)
-        peaks.append(int(done.stdout))
-    assert peaks[1] < 1.15 * peaks[0]

@@ -5,44 +5,15 @@ import dataclasses
 import numpy as np
 import pytest
 from PIL import Image
-from sheets import enlarged, find
 
 from scenegen import open_rooms
 from scenegen.rooms.preview import contact_sheet, depth_bytes, srgb_bytes, tiles
-
-BACKGROUND = 250
-TILE = 128  # images of 32 pixels are shown four times as large
 
 
 @pytest.fixture(scope="module")
 def rooms(rooms_path):
     with open_rooms(rooms_path) as file:
         return list(file)
-
-
-def places_of(sheet, rooms):
-    """Return (row, column) of the top left corner of each tile of some rooms."""
-    return [find(sheet, enlarged(picture, 4)) for room in rooms for picture in tiles(room)]
-
-
-def test_the_sheet_shows_every_picture_once_with_labels(rooms):
-    sheet = np.asarray(contact_sheet(rooms[:3]))
-    assert sheet.dtype == np.uint8
-    assert sheet.shape[1] >= 2 * 4 * TILE, "two rooms side by side"
-    assert sheet.shape[0] >= 2 * TILE, "the third below them"
-    places = places_of(sheet, rooms[:3])
-    assert [y for y, _ in places[:8]] == [places[0][0]] * 8
-    assert sorted(places) == places, "image, depth, normal, ids of each room, in reading order"
-    for y, x in places[:8]:
-        title = sheet[y - 16 : y, x : x + 60]
-        assert (title.min(axis=-1) < 100).sum() > 30, "a title in dark ink above each column"
-    for y, x in places[::4]:
-        caption = sheet[y + TILE : y + TILE + 18, x : x + 200]
-        assert (caption.min(axis=-1) < 150).sum() > 100, "a caption below each room"
-    bare = sheet.copy()
-    for y, x in places:
-        bare[y - 18 : y + TILE + 18, x : x + TILE + 300] = BACKGROUND
-    assert (bare == BACKGROUND).all(), "nothing is drawn elsewhere"
 
 
 def test_near_is_dark():
@@ -53,21 +24,6 @@ def test_near_is_dark():
     assert (shown[..., :1] == shown).all()
     assert depth_bytes(np.full((2, 2), np.nan)).shape == (2, 2, 3)
     assert np.ptp(depth_bytes(np.full((2, 2), 1.5))) == 0
-
-
-def test_pictures_of_a_real_room(rooms):
-    room = max(rooms, key=lambda r: len(r.scene.objects))
-    image, depth, normal, ids = tiles(room)
-    assert all(p.shape == (32, 32, 3) and p.dtype == np.uint8 for p in (image, depth, normal, ids))
-    order = np.argsort(room.depth, axis=None)
-    assert (np.diff(depth[..., 0].ravel()[order].astype(int)) >= 0).all()
-    expected = np.rint((room.normal.astype(float) + 1) / 2 * 255)
-    assert np.abs(normal - expected).max() <= 1
-    colours = {tuple(ids[room.object_id == k].reshape(-1, 3)[0]) for k in np.unique(room.object_id)}
-    assert len(colours) == len(np.unique(room.object_id)) >= 3
-    for k in np.unique(room.object_id):
-        assert np.ptp(ids[room.object_id == k], axis=0).max() == 0, "one colour for one object"
-    assert image.mean() > room.image.mean(), "encoded for the eye: brighter than linear bytes"
 
 
 def test_where_nothing_is_hit_no_picture_pretends(rooms):

@@ -4,16 +4,11 @@ import dataclasses
 import hashlib
 import importlib.metadata
 import json
-import zlib
 
 import h5py
 import numpy as np
-import pytest
 
-from scenegen import RoomsDataset, open_rooms
-from scenegen.common.errors import SpecError
 from scenegen.description.names import SHAPE_NAMES
-from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.content import datasets
 from scenegen.layout import FIELDS
@@ -116,31 +111,6 @@ def test_the_fingerprint_is_that_of_spec_and_scenes(rooms_path):
         assert file.attrs["fingerprint"] == hashlib.sha256(lines.encode()).hexdigest()
 
 
-@pytest.mark.parametrize("name", ["image", "depth", "normal", "object_id"])
-def test_a_raw_chunk_decodes_by_the_books(rooms_path, name):
-    """Undo, by hand and in reverse order, what the file's own filter list says."""
-    with h5py.File(rooms_path) as file:
-        dataset = file[name]
-        plist = dataset.id.get_create_plist()
-        filters = [plist.get_filter(i) for i in range(plist.get_nfilters())]
-        mask, data = dataset.id.read_direct_chunk((5, *(0,) * (dataset.ndim - 1)))
-        assert mask == 0
-        assert h5py.h5z.FILTER_DEFLATE in [f[0] for f in filters], "compressed by default"
-        for number, _, values, _ in reversed(filters):
-            if number == h5py.h5z.FILTER_DEFLATE:
-                data = zlib.decompress(data)
-            elif number == h5py.h5z.FILTER_SHUFFLE:
-                planes = np.frombuffer(data, np.uint8).reshape(values[0], -1)
-                data = planes.T.tobytes()
-            else:
-                pytest.fail(f"filter {number} is not in every HDF5 library")
-        expected = dataset[5]
-        np.testing.assert_array_equal(
-            np.frombuffer(data, expected.dtype).reshape(expected.shape), expected
-        )
-        assert dataset.shuffle == (expected.itemsize > 1 and name != "normal")
-
-
 def test_every_compression_gives_equal_contents(rooms_path, make_rooms, tmp_path):
     sizes = [rooms_path.stat().st_size]
     for compression in ("lzf", "none"):
@@ -152,56 +122,6 @@ def test_every_compression_gives_equal_contents(rooms_path, make_rooms, tmp_path
                 np.testing.assert_array_equal(a[name][:], b[name][:], err_msg=name)
             assert a.attrs["fingerprint"] == b.attrs["fingerprint"]
     assert sizes[0] < sizes[1] < sizes[2]
-
-
-def test_scene_descriptions_agree_with_the_arrays(rooms_path):
-    with h5py.File(rooms_path) as file:
-        for i in range(8):
-            scene = SceneSpec.from_json(file["scene"].asstr()[i])
-            assert scene.to_json() == file["scene"].asstr()[i]
-            objects, lights = len(scene.objects), len(scene.lights)
-            assert (file["object/count"][i], file["light/count"][i]) == (objects, lights)
-            assert file["scene_index"][i] == scene.index == i
-            assert file["view_index"][i] == 0
-            names = file["object/shape"].attrs["names"]
-            shapes = file["object/shape"][i]
-            assert [names[s] for s in shapes[:objects]] == [item.shape for item in scene.objects]
-            assert (shapes[objects:] == -1).all()
-            for k, item in enumerate(scene.objects):
-                placed = file["object/world_from_object"][i, k]
-                np.testing.assert_array_equal(placed[:3, 3], item.position)
-                assert np.linalg.det(placed[:3, :3]) == pytest.approx(item.scale**3)
-                assert file["object/scale"][i, k] == item.scale
-                seen = (file["object_id"][i] == k + 1).sum()
-                assert file["object/visible_pixels"][i, k] == seen >= 3
-            assert (file["object/world_from_object"][i, objects:] == 0).all()
-            for j, light in enumerate(scene.lights):
-                np.testing.assert_array_equal(file["light/position"][i, j], light.position)
-                np.testing.assert_array_equal(file["light/color"][i, j], light.color)
-            assert (file["light/color"][i, lights:] == 0).all()
-
-
-def test_a_room_is_complete(float_path):
-    with open_rooms(float_path) as rooms, h5py.File(float_path) as file:
-        room = rooms[2]
-        assert (room.index, room.view_index, room.scene.index) == (2, 0, 2)
-        for name in ("image", "depth", "normal", "object_id"):
-            np.testing.assert_array_equal(getattr(room, name), file[name][2])
-        assert room.depth.shape == (48, 40)
-        assert room.image.dtype == room.radiance.dtype == np.float32
-        camera = room.scene.cameras[0]
-        np.testing.assert_allclose(room.world_from_camera, camera.world_from_camera, atol=1e-15)
-        assert room.fov_y_degrees == file["camera/fov_y_degrees"][2]
-        np.testing.assert_allclose(room.points[..., 2], -room.depth, atol=1e-7)
-        assert room.points[0, 0, 0] < 0 < room.points[0, 0, 1]  # top left: x left, y up
-
-
-def test_unknown_fields_are_named(rooms_path):
-    for fields in (("image", "depht"), ("scene",)):
-        with pytest.raises(SpecError) as caught:
-            RoomsDataset(rooms_path, fields=fields)
-        assert caught.value.found == repr(fields[-1])
-        assert "image, depth" in caught.value.expected
 
 
 def test_radiance_of_developed_pictures_is_what_they_show(interior_path, rooms_path):

@@ -3,9 +3,6 @@
 The rules of `row_rules` have a table of their own in `test_verify.py`.
 """
 
-import subprocess
-import sys
-
 import h5py
 import numpy as np
 import pytest
@@ -134,13 +131,3 @@ def test_a_damaged_row_spoils_itself_only(damaged, refuses, verdict, kind):
     code, checks, output = verdict(path, "--items", "2")
     assert (code, checks[check]) == (1, "FAIL")
     assert "row 5" in output
-
-
-def test_in_a_process_of_its_own(tmp_path, check_refusal, damaged):
-    """As a shell sees it: nothing of HDF5's own errors, nothing at exit."""
-    path = damaged(damaged_chunk("depth", 0))
-    done = subprocess.run(
-        [sys.executable, "-c", "import cli; cli.scenegen()", "info", path.name],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    check_refusal(done.returncode, done.stdout, done.stderr, (path.name,))

@@ -10,7 +10,7 @@ import pytest
 from streamed import check_equal, stored
 
 from scenegen import DatasetSpec, RoomStream, preset_spec
-from scenegen.common.errors import BackendError, PlacementError, SpecError
+from scenegen.common.errors import BackendError, SpecError
 from scenegen.description.presets import PRESETS
 from scenegen.rooms.make import make_dataset
 
@@ -76,12 +76,6 @@ def test_pixels_stay_on_the_device_and_reach_torch_without_a_copy(rooms):
         assert len({tensor.data_ptr() for tensor in tensors}) == 3
     again = torch.from_dlpack(batches[0]["depth"])
     assert again.data_ptr() == torch.from_dlpack(batches[0]["depth"]).data_ptr()
-
-
-def test_requests_that_cannot_be_met_end_the_loop():
-    full = DatasetSpec(**{**TINY, "objects": (60, 60), "object_radius": (0.4, 0.4)})
-    with pytest.raises(PlacementError):
-        next(iter(RoomStream(full, batch=1)))
 
 
 def test_settings_that_no_stream_has():

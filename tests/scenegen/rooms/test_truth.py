@@ -101,18 +101,6 @@ def test_all_that_handles_files_knows_it(full, merged, tmp_path, run):
     assert {name.replace("/", "_") for name in COLUMNS} <= set(columns)
 
 
-def test_it_changes_nothing_else(full, make_rooms, tmp_path):
-    with open_rooms(full) as rooms:
-        settings = {**vars(rooms.spec), "truth": ()}
-        spec = rooms.spec.to_json()
-    make_rooms(tmp_path / "plain.h5", 3, **settings)
-    with open_rooms(full) as rooms, open_rooms(tmp_path / "plain.h5") as plain:
-        assert rooms.stored_truth_digest == plain.stored_truth_digest
-        assert rooms.stored_digests().items() >= plain.stored_digests().items()
-        assert json.loads(spec)["truth"] == list(TRUTHS)
-        assert "truth" not in json.loads(plain.spec.to_json()), "as in files of version 1.0"
-
-
 def mask_of_no_object(file):
     row = int((file["object/count"][()] == 2).argmax())
     file["object/amodal_mask"][row, 2, 5, 5] = 1
@@ -140,27 +128,13 @@ def test_each_is_checked_against_depth_and_poses(edit, check, merged, tmp_path):
     assert check in failed
 
 
-def test_the_command(run, tmp_path):
-    command = ("render", "--n", "1", "--size", "32", "--views", "0,20", "--out", "x.h5")
-    assert run(*command, "--with", "flow,amodal").exit_code == 0
-    with open_rooms(tmp_path / "x.h5") as rooms:
-        assert rooms.spec.truth == ("amodal", "flow")
-    assert run(*command, "--with", "shadow", "--overwrite").exit_code == 2
-    assert run(*command, "--reflectance", "own", "--overwrite").exit_code == 2
-
-
 @pytest.mark.parametrize(
-    ("settings", "where"),
-    [({"truth": ("depths",)}, "truth"), ({"truth": ("flow",)}, "flow")],
+    ("settings", "where"), [({"truth": ("depths",)}, "truth"), ({"truth": ("flow",)}, "flow")]
 )
 def test_refused(settings, where):
     with pytest.raises(SpecError) as error:
         DatasetSpec(**settings)
     assert error.value.where == where
-
-
-def test_the_order_of_the_request_does_not_matter():
-    assert DatasetSpec(truth=("albedo", "amodal")) == DatasetSpec(truth=("amodal", "albedo"))
 
 
 @pytest.mark.parametrize(("depth", "count"), [(1.9, 0), (2.05, 0), (2.2, 1)])

@@ -83,12 +83,6 @@ def test_a_good_file_passes(verdict, request, which):
     assert "bit for bit" in output
 
 
-def test_lists_and_counts(verdict, rooms_path):
-    assert set(verdict(rooms_path, "--items", 0)[1]) == ROWS
-    assert "3 rows, bit for bit" in verdict(rooms_path, "--items", 3)[2]
-    assert "8 rows, bit for bit" in verdict(rooms_path, "--items", 99)[2]
-
-
 @pytest.mark.parametrize(
     "how",
     [
@@ -129,70 +123,24 @@ def nudged(name, by):
     return values(name, lambda array: array + array.dtype.type(by))
 
 
-@pytest.mark.parametrize(
-    "other",
-    [
-        None,
-        "Mitsuba",
-        *(pytest.param(name, marks=pytest.mark.slow) for name in ("release", "variant")),
-    ],
-)
+@pytest.mark.parametrize("other", [None, "Mitsuba", "release", "variant"])
 @pytest.mark.parametrize(
     ("edit", "alike"),
-    [
-        (lambda file: None, True),
-        (nudged("depth", 5e-5), True),
-        (put("depth", (2, 7, 9), 1.9), False),
-        (nudged("depth", 1e-2), False),
-        (nudged("normal", 5e-4), True),
-        (nudged("normal", 5e-3), False),
-        (nudged("image", 1), True),
-        (nudged("image", 3), False),
-        (put("object_id", (2, 7, 9), 3), False),
-        (at_edge, True),
-        (put("object_id", (2, 7, slice(9, 13)), 3), False),
-    ],
-    ids=["as rendered", "depth 5e-5", "one depth", "depth 1e-2", "normal 5e-4", "normal 5e-3",
-         "image 1",
-         "image 3", "one id", "one id at an edge", "four ids"],
-)  # fmt: skip
+    [(nudged("depth", 5e-5), True), (at_edge, True), (put("object_id", (2, 7, 9), 3), False)],
+    ids=["depth 5e-5", "one id at an edge", "one id"],
+)
 def test_other_versions_are_told_and_compared_within_a_tolerance(damaged, other, edit, alike):
     """With the same versions a single bit counts."""
     attributes = OTHERS.get(other, {})
 
     def spoil(file):
-        before = {name: file[name][:] for name in ("image", "depth", "normal", "object_id")}
         edit(file)
-        spoil.changed = any((before[name] != file[name][:]).any() for name in before)
         file.attrs.update(attributes)
 
-    path = damaged(spoil)
-    again = {check.name: check for check in checks_of(path, 3)}["rendered again"]
-    assert again.ok == (alike if attributes else not spoil.changed), again.detail
+    again = {check.name: check for check in checks_of(damaged(spoil), 3)}["rendered again"]
+    assert again.ok == (bool(attributes) and alike), again.detail
     for name, value in attributes.items():
         assert f"{name} {value}" in again.detail
-
-
-@pytest.mark.parametrize(
-    ("how", "factor", "alike"),
-    [
-        ({"image_dtype": "float32"}, 1 + 5e-5, True),
-        ({"image_dtype": "float32"}, 1 + 1e-3, False),
-        ({"image_dtype": "float16"}, 1 + 2.0**-11, True),
-        ({"image_dtype": "float16"}, 1 + 2.0**-8, False),
-        ({"shading": "path", "spp": 2}, 0.95, True),
-        ({"shading": "path", "spp": 2}, 0.5, False),
-    ],
-    ids=str,
-)
-def test_images_of_other_versions(make_rooms, tmp_path, how, factor, alike):
-    """Floats relative to the radiance; images of a path tracer by the mean of each channel."""
-    path = make_rooms(tmp_path / "x.h5", 2, **how)
-    with h5py.File(path, "r+") as file:
-        file.attrs["drjit_version"] = "1.4.0"
-        file["image"][...] = (file["image"][:] * factor).astype(file["image"].dtype)
-    again = {check.name: check for check in checks_of(path, 8)}["rendered again"]
-    assert again.ok == alike, again.detail
 
 
 def shifted_ids(ids):
@@ -441,15 +389,42 @@ def test_attributes_must_be_true_even_when_sealed_again(spoilt, name, key, value
     assert set(spoilt(edit)) == {"layout"}
 
 
-@pytest.mark.parametrize(("factor", "within"), [(1.08, True), (0.92, True), (1.2, False)])
-def test_path_traced_images_agree_in_their_means(factor, within):
-    spec = DatasetSpec(shading="path", image_dtype="float32")
+@pytest.mark.parametrize(
+    ("how", "factor", "within"),
+    [
+        ({"shading": "path"}, 1.08, True),
+        ({"shading": "path"}, 0.92, True),
+        ({"shading": "path"}, 1.2, False),
+        ({}, 1 + 5e-5, True),
+        ({}, 1 + 1e-3, False),
+        ({"image_dtype": "float16"}, 1 + 2.0**-11, True),
+        ({"image_dtype": "float16"}, 1 + 2.0**-8, False),
+    ],
+)
+def test_images_agree_in_their_floats_and_path_traced_ones_in_their_means(how, factor, within):
+    spec = DatasetSpec(**{"image_dtype": "float32", **how})
     noise = 1.0 + np.random.default_rng(0).uniform(-0.5, 0.5, (64, 64, 3))
-    none = np.zeros((64, 64), bool)
-    again = np.full((64, 64, 3), 0.5)
-    assert (
-        _within_tolerance("image", factor * noise / noise.mean() / 2, again, none, spec) == within
-    )
+    noise = (noise / noise.mean() / 2).astype(spec.image_dtype)
+    again = np.full_like(noise, 0.5) if how.get("shading") else noise
+    stored, none = (factor * noise).astype(noise.dtype), np.zeros((64, 64), bool)
+    assert _within_tolerance("image", stored, again, none, spec) == within
+
+
+@pytest.mark.parametrize(
+    ("name", "by", "within"),
+    [
+        ("depth", 5e-5, True),
+        ("depth", 1e-2, False),
+        ("normal", 5e-4, True),
+        ("normal", 5e-3, False),
+        ("image", 1, True),
+        ("image", 3, False),
+        ("object_id", 1, False),
+    ],
+)
+def test_tolerances_of_pixels(name, by, within):
+    again, none = np.ones((64, 64)), np.zeros((64, 64), bool)
+    assert _within_tolerance(name, again + by, again, none, DatasetSpec()) == within
 
 
 @pytest.mark.parametrize(("pixels", "within"), [(0, True), (2, True), (20, False)])

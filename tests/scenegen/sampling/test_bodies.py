@@ -40,13 +40,3 @@ def test_sums_of_rounded_products_are_exact_in_any_order():
     assert ((a + b) + c == b + (c + a)).all()
     loose = RNG.uniform(-1, 1, (3, 5000)) * RNG.uniform(-1, 1, (3, 5000))
     assert ((loose[0] + loose[1]) + loose[2] != loose[0] + (loose[1] + loose[2])).any()
-
-
-def test_the_nearest_resting_side():
-    down = Rotation.random(200, rng=RNG).as_matrix()[:, 0]
-    for k, one, side in zip(KIND, down, BODIES.resting_side(KIND, down), strict=True):
-        sides = SHAPES[k].resting_directions
-        if len(sides):
-            assert side @ one == pytest.approx((sides @ one).max(), abs=1e-7)
-        else:
-            assert np.isnan(side).all()

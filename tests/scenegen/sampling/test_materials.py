@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import kstest
 
 from scenegen.description.specs import DatasetSpec
-from scenegen.sampling.scenes import sample_scene, sample_scenes
+from scenegen.sampling.scenes import sample_scenes
 
 SPARSE = DatasetSpec(objects=(1, 4), object_radius=(0.03, 0.04), seed=6)
 
@@ -63,48 +63,3 @@ def test_specular_and_shininess_are_uniform_in_their_ranges_and_independent():
     assert kstest(found[:, 0], "uniform", (0.2, 0.4)).pvalue > 0.01
     assert kstest(found[:, 1], "uniform", (5, 40)).pvalue > 0.01
     assert abs(np.corrcoef(found.T)[0, 1]) < 4 / len(found) ** 0.5
-
-
-def test_materials_change_nothing_else():
-    """Other attempts at a scene do not change its materials, either."""
-    glossy = replace(SPARSE, random_reflectance=True, specular=(0.2, 0.6), shininess=(5.0, 45.0))
-    for plain, painted in zip(scenes(SPARSE, 8), scenes(glossy, 8), strict=True):
-        bare = [replace(o, reflectance=(0.8,) * 3, specular=0.0, shininess=1.0)
-                for o in painted.objects]  # fmt: skip
-        assert replace(painted, objects=tuple(bare)) == plain
-        again = sample_scene(glossy, painted.index, 1)
-        assert again is not None
-        for one, other in zip(painted.objects, again.objects, strict=True):
-            assert one.position != other.position
-            looks = [(o.shape, o.reflectance, o.specular, o.shininess) for o in (one, other)]
-            assert looks[0] == looks[1]
-
-
-def lights(saturation, count=60, **settings):
-    spec = DatasetSpec(objects=(0, 0), light_saturation=saturation, **settings)
-    return [light for scene in scenes(spec, count) for light in scene.lights]
-
-
-def test_saturation_is_how_far_channels_may_fall_below_the_brightest():
-    def ratios(saturation):
-        colors = np.array([light.color for light in lights(saturation)])
-        return np.sort(colors / colors.max(axis=1, keepdims=True), axis=1)
-
-    assert (ratios(0.0) == 1).all(), "white"
-    assert ratios(0.25).min() > 0.75
-    assert ratios(1.0)[:, 0].min() < 0.02
-    means = [ratios(s)[:, 0].mean() for s in (0.0, 0.3, 0.6, 1.0)]
-    assert means == sorted(means, reverse=True)
-    assert means[-1] < 0.4, "strong colours are the rule"
-
-
-@pytest.mark.parametrize("saturation", [0.0, 0.7, 1.0])
-def test_saturation_moves_no_light_and_keeps_the_level(saturation):
-    """On a white surface at the target, facing all lights, the brightest channels add up to it."""
-    some = {"lights": (1, 5), "light_level": 0.6, "attenuation": (0.2, 0.9), "light_radius": 3.0}
-    found = lights(saturation, 20, **some)
-    assert [x.position for x in found] == [x.position for x in lights(0.5, 20, **some)]
-    spec = DatasetSpec(objects=(0, 0), light_saturation=saturation, **some)
-    for scene in scenes(spec, 20):
-        level = sum(max(x.color) for x in scene.lights) / (0.2 * 3 + 0.9 * 3**2)
-        assert level == pytest.approx(0.6)

@@ -6,7 +6,6 @@ from typing import Any
 import pytest
 
 from scenegen.common.errors import PlacementError
-from scenegen.description.presets import preset_spec
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.catalogue import objects_of
 from scenegen.sampling import proposals
@@ -53,28 +52,6 @@ def test_an_item_gets_its_first_attempt_that_is_not_refused(ahead, batch, monkey
                 break
 
 
-def test_no_item_is_taken_at_or_after_the_end():
-    assert sorted(accepted(8, 110)) == [*range(100, 110)]
-
-
-def test_an_impossible_item_is_named_and_the_first_one(monkeypatch):
-    monkeypatch.setattr("scenegen.sampling.scenes.MAX_ATTEMPTS", 60)
-    spec = DatasetSpec(objects=(40, 40))
-    queue = ProposalQueue(spec, range(3000), objects_of(spec))
-    with pytest.raises(PlacementError) as refused:
-        queue.take(64, 3000)
-    assert refused.value.where == "item 0"
-
-
-def test_a_rare_item_of_a_preset_finds_its_place_in_the_end():
-    """Of the first 20,000 rooms of this preset and seed the one that needs most proposals."""
-    spec = preset_spec("shapenet", seed=1, object_split="train")
-    queue = ProposalQueue(spec, range(16775, 16776), objects_of(spec))
-    scenes = queue.take(1, 16776)
-    assert scenes is not None
-    assert scenes.index.tolist() == [16775]
-
-
 def test_an_item_that_is_always_refused_ends_the_run():
     queue = ProposalQueue(SPEC, ITEMS, objects_of(SPEC))
     refused_before = 0
@@ -91,22 +68,3 @@ def test_an_item_that_is_always_refused_ends_the_run():
         refuse_the_first()
     assert refused.value.where == "item 100"
     assert refused_before == MAX_RENDERED
-
-
-def test_waiting_items_do_not_pile_up_proposals(monkeypatch):
-    """While one item is refused again and again, no more than two draws wait."""
-    drawn: list[int] = []
-    sample = proposals.sample_scenes
-
-    def counted(spec, index, *rest):
-        drawn.extend(index)
-        return sample(spec, index, *rest)
-
-    monkeypatch.setattr(proposals, "sample_scenes", counted)
-    monkeypatch.setattr(proposals, "AHEAD", 16)
-    queue = ProposalQueue(SPEC, range(10**9), objects_of(SPEC))
-    for _ in range(20):
-        scenes = queue.take(4, 8)
-        for item in [] if scenes is None else scenes.index.tolist():
-            (queue.refuse if item == 0 else queue.accept)(item)
-    assert max(drawn) < 8 + 4 * 16, "of a thousand million items"

@@ -1,13 +1,11 @@
 """A data card as its readers see it: Hugging Face's reader of headers, and Markdown on a page."""
 
-import hashlib
 from contextlib import ExitStack
 from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 import yaml
-from huggingface_hub import DatasetCard
 from markdown_it import MarkdownIt
 
 from scenegen import open_rooms
@@ -34,38 +32,6 @@ def page(holey_set, float_path, tmp_path_factory):
     return make_card([holey_set, float_path], tmp_path_factory.mktemp("card") / "README.md")
 
 
-def test_what_the_header_tells(page):
-    card = DatasetCard(page)
-    assert (card.data.pretty_name, card.data.license) == ("Two rooms", "cc-by-4.0")
-    assert {"depth-estimation", "pix2shape-bench"} < set(card.data.tags)
-    assert "      author = {{A. Person} and {B Person}}," in page.splitlines()
-
-
-def test_files_and_their_sha256(page, holey_set, float_path):
-    names = ["set.h5", *(f"set-0000{i}-of-00003.h5" for i in range(3))]
-    files = [*(holey_set.with_name(name) for name in names), float_path]
-    for path in files:
-        data = path.read_bytes()
-        assert f"| {path.name} | {len(data)} | {hashlib.sha256(data).hexdigest()} |" in page
-    assert page.count("| shard of set.h5 |") == 3
-
-
-def test_the_request_and_command_are_there_to_be_copied(page, holey_set):
-    with open_rooms(holey_set) as rooms:
-        spec = rooms.attributes["spec"]
-        assert f"| set.h5 | 14 | 7 | {rooms.spec.height}x" in page
-    assert f"    {spec}" in page.splitlines()
-
-
-def test_a_card_of_interiors_says_what_is_true_of_them(interior_path, rooms_path, tmp_path):
-    page = make_card([interior_path], tmp_path / "README.md")
-    wrong = ("scene units", "corner", "no gamma", "two walls")
-    assert not [words for words in wrong if words in page]
-    assert "| `depth` | (y, x) | float32 | metre |" in page
-    with pytest.raises(SpecError):
-        make_card([interior_path, rooms_path], tmp_path / "both")
-
-
 def test_no_licence_is_guessed_of_what_others_made():
     spec = preset_spec("interiors")
     assert default_license([SimpleNamespace(spec=spec)])
@@ -86,20 +52,6 @@ def test_texts_from_files_and_people_stay_texts(damaged, tmp_path):
                 if tag in html]  # fmt: skip
     assert html.count("<h1>") == 1
     assert f"    {WICKED}".replace("\n", "\\n") in page.splitlines(), "a block, to be copied"
-
-
-def test_scenes_that_are_in_two_files_are_told(rooms_path, page, tmp_path):
-    assert "no scene is in two" in page
-    (tmp_path / "other.h5").write_bytes(rooms_path.read_bytes())
-    page = make_card([rooms_path, tmp_path / "other.h5"], tmp_path / "README.md")
-    assert "**8 scenes are in more than one file**" in page
-
-
-def test_one_name_twice(rooms_path, tmp_path):
-    (tmp_path / "rooms.h5").write_bytes(rooms_path.read_bytes())
-    with pytest.raises(SpecError) as error:
-        make_card([rooms_path, tmp_path / "rooms.h5"], tmp_path / "README.md")
-    assert error.value.where == "files"
 
 
 @pytest.mark.parametrize("several", [False, True])

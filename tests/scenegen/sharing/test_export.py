@@ -1,8 +1,6 @@
 """Exported rows, read by the loaders that people use: nothing is lost, and nothing half done."""
 
-import io
 import json
-import re
 import tarfile
 
 import numpy as np
@@ -93,31 +91,6 @@ def test_developed_pictures_are_encoded_once(interior_path, tmp_path, encoding):
     np.testing.assert_allclose(codes, expected, rtol=0, atol=0.501 if encoding == "linear" else 0)
 
 
-def test_floating_point_images_stay_radiance(float_path, tmp_path):
-    export_rows(float_path, "webdataset", tmp_path / "out")
-    about = json.loads((tmp_path / "out" / ABOUT).read_text())["columns"]["image"]
-    assert "encoding" not in about
-    with tarfile.open(tmp_path / "out" / "float-00000-of-00001.tar") as archive:
-        image = np.load(io.BytesIO(archive.extractfile("000000001.image.npy").read()))
-    with open_rooms(float_path) as rooms:
-        np.testing.assert_array_equal(image, rooms[1].image)
-
-
-def test_archives_tell_nothing_of_their_maker(path, tmp_path):
-    made = export_rows(path, "webdataset", tmp_path / "out", rows=[3, 1], rows_per_file=9)
-    with tarfile.open(made[0]) as archive:
-        members = archive.getmembers()
-        depth = np.load(io.BytesIO(archive.extractfile("000000001.depth.npy").read()))
-    with open_rooms(path) as rooms:
-        np.testing.assert_array_equal(depth, rooms.read("depth", 1))
-    assert {(m.mtime, m.uid, m.gid, m.uname, m.gname, m.mode) for m in members} == {
-        (0, 0, 0, "", "", 0o644)
-    }
-    names = [m.name.partition(".")[0] for m in members]
-    assert names == ["000000003"] * 5 + ["000000001"] * 5
-    assert [m.name for m in members[:5]] == sorted(m.name for m in members[:5])
-
-
 @pytest.mark.parametrize("form", DATA_FORMATS)
 def test_the_same_bytes_again_and_an_older_folder_is_replaced(form, path, tmp_path):
     def contents():
@@ -132,20 +105,6 @@ def test_the_same_bytes_again_and_an_older_folder_is_replaced(form, path, tmp_pa
     (tmp_path / "out" / "mine.txt").write_text("mine")
     with pytest.raises(FileExistsError):
         export_rows(path, form, tmp_path / "out", overwrite=True)
-
-
-def test_what_files_do_not_tell_is_beside_them(holey_set, tmp_path):
-    made = export_rows(holey_set, "webdataset", tmp_path / "out", rows_per_file=9)
-    about = json.loads((tmp_path / "out" / ABOUT).read_text())
-    assert about["files"] == [p.name for p in made[:-1]] == [
-        "set-00000-of-00002.tar", "set-00001-of-00002.tar"
-    ]  # fmt: skip
-    with open_rooms(holey_set) as rooms:
-        assert about["attributes"] == {k: str(v) for k, v in rooms.attributes.items()}
-        assert about["columns"]["image"]["scale"] == 1 / 255
-        assert about["columns"]["object_shape"]["names"] == list(rooms.spec.shapes)
-    assert about["columns"]["depth"]["unit"] == "scene unit"
-    assert about["columns"]["depth"]["row_shape"] == [32, 32]
 
 
 def shortened(file):
@@ -182,17 +141,3 @@ def test_refused(how, where, rooms_path, tmp_path):
         export_rows(rooms_path, "parquet", tmp_path / "out", **how)
     assert error.value.where == where
     assert list(tmp_path.iterdir()) == []
-
-
-def test_no_more_rows_are_in_memory_than_fit(rooms_path, tmp_path, monkeypatch):
-    with open_rooms(rooms_path) as rooms:
-        size = sum(np.asarray(rooms.read(name, 0)).nbytes for name in rooms.fields)
-    monkeypatch.setattr("scenegen.sharing.task.BLOCK_BYTES", 3 * size)
-    steps = []
-    made = export_rows(rooms_path, "parquet", tmp_path / "out", progress=steps.append)
-    import pyarrow.parquet as pq
-
-    file = pq.ParquetFile(made[0])
-    groups = [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)]
-    assert groups == steps == [3, 3, 2]
-    assert re.fullmatch(r"rooms-00000-of-00001\.parquet", made[0].name)

@@ -1,6 +1,6 @@
 """What a model is not told it has to say itself: materials, and where lights are."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import pytest
 import torch
@@ -8,10 +8,7 @@ from pix2shape_models import made, room_source, tiny
 from refusals import refused
 from torch.utils.data import default_collate
 
-from baselines.pix2shape.batch import Relief
-from baselines.pix2shape.network.empty_rooms import empty_rooms
-from baselines.pix2shape.network.model import Material, Surfels, shaded
-from baselines.pix2shape.network.surfels import render
+from baselines.pix2shape.network.model import shaded
 from baselines.pix2shape.training.steps import draw, generator_step
 from scenegen.common.errors import SpecError
 
@@ -63,46 +60,3 @@ def test_inferred_lights_are_one_place_in_all_cameras(colourful):
     assert not torch.allclose(views.scene.light_position[0], views.scene.light_position[1])
     torch.testing.assert_close(world, model.decoder.light_positions(code))
     assert (model.decoder.light_positions(100 * code) >= 0).all(), "a light behind a wall"
-
-
-def test_a_material_is_shaded_in_place_of_what_is_told(colourful):
-    views = batch_of(colourful, tiny(material=True)).views
-    number, depth = torch.Generator().manual_seed(0), 1.2 + 0.1 * torch.rand(4, 32, 32)
-    albedo, k_s, exponent = torch.rand(4, 5, 32, 32, generator=number).split([3, 1, 1], dim=1)
-    material = Material(albedo, k_s[:, 0], 1 + 20 * exponent[:, 0])
-    shown = replace(
-        views.scene, reflectance=albedo, specular=k_s[:, 0], shininess=material.shininess
-    )
-    assert torch.equal(shaded(Surfels(depth, material=material), views), render(depth, shown))
-
-
-def test_where_matching_teaches_surfaces_images_do_not(colourful):
-    config = tiny(rays=True, matching=1.0, adversarial=0.0, code_reconstruction=0.0, **LEARNS)
-    batch, model = batch_of(colourful, config), made(config).train()
-    flat = torch.zeros(4, 1, 32, 32)
-    relief = Relief(flat, batch.views.world_from_camera[:, None])
-    noise = draw(4, config.networks.z, 0)
-    _, losses = generator_step(model, replace(batch, relief=relief), noise)
-    losses["reconstruction"].backward()
-    taught = model.decoder.last.weight.grad.abs().amax(dim=(0, 2, 3)) > 0
-    assert taught.tolist() == [False, True, True, True, True, True]
-
-
-def test_a_bounded_relief_can_rise_again(rooms_path):
-    """Where it means floor or wall the depth is exactly that, and has a slope all the same."""
-    config = tiny(rays=True, bounded=True)
-    batch, model = batch_of(rooms_path, config), made(config)
-    cameras, size = batch.views.cameras, config.networks.size
-    walls, _, _ = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, size)
-    for bias, low, high in ((-20.0, 0, 0), (0.0, 0.02, 0.6), (20.0, 0.5, 0.6)):
-        torch.nn.init.zeros_(model.decoder.last.weight)
-        torch.nn.init.constant_(model.decoder.last.bias, bias)
-        code = torch.zeros(len(walls), config.networks.z)
-        depth = model.surfels(code, batch.views.condition, cameras).depth
-        relief = (walls - depth).detach()
-        assert low <= float(relief.min()) <= float(relief.max()) <= high + 1e-6
-        model.decoder.last.bias.grad = None
-        depth.sum().backward()
-        assert bias == 20 or float(model.decoder.last.bias.grad) < 0, "higher is nearer"
-    with pytest.raises(SpecError):
-        tiny(bounded=True)

@@ -4,11 +4,9 @@ import math
 
 import pytest
 import torch
-from refusals import refused
 
 from baselines.pix2shape.network.architecture import NetworkSpec
-from baselines.pix2shape.network.polar import PolarEncoder, polar, standardised
-from scenegen.common.errors import SpecError
+from baselines.pix2shape.network.polar import PolarEncoder
 
 SPEC = NetworkSpec(
     size=32, width=0.02, z_scene=6, z_view=2, camera=False, spherical=True, encoder="polar"
@@ -25,34 +23,6 @@ def shapes(count=4):
     return image
 
 
-@pytest.mark.parametrize(("row", "column"), [(16, 28), (28, 16), (4, 15), (15, 4)])
-def test_a_pixel_lands_at_its_angle_and_radius(row, column):
-    """Angles go from the right downwards, and the radius ends at the middle of a side."""
-    image = torch.zeros(1, 1, 32, 32)
-    image[0, 0, row, column] = 1.0
-    found = polar(image)[0, 0]
-    assert found.shape == (32, 12)
-    angle, radius = divmod(int(found.argmax()), 12)
-    x, y = column + 0.5 - 16, row + 0.5 - 16
-    assert (radius + 0.5) / 12 * 16 == pytest.approx(math.hypot(x, y), abs=1.4)
-    off = (angle + 0.5) / 32 * 2 * math.pi - math.atan2(y, x)
-    assert math.cos(off) > math.cos(0.2)
-
-
-def test_a_shape_has_mean_0_and_variance_1_and_the_background_0():
-    polars = polar(shapes())
-    found = standardised(polars)
-    mask = found[:, 3:]
-    assert torch.equal(mask[:, 0].bool(), (polars < 0.99).any(dim=1))
-    assert not found[:, :3].masked_select(mask == 0).any()
-    weight = mask * (torch.arange(12) + 0.5)
-    total = weight.sum(dim=(2, 3))
-    assert (found[:, :3] * weight).sum(dim=(2, 3)) / total == pytest.approx(0, abs=1e-5)
-    assert (found[:, :3] ** 2 * weight).sum(dim=(2, 3)) / total == pytest.approx(1, abs=0.1)
-    darker = standardised(torch.where(mask > 0, 0.7 * polars, 1.0))
-    assert (darker - found).abs().max() < 0.1, "whatever the lights' strength"
-
-
 def test_a_turned_picture_has_the_same_scene_and_another_view():
     torch.manual_seed(0)
     encoder, nothing = PolarEncoder(SPEC).eval(), torch.empty(4, 0)
@@ -65,10 +35,3 @@ def test_a_turned_picture_has_the_same_scene_and_another_view():
     assert (turned[:, 6:] - code[:, 6:]).abs().max() > 1e-2
     assert (mirrored[:, :6] - code[:, :6]).abs().max() > 1e-2, "handedness is seen"
     assert code[:, :6].norm(dim=1) == pytest.approx(math.sqrt(6), rel=1e-5)
-
-
-def test_no_camera_is_told():
-    with refused(SpecError, "encoder"):
-        NetworkSpec(encoder="polar")
-    with refused(SpecError, "encoder", expected="one of paper, polar"):
-        NetworkSpec(encoder="resnet")

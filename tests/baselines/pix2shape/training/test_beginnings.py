@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import torch
-from pix2shape_models import state_of, stored, tiny
+from pix2shape_models import stored, tiny
 from refusals import refused
 
 from baselines.pix2shape.network.config import model_config
@@ -48,21 +47,6 @@ def test_what_does_not_go_together(data, how, where, truths, train_questions):
         new_run(TrainingFiles(path), tiny(size=64) if data == "large" else CONFIG, **how)
 
 
-def test_a_run_begins_from_the_networks_of_another(rooms_path, tmp_path):
-    """And from new ones, of its own seed, where none are given."""
-    start = untrained(tmp_path / "a.safetensors", rooms_path)
-    config = replace(CONFIG, seed=4, learning_rate=1e-9)
-    given, fresh = (
-        new_run(TrainingFiles(rooms_path), config, start=path)[0].network for path in (start, None)
-    )
-    expected = state_of(CONFIG).network
-    for name in ("encoder", "decoder"):
-        own = dict(getattr(given, name).named_parameters())
-        for key, value in getattr(expected, name).named_parameters():
-            assert torch.allclose(own[key], value, atol=1e-3, rtol=1e-3), key
-    assert not torch.allclose(fresh.encoder.layers[0].weight, expected.encoder.layers[0].weight)
-
-
 @pytest.mark.parametrize(
     ("change", "told"),
     [
@@ -97,22 +81,6 @@ def test_depth_maps_of_earlier_runs_are_not_forgotten(rooms_path, tmp_path):
         start = stored(tmp_path / f"{number}.safetensors", state.network, card)
     with refused(SpecError, "start"):
         new_run(TrainingFiles(rooms_path), CONFIG, start=start)
-
-
-def test_labels_of_earlier_runs_are_not_forgotten(train_questions, tmp_path):
-    start = None
-    for labels, earlier in ((2, 0), (1, 2), (0, 3)):
-        state, _ = new_run(TrainingFiles(train_questions), CONFIG, labels=labels, start=start)
-        card = state.card
-        assert (card.labels, card.earlier_labels) == (labels, earlier)
-        start = stored(tmp_path / f"{labels}.safetensors", state.network, card)
-
-
-def test_what_is_of_questions_alone_is_off_for_rooms(rooms_path):
-    more = {"contrast": 1.0, "question_batch": 8, "turned": True, "temperature": 0.5}
-    found = card_of(rooms_path, replace(CONFIG, **more)).settings
-    assert found == replace(CONFIG, mutual_information=0.0, questions=0.0)
-    assert found.method == "pix2shape"
 
 
 @pytest.mark.parametrize(

@@ -15,11 +15,9 @@ from PIL import Image
 from pix2shape_models import edited, room_source, tiny
 from refusals import refused
 from safetensors.torch import load_file
-from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from torch.utils.data import default_collate
 
 from baselines.pix2shape.network.config import LOSSES
-from baselines.pix2shape.network.model import Prior
 from baselines.pix2shape.training import run as module
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, load_weights
@@ -108,14 +106,6 @@ def test_what_a_run_leaves(rooms_path, unbroken):
         assert picture.size == (4 * 134 + 6, 6 * 134 + 6)
 
 
-def test_the_logs_tell_every_loss_and_picture(unbroken):
-    logs = EventAccumulator(str(unbroken / "logs")).Reload()
-    losses = {"distance", "penalty", "reconstruction", "adversarial", "code_reconstruction"}
-    assert set(logs.Tags()["scalars"]) == losses
-    assert [event.step for event in logs.Scalars("reconstruction")] == [4]
-    assert [event.step for event in logs.Images("pictures")] == [2, 4]
-
-
 def test_a_killed_run_goes_on_as_if_it_had_not_been(rooms_path, folder, unbroken):
     with pytest.raises(Killed):
         train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(3))
@@ -155,31 +145,6 @@ def test_a_finished_run_is_neither_trained_on_nor_replaced(rooms_path, folder, u
         train_run(folder, path, None, HERE)
 
 
-def test_classes_are_told(single_path, folder):
-    weights = train_run(folder, single_path, CONFIG, HERE, conditional=True)
-    model, card = load_weights(weights, METHOD)
-    assert card.classes == ("box", "sphere")
-    assert (model.config.networks.classes, model.config.networks.condition) == (2, 5)
-    again, how = folder.with_name("again"), {"conditional": True, "progress": killed_at(3)}
-    with pytest.raises(Killed):
-        train_run(again, single_path, CONFIG, HERE, **how)
-    assert same(train_run(again, single_path, None, HERE), weights)
-
-
-@pytest.mark.parametrize("labels", [0, 2])
-def test_questions_and_their_labels(train_questions, folder, labels):
-    seen: list[dict[str, float]] = []
-    config = replace(CONFIG, iterations=2)
-    how = {"labels": labels, "progress": lambda done, total, numbers: seen.append(numbers)}
-    weights = train_run(folder, train_questions, config, HERE, **how)
-    assert all(("questions" in numbers) == bool(labels) for numbers in seen)
-    assert all("mutual_information" in numbers for numbers in seen)
-    model, card = load_weights(weights, METHOD)
-    assert (card.labels, model.config.opacity) == (labels, True)
-    assert not model.config.networks.camera
-    assert same(train_run(folder, train_questions, None, HERE), weights), "with its own labels"
-
-
 @pytest.mark.parametrize("adversarial", [0.0, 1.0])
 def test_the_prior_is_that_of_codes_where_no_critic_ties_them(rooms_path, folder, adversarial):
     config = replace(CONFIG, adversarial=adversarial)
@@ -195,20 +160,6 @@ def test_the_prior_is_that_of_codes_where_no_critic_ties_them(rooms_path, folder
     spread, covariance = float(codes.std()), prior.factor @ prior.factor.T
     torch.testing.assert_close(prior.mean, codes.mean(dim=0), atol=0.02 * spread, rtol=0)
     torch.testing.assert_close(covariance, codes.T.cov(), atol=0.05 * spread**2, rtol=0)
-
-
-def test_each_class_has_the_mean_of_its_codes():
-    """Classes with other means, one covariance; a class that is not seen has the mean of all."""
-    number = torch.Generator().manual_seed(0)
-    codes, told = torch.randn(3000, 4, generator=number), torch.eye(3)[torch.arange(3000) % 2]
-    codes[::2] += 5
-    prior, condition = Prior(4, 3), torch.cat([torch.rand(3000, 3), told], dim=1)
-    prior.fit(codes, condition)
-    found = prior(torch.randn(3000, 4, generator=number), condition)
-    for one in (codes, found):
-        torch.testing.assert_close(one[::2].mean(dim=0), torch.full((4,), 5.0), atol=0.1, rtol=0)
-        torch.testing.assert_close(one[1::2].T.cov(), torch.eye(4), atol=0.15, rtol=0)
-    torch.testing.assert_close(prior.mean[2], codes.mean(dim=0))
 
 
 @pytest.mark.parametrize("config", [CONFIG, None], ids=["new", "resumed"])
@@ -228,16 +179,6 @@ def test_a_run_that_ended_meanwhile_is_kept(config, rooms_path, folder, monkeypa
     with refused(SceneGenError, str(folder), hint="--resume"):
         train_run(folder, rooms_path, config, HERE)
     assert load_checkpoint(folder, METHOD).card.iteration == 4
-
-
-@pytest.mark.parametrize("name", ["pictures.png", "weights.safetensors"])
-def test_a_folder_in_the_place_of_a_file_is_refused_before_training(name, rooms_path, folder):
-    (folder / name).mkdir(parents=True)
-    done: list[Any] = []
-    with pytest.raises(OSError) as error:
-        train_run(folder, rooms_path, CONFIG, HERE, progress=lambda *now: done.append(now))
-    assert error.value.filename == str(folder / name)
-    assert done == []
 
 
 OFF = dict.fromkeys(LOSSES, 0.0)
@@ -261,13 +202,3 @@ def test_a_run_of_rays_learns_from_matching_alone(near_path, folder, tmp_path):
     other = tmp_path / "other"
     train_run(other, blind, RAYS, HERE)
     assert same(folder / "weights.safetensors", other / "weights.safetensors")
-
-
-def test_rays_refuse_uneven_views_before_the_search(near_path, folder, tmp_path):
-    uneven = tmp_path / "uneven.h5"
-    shutil.copy(near_path, uneven)
-    with h5py.File(uneven, "r+") as file:
-        file["view_angle_degrees"][5] = 60
-    with refused(SpecError, str(uneven)):
-        train_run(folder, uneven, RAYS, HERE)
-    assert not folder.exists()

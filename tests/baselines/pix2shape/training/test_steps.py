@@ -1,13 +1,12 @@
 """One step: the losses that are asked for, their weighted sum, and gradients where they belong."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import pytest
 import torch
 
-from baselines.pix2shape.batch import Batch, Relief
+from baselines.pix2shape.batch import Batch
 from baselines.pix2shape.network.architecture import NetworkSpec
 from baselines.pix2shape.network.config import LOSSES, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape, Views
@@ -82,21 +81,6 @@ def test_the_critics_step_teaches_critic_and_statistics_alone(weights, learn):
     assert set(numbers) == ({"distance", "penalty"} if "adversarial" in weights else set())
 
 
-def test_the_critics_total_is_penalty_less_distance_less_information():
-    """So that its step raises the other two, which the generator's step lowers."""
-    batch, noise = some_batch(), draw(8, 8, 3)
-    model = model_of(only(adversarial=1.0, mutual_information=0.1))
-    total, numbers = critic_step(model, batch, noise)
-    code = model.encode(batch.image, batch.views)
-    halves = code[:, :6], code[:, 6:]
-    information = functions.mutual_information(model.statistics, *halves, noise.order)
-    expected = numbers["penalty"] - numbers["distance"] - information
-    assert total.item() == pytest.approx(expected.item(), rel=1e-5)
-    losses = generator_step(model, batch, noise)[1]
-    assert losses["adversarial"].item() == pytest.approx(numbers["distance"].item(), rel=1e-5)
-    assert losses["mutual_information"].item() == pytest.approx(information.item(), rel=1e-5)
-
-
 def test_depth_supervision_ignores_what_is_not_known():
     model, batch = model_of(only(depth=1.0)), some_batch()
     batch.depth[0, :5] = math.nan
@@ -129,91 +113,3 @@ def test_questions_teach_the_scenes_part_of_the_code():
     codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
     expected = functions.question_loss(codes, answers).item()
     assert losses["questions"].item() == pytest.approx(expected)
-
-
-def test_questions_of_unknown_answers_are_contrasted_alone():
-    model = model_of(only(questions=1.0, contrast=1.0))
-    images, _ = labelled()
-    codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
-    for answers in ([-1, -1], [-1, 1], [2, 0]):
-        told = torch.tensor(answers)
-        losses = generator_step(model, some_batch(), draw(8, 8, 3), (images, told))[1]
-        expected = functions.contrast_loss(codes, told).item()
-        assert losses["contrast"].item() == pytest.approx(expected)
-        known = told >= 0
-        assert ("questions" in losses) == bool(known.any())
-        if known.any():
-            expected = functions.question_loss(codes[known], told[known]).item()
-            assert losses["questions"].item() == pytest.approx(expected)
-
-
-def test_contrast_has_the_configurations_temperature_and_negatives():
-    config = replace(only(contrast=1.0), temperature=0.7, hard_negatives=0.3, easy_negatives=0.4)
-    model, (images, answers) = model_of(config), labelled()
-    codes = model.encode(images.image, images.views)[:, :6].view(2, 4, 6)
-    found = generator_step(model, some_batch(), draw(8, 8, 3), (images, answers))[1]["contrast"]
-    expected = functions.contrast_loss(codes, answers, 0.7, 0.3, 0.4).item()
-    assert found.item() == pytest.approx(expected)
-    assert expected != pytest.approx(functions.contrast_loss(codes, answers).item(), rel=1e-2)
-
-
-def facing_the_origin(place: Any) -> Any:
-    """Return cameras at places (B, 3), upright, that look at the origin: world_from_camera."""
-    back = torch.nn.functional.normalize(place, dim=1)
-    right = torch.linalg.cross(torch.tensor([[0.0, 0.0, 1.0]]).expand_as(back), back)
-    right = torch.nn.functional.normalize(right, dim=1)
-    pose = torch.eye(4).repeat(len(place), 1, 1)
-    pose[:, :3] = torch.stack([right, torch.linalg.cross(back, right), back, place], dim=2)
-    return pose
-
-
-def test_matching_compares_relief_in_one_view_of_each_scene():
-    networks = NetworkSpec(size=32, width=0.05, z_scene=3, rays=True)
-    model = model_of(replace(only(), networks=networks, matching=1.0))
-    batch, noise = some_batch(), draw(8, 3, 3)
-    place = 0.5 + batch.views.condition
-    poses = facing_the_origin(place)[:, None].repeat(1, 2, 1, 1)
-    poses[:, 1, 0, 3] += 0.1
-    found = torch.rand(8, 2, 32, 32)
-    views = replace(batch.views, world_from_camera=poses[:, 0])
-    batch = replace(batch, views=views, relief=Relief(found, poses))
-    total, losses = generator_step(model, batch, noise)
-    drawn = (noise.share >= 0.5).long()
-    assert 0 < drawn.sum() < 8, "either view is drawn for some"
-    code = model.encode(batch.image, views)
-    each = torch.arange(8)
-    said = model.relief(code, poses[each, drawn, :3, 3])
-    expected = (said - found[each, drawn]).abs().mean()
-    assert losses["matching"].item() == pytest.approx(expected.item(), rel=1e-5)
-    total.backward()
-    assert model.encoder.layers[0].weight.grad.any()
-
-
-@pytest.mark.parametrize(
-    ("absolute", "loss"), [(0, functions.reconstruction_loss), (1, functions.absolute_loss)]
-)
-def test_images_are_compared_by_the_norm_or_by_absolute_differences(absolute, loss):
-    batch = some_batch()
-    model = model_of(replace(only(reconstruction=1.0), absolute_differences=bool(absolute)))
-    found = generator_step(model, batch, draw(8, 8, 3))[1]["reconstruction"]
-    again = model.image(model.encode(batch.image, batch.views), batch.views)
-    assert found.item() == pytest.approx(loss(batch.image, again).item(), rel=1e-5)
-
-
-def test_noise_is_the_seeds():
-    state = torch.get_rng_state()
-    one, again, other = draw(9, 4, 7, 5, 3), draw(9, 4, 7, 5, 3), draw(9, 4, 8, 5, 3)
-    assert torch.equal(torch.get_rng_state(), state), "no other random numbers are touched"
-    assert (one.code.shape, one.share.shape) == ((9, 4), (9,))
-    assert sorted(one.order.tolist()) == list(range(9))
-    assert 0 <= one.share.min() <= one.share.max() <= 1
-    assert 0 <= one.turn.min() < one.turn.max() <= 2 * math.pi
-    by_question = one.mirror.view(5, 3)
-    assert torch.equal(by_question.all(dim=1), by_question.any(dim=1)), "a question's, or none"
-    assert by_question.any()
-    assert not by_question.all()
-    for name in ("code", "share", "order"):  # the same, whatever is compared
-        assert torch.equal(getattr(one, name), getattr(draw(9, 4, 7), name))
-    for name in ("code", "share", "order", "turn", "mirror"):
-        assert torch.equal(getattr(one, name), getattr(again, name))
-        assert not torch.equal(getattr(one, name), getattr(other, name))

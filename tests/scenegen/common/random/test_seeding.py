@@ -31,20 +31,6 @@ def test_neighbouring_streams_share_no_number() -> None:
     assert len(np.unique(np.concatenate(streams))) == len(streams) * LENGTH
 
 
-def test_no_stream_is_a_shifted_copy_of_another() -> None:
-    long = item_rng(0, 0, Purpose.CAMERA).random(50 * LENGTH)
-    for seed, index, purpose, attempt in ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)):
-        other = item_rng(seed, index, Purpose(purpose), attempt).random(LENGTH)
-        assert not np.isin(other, long).any()
-
-
-@pytest.mark.parametrize("key", [(-1, 0, 0), (0, -1, 0), (0, 0, -1)])
-def test_negative_keys_are_refused(key: tuple[int, int, int]) -> None:
-    seed, index, attempt = key
-    with pytest.raises(ValueError, match="non-negative"):
-        item_rng(seed, index, Purpose.CAMERA, attempt)
-
-
 KEYS = list(itertools.product((0, 1, 2**32, 2**63), Purpose, (0, 1, 2**24 - 1), (0, 1000, 2**32)))
 
 

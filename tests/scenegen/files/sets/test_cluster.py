@@ -3,16 +3,12 @@
 import json
 import os
 import signal
-import subprocess
-import sys
 from dataclasses import replace
 from functools import partial
-from pathlib import Path
 
 import pytest
-from audit_tables import audited
 from click.testing import CliRunner
-from cluster_tasks import crash, fail, shared, slow_square, version_by_process
+from cluster_tasks import crash, shared, slow_square, version_by_process
 
 import cli
 from iqtt.files.make import make_split
@@ -60,15 +56,6 @@ def test_rooms_and_questions_are_those_of_one_process(cluster, make_rooms, tmp_p
     assert contents(tmp_path / "many" / "split") == contents(tmp_path / "one" / "split")
 
 
-@pytest.mark.slow
-def test_whole_files_and_audits_are_those_of_one_process(cluster, tmp_path):
-    make_split(tmp_path / "one", SPLIT)
-    make_split(tmp_path / "many", SPLIT, cluster=cluster)
-    assert contents(tmp_path / "many") == contents(tmp_path / "one")
-    records = [audited([tmp_path / "one"], cluster=how).record() for how in (cluster, None)]
-    assert json.dumps(records[0]) == json.dumps(records[1])
-
-
 def test_tasks_of_workers_that_die_go_to_others(plain, tmp_path):
     """One of two is killed in the midst of it."""
     squares = plain.results(partial(slow_square, tmp_path), range(12))
@@ -84,12 +71,6 @@ def test_a_crash_is_tried_again_and_named(plain, tmp_path):
         list(plain.results(partial(crash, tmp_path, True), range(5), "part {}".format))
     assert lost.value.where.startswith("part 3:")
     assert lost.value.found == "signal 11, SIGSEGV"
-
-
-def test_errors_of_workers_are_raised_here(plain):
-    with pytest.raises(SceneGenError) as raised:
-        list(plain.results(fail, range(3)))
-    assert raised.value.found == "a task that fails"
 
 
 def test_workers_with_other_versions_are_refused(cluster):
@@ -133,25 +114,6 @@ def test_no_scheduler_is_one_line(monkeypatch, address):
     result = CliRunner().invoke(cli.scenegen, words)
     assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
     assert address in result.stderr
-
-
-PLAIN = """
-print("once")
-from scenegen.files.sets.cluster import LOCAL, connected
-with connected(LOCAL, 2, dict) as cluster:
-    print(list(cluster.results(abs, [-1, 2, -3])))
-"""
-
-
-@pytest.mark.slow
-def test_a_plain_script_needs_no_guard(tmp_path):
-    (tmp_path / "plain.py").write_text(PLAIN)
-    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[4])}
-    done = subprocess.run(
-        [sys.executable, "plain.py"], cwd=tmp_path, env=environment, timeout=120,
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert (done.stdout, done.stderr) == ("once\n[1, 2, 3]\n", "")
 
 
 def test_scores_are_those_of_one_process(cluster, make_rooms, tmp_path):

@@ -13,11 +13,10 @@ import h5py
 import pytest
 from made_sets import SEED, contents, everything, questions, rooms, same_values
 
-from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.pool import LostWorkerError
 from scenegen.files.sets.making import complete_parts, parts_folder
 from scenegen.files.sets.shards import ROW_DIGESTS
-from scenegen.files.sets.workspace import run_lock
 from scenegen.rooms.render import RoomsWork
 
 TASKS = {
@@ -214,24 +213,6 @@ def test_files_of_others_are_kept(task, tmp_path):
                 make(folder)
         assert sorted(path.name for path in folder.iterdir()) == sorted([name, "notes"])
         assert (folder / name).read_text() == "mine"
-
-
-@BOTH
-def test_two_runs_never_make_one_set(task, tmp_path):
-    folder = tmp_path / "set"
-    folder.mkdir()
-    first = folder / task.files[0]
-    with run_lock(folder / f".{first.name}.lock", first), pytest.raises(SceneGenError):
-        task.shards(folder)
-    assert list(folder.iterdir()) == []
-
-
-@BOTH
-@pytest.mark.parametrize("options", [{"compression": "zip"}, {"shard_size": 0}], ids=str)
-def test_bad_settings_leave_nothing(task, tmp_path, options):
-    with pytest.raises(SpecError):
-        task.shards(tmp_path / "set", **options)
-    assert not list(tmp_path.rglob("*.*"))
 
 
 @BOTH

@@ -2,7 +2,6 @@
 
 import errno
 import functools
-import math
 import os
 import signal
 import subprocess
@@ -17,7 +16,7 @@ import pytest
 from scenegen.common.errors import SceneGenError
 from scenegen.files import pool
 from scenegen.files.pool import LostWorkerError
-from scenegen.files.sets.workers import in_order, in_processes, in_threads
+from scenegen.files.sets.workers import in_processes
 
 BUSY = """
 import sys, time
@@ -61,38 +60,6 @@ def test_ctrl_c_is_left_to_the_process_that_started_them():
     process = start(1)
     os.killpg(process.pid, signal.SIGINT)
     assert process.communicate(timeout=20) == ("stopped\n", "")
-
-
-def test_results_come_in_order_from_both_kinds_of_workers():
-    tasks = [9, 1, 5, 3, 7, 2]
-    assert list(in_threads(abs, tasks, 3, 2)) == tasks
-    assert list(in_processes(abs, iter(tasks), 2)) == tasks
-
-
-def _counted(task):
-    yield from range(task)
-    return task
-
-
-@pytest.mark.parametrize("workers", [1, 2])
-def test_what_a_generator_yields_and_returns_comes_in_order(workers):
-    ends = []
-    assert list(in_order(_counted, [2, 0, 3], workers, ends.append)) == [0, 1, 0, 1, 2]
-    assert ends == [2, 0, 3]
-
-
-@pytest.mark.parametrize("run", [in_processes, functools.partial(in_threads, ahead=1)])
-def test_errors_are_those_of_the_function(run):
-    with pytest.raises(ValueError, match="domain"):
-        list(run(math.sqrt, [4.0, -1.0, 9.0], count=2))
-
-
-def test_few_tasks_are_begun_ahead():
-    begun = []
-    results = in_threads(abs, (begun.append(i) or i for i in range(100)), 2, 5)
-    assert next(results) == 0
-    assert len(begun) <= 7
-    results.close()
 
 
 def test_warnings_of_a_process_are_given_here():
@@ -204,19 +171,6 @@ def test_a_pool_goes_on_after_a_process_ended():
 def _strange_end(task):
     if task:
         os._exit(0)
-
-
-def _threads(_task):
-    import numpy  # noqa: F401
-    import scipy.linalg  # noqa: F401
-    from threadpoolctl import threadpool_info
-
-    return [library["num_threads"] for library in threadpool_info()]
-
-
-def test_libraries_of_a_process_use_one_thread():
-    found = next(in_processes(_threads, [0], 1))
-    assert set(found) == {1}
 
 
 SCRIPT = """

@@ -205,16 +205,6 @@ def test_a_cleaner_between_making_and_locking(tmp_path, monkeypatch, moment):
     assert (tmp_path / "next.txt").read_text() == "mine"
 
 
-def test_a_disk_without_room_for_a_workspace(tmp_path, monkeypatch):
-    def refuses(path: Path, *_: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))
-
-    monkeypatch.setattr(Path, "mkdir", refuses)
-    with pytest.raises(OSError, match="No space left") as error:
-        write_text(tmp_path / "next.txt", "mine")
-    assert (error.value.filename, error.value.errno) == (str(tmp_path / "next.txt"), errno.ENOSPC)
-
-
 @pytest.mark.parametrize(
     ("said", "number"),
     [

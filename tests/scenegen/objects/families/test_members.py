@@ -4,8 +4,6 @@ import hashlib
 
 import numpy as np
 import pytest
-from embreex import rtcore_scene
-from embreex.mesh_construction import TriangleMesh
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from shape_checks import DOWN, check_body, check_centred, check_size, support, unit_vectors
@@ -28,13 +26,11 @@ DIGESTS = {
     "mug": "fcf53df21b766e59",
     "table": "9a86c4af2fd566fb",
 }
-PIXELS = 28  # of a small view's side: objects are 40 to 60 wide in pictures of 128
 DIRECTIONS = np.concatenate([unit_vectors(300), np.eye(3), -np.eye(3)])
-VIEWS = ((35.0, 25.0), (215.0, 50.0))  # azimuth and elevation, degrees
 
 
-def spread(family, step=74):
-    return (member_shape(family, member) for member in range(0, MEMBERS, step))
+def spread(family):
+    return (member_shape(family, member) for member in (4, 10, 24, *range(0, MEMBERS, 74)))
 
 
 def welded(shape):
@@ -120,12 +116,6 @@ def test_members_look_as_they_did(family):
     assert code.hexdigest()[:16] == DIGESTS[family]
 
 
-def test_a_member_is_named_and_built_once():
-    shape = member_shape("mug", 7)
-    assert shape.name == "mug/0007"
-    assert member_shape("mug", 7) is shape
-
-
 @pytest.mark.parametrize(
     ("family", "member", "where", "found"),
     [("tray", 0, "family", "'tray'"), ("mug", MEMBERS, "mug", "1000"), ("mug", -1, "mug", "-1")],
@@ -136,49 +126,3 @@ def test_unknown_members_are_refused(family, member, where, found):
     assert error.value.where == where
     assert found in error.value.found
     assert error.value.expected
-
-
-def view_rays():
-    """Parallel rays through the pixels of all views, float32."""
-    steps = (np.arange(PIXELS) + 0.5) / PIXELS * 2 - 1
-    x, y = (v.reshape(-1, 1) for v in np.meshgrid(steps, -steps))
-    origins, directions = [], []
-    for angles in VIEWS:
-        azimuth, elevation = np.radians(angles)
-        flat = np.cos(elevation)
-        ahead = -np.array([np.sin(azimuth) * flat, np.sin(elevation), np.cos(azimuth) * flat])
-        right = np.cross(ahead, [0.0, 1.0, 0.0]) / flat
-        origins.append(x * right + y * np.cross(right, ahead) - 2 * ahead)
-        directions.append(np.broadcast_to(ahead, (PIXELS**2, 3)))
-    return np.concatenate(origins, dtype=np.float32), np.concatenate(directions, dtype=np.float32)
-
-
-def least_difference(family, step):
-    """Return least and median share of pixels in which members differ from their most similar one.
-
-    Pixels are those that either covers in small depth images; depths differ by over 0.03.
-    """
-    origins, directions = view_rays()
-    images = []
-    for shape in spread(family, step):
-        scene = rtcore_scene.EmbreeScene()
-        TriangleMesh(scene, shape.triangles.astype(np.float32))
-        depth = scene.run(origins, directions, query="DISTANCE")
-        images.append(np.where(depth < 4.0, depth, 9.0).astype(np.float32))
-    every = np.array(images)
-    likest = []
-    for i, image in enumerate(every):
-        differs = np.count_nonzero(abs(every - image) > 0.03, axis=1)
-        covered = np.count_nonzero((every < 9.0) | (image < 9.0), axis=1)
-        likest.append(np.delete(differs / covered, i).min())
-    return min(likest), float(np.median(likest))
-
-
-@pytest.mark.parametrize(
-    ("step", "typical"), [(25, 0.25), pytest.param(1, 0.2, marks=pytest.mark.slow)]
-)
-@FAMILIES
-def test_members_are_visibly_different(family, step, typical):
-    least, median = least_difference(family, step)
-    assert least > 0.01
-    assert median > typical

@@ -8,10 +8,7 @@ import pytest
 from scenegen.objects.families.parts.assembly import assemble
 from scenegen.objects.families.parts.boxes import box, boxes
 from scenegen.objects.families.parts.moves import buried, moved, turn_about_x, turn_about_z
-from scenegen.objects.families.parts.profiles import (
-    arc,
-    line,
-)
+from scenegen.objects.families.parts.profiles import arc, line
 from scenegen.objects.families.parts.surfaces import loft
 from scenegen.objects.families.parts.sweeps import tube
 from scenegen.objects.families.parts.walls import hollow, ring, shell

@@ -1,16 +1,14 @@
 """Members from the store are those that `make_member` makes, and each is made once."""
 
-from pathlib import Path
 from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from scenegen.common.errors import SpecError
 from scenegen.objects.cast_meshes import cast_mesh
 from scenegen.objects.families import store
 from scenegen.objects.families.members import make_member
-from scenegen.objects.families.store import MemberStore, code_version
+from scenegen.objects.families.store import MemberStore
 
 MUG = ("mug", 7)
 
@@ -45,45 +43,3 @@ def test_a_member_is_made_once_and_comes_back_as_it_was(tmp_path, made):
     path.write_bytes(path.read_bytes()[:-30])
     check(MemberStore(tmp_path))
     assert made.call_count == 2
-
-
-def test_without_a_folder_only_the_last_meshes_are_kept(made, monkeypatch):
-    monkeypatch.setattr(store, "MOST_KEPT", 1)
-    members = MemberStore()
-    check(members)
-    assert made.call_count == 1, "the outline has the mesh made"
-    members.mesh("bowl", 1)
-    members.mesh(*MUG)
-    assert made.call_count == 3
-
-
-@pytest.mark.parametrize("member", [("spoon", 1), ("mug", -1), ("mug", 1000), ("../mug", 1)])
-def test_unknown_members_are_refused(member, tmp_path):
-    for ask in (MemberStore(tmp_path).outline, MemberStore(tmp_path).mesh):
-        with pytest.raises(SpecError):
-            ask(*member)
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_other_code_has_entries_of_its_own(tmp_path, made, monkeypatch):
-    MemberStore(tmp_path).mesh(*MUG)
-    monkeypatch.setattr(np, "__version__", "0.0")
-    code_version.cache_clear()
-    try:
-        MemberStore(tmp_path).mesh(*MUG)
-    finally:
-        code_version.cache_clear()
-    assert made.call_count == 2
-    assert len(list(tmp_path.iterdir())) == 2
-
-
-def test_the_version_depends_on_all_that_makes_members(monkeypatch):
-    read, seen = Path.read_bytes, list[str]()
-
-    def noted(path):
-        seen.append(path.name)
-        return read(path)
-
-    monkeypatch.setattr(Path, "read_bytes", noted)
-    code_version.__wrapped__()
-    assert {"vessels.py", "members.py", "sweeps.py", "solids.py", "cast_meshes.py"} < set(seen)

@@ -6,16 +6,14 @@ import trimesh
 from embreex import rtcore_scene
 from embreex.mesh_construction import TriangleMesh
 
-from scenegen.common.errors import SpecError
 from scenegen.description.names import FAMILY_NAMES
 from scenegen.objects.families.members import member_shape
 from scenegen.objects.furniture.furnishing import CLEAR, FAMILIES_FACTS, WHOLE, furnishing, supports
 from scenegen.objects.furniture.unwrapping import stretches
-from scenegen.objects.meshes.listing import object_split
 
 FAMILIES = pytest.mark.parametrize("family", FAMILIES_FACTS)
 NEW = pytest.mark.parametrize("family", [f for f in FAMILIES_FACTS if f not in FAMILY_NAMES])
-NUMBERS = (0, 1, 2, 3, 500, 999)
+NUMBERS = (0, 1, 2, 3, 4, 6, 13, 500, 999)
 
 
 def things(family, numbers=NUMBERS):
@@ -102,41 +100,6 @@ def test_supports_lie_on_the_surface_and_are_free(family):
     assert bool(found) == (facts.surfaces or facts.seats)
 
 
-@pytest.mark.parametrize("family", ["table", "desk", "coffee_table", "nightstand"])
-def test_tops_support_things(family):
-    for thing in things(family, range(20)):
-        top = thing.vertices[:, 1].max()
-        assert any(abs(y - top) < 0.01 for y, *_ in supports(thing))
-
-
-def test_shelves_have_a_support_on_every_board():
-    thing = next(t for t in things("shelf", range(30)) if t.vertices[:, 1].max() > 1.5)
-    heights = sorted({round(y, 3) for y, *_ in supports(thing)})
-    assert len(heights) >= 4
-    assert (np.diff(heights) > 0.2).all()
-
-
-@FAMILIES
-def test_test_members_are_not_training_members(family):
-    by_split = {}
-    for number in range(60):
-        by_split.setdefault(object_split(f"{family}/{number:04d}"), []).append(number)
-    assert len(by_split["train"]) > 2
-    assert len(by_split["test"]) > 2
-    train, test = (
-        {member_shape(family, n).mesh.vertices.round(6).tobytes() for n in by_split[split][:8]}
-        for split in ("train", "test")
-    )
-    assert len(train) + len(test) == len(train | test)
-
-
-def test_a_member_is_the_same_again():
-    first, second = furnishing("sofa", 7), furnishing("sofa", 7)
-    assert first.materials == second.materials
-    for name in ("vertices", "faces", "corner_uv", "corner_normals", "part", "patch"):
-        np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
-
-
 @NEW
 def test_the_body_for_placing_contains_the_shape(family):
     for number in NUMBERS[:3]:
@@ -148,15 +111,3 @@ def test_the_body_for_placing_contains_the_shape(family):
         body = (shape.hull_points @ directions.T + np.outer(shape.hull_discs, flat)).max(axis=0)
         assert (body > reach - 1e-6).all()
         assert (body < reach + 0.03).all()
-
-
-def test_the_default_families_are_the_nine():
-    assert tuple(sorted(FAMILY_NAMES)) == FAMILY_NAMES
-    assert len(FAMILY_NAMES) == 9
-    assert len(FAMILIES_FACTS) >= 24
-
-
-def test_unknown_furniture_is_refused():
-    with pytest.raises(SpecError) as error:
-        furnishing("throne", 0)
-    assert error.value.where == "family"

@@ -21,7 +21,7 @@ from scenegen.objects.families.members import MEMBERS
 from scenegen.objects.furniture.furnishing import CLAMP, MIRROR, REPEAT, furnishing
 from scenegen.objects.furniture.shapes import piece
 from scenegen.objects.meshes import limits, materials, textures
-from scenegen.objects.meshes.as_furniture import family_like, mesh_furniture
+from scenegen.objects.meshes.as_furniture import mesh_furniture
 from scenegen.objects.meshes.colors import corner_colors
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFile, ModelFolder
@@ -182,11 +182,6 @@ def test_things_stand_on_meshes_of_tables_however_they_are_wound(tmp_path, wound
     assert (x1 - x0) * (z1 - z0) > 0.85 * 4 * found.half[0] * found.half[1]
 
 
-def test_classes_stand_in_the_places_of_families():
-    names = {"Sofa": "sofa", "coffee-table": "coffee_table", "pillow": "cushion", "gun": "object"}
-    assert {name: family_like(name) for name in names} == names
-
-
 @pytest.fixture
 def own(tmp_path):
     """A folder with a textured chair, tables, and things of an unknown class, some broken."""
@@ -248,38 +243,6 @@ def test_faces_that_cleaning_drops_move_no_picture(tmp_path, line):
     np.testing.assert_allclose(found.uv, usual.uv, atol=1e-6)
 
 
-@pytest.mark.parametrize("places", ["nan nan", "inf 0", "1e300 -1e300"])
-def test_texture_coordinates_are_finite(tmp_path, places):
-    path = quad(tmp_path / "models")
-    path.write_text(path.read_text().replace("vt 1 1", f"vt {places}"))
-    thing = mesh_furniture(store_of(path), "thing/a").furnished.thing
-    assert np.isfinite(thing.corner_uv).all()
-
-
-def test_faces_of_polygons_cut_otherwise_keep_their_colours(tmp_path):
-    count, rng = 30, np.random.default_rng(1)
-    angle, radius = 2 * np.pi * np.arange(count) / count, rng.uniform(0.3, 1.0, count)
-    points = np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1)
-    ring = list(range(1, count + 1))
-    lines = [f"v {x} {y} {z}" for y in (0, 0.03) for x, z in points]
-    for color, faces in (
-        ("r", [[count + i for i in ring]]),
-        ("g", [ring]),
-        ("b", [[i, i % count + 1, count + i % count + 1, count + i] for i in ring]),
-    ):
-        lines += [f"usemtl {color}", *(f"f {' '.join(map(str, face))}" for face in faces)]
-    (tmp_path / "a.mtl").write_text("newmtl r\nKd 1 0 0\nnewmtl g\nKd 0 1 0\nnewmtl b\nKd 0 0 1\n")
-    (tmp_path / "a.obj").write_text("\n".join(["mtllib a.mtl", *lines]))
-    store = store_of(tmp_path / "a.obj")
-    paint, mesh = store.paint("thing/a"), store.shape("thing/a").mesh
-    heights = mesh.vertices[mesh.faces][..., 1]
-    sides = np.ptp(heights, axis=1) > 1e-6
-    expected = np.where(sides, 2, np.where(heights[:, 0] > 0, 0, 1))
-    palette = paint.textures[0].color[0]
-    shown_colors = palette[(paint.uv[:, 0, 0] * len(palette)).astype(int)]
-    np.testing.assert_array_equal(shown_colors.argmax(axis=1), expected)
-
-
 def test_pictures_of_16_bits_and_options_of_materials(tmp_path):
     path = quad(tmp_path / "models", material="map_Kd -s 2 2 1 -o 0.5 0 0")
     place = path.with_name("picture.png")
@@ -289,18 +252,6 @@ def test_pictures_of_16_bits_and_options_of_materials(tmp_path):
                                [0, 128, 200, 255], atol=1e-3)  # fmt: skip
     uv = store_of(path).paint("thing/a").uv
     np.testing.assert_allclose(np.ptp(uv, axis=1), 2)
-
-
-def test_files_that_are_lacking_are_told_once(tmp_path):
-    path = quad(tmp_path / "models")
-    path.with_name("picture.png").write_text("no picture")
-    with pytest.warns(UserWarning, match="picture.png") as told:
-        paint = store_of(path).paint("thing/a")
-    assert len(told) == 1
-    assert paint.textures[0].color.tolist() == [[[1.0, 1.0, 1.0]]]
-    path.with_name("a.mtl").unlink()
-    with pytest.warns(UserWarning, match="a.mtl"):
-        assert store_of(path).paint("thing/a") is None
 
 
 def rewritten(data, change):

@@ -6,7 +6,6 @@ import trimesh
 from PIL import Image
 
 from scenegen import DatasetSpec, open_rooms
-from scenegen.common.errors import SpecError
 from scenegen.objects.meshes.colors import corner_colors
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.sources import object_source
@@ -126,11 +125,3 @@ def test_colours_are_blended_between_the_corners(tmp_path):
             on = room.object_id > 0
             place = room.truth["object_coordinates"][on] * radius / extents
             np.testing.assert_allclose(room.truth["albedo"][on], 0.8 * (place + 0.5), atol=1e-4)
-
-
-def test_refused_where_there_are_no_files():
-    folder = {"source": "folder", "shapes": ("box",)}
-    for settings in ({}, {**folder, "shading": "path"}, {**folder, "random_reflectance": True}):
-        with pytest.raises(SpecError) as error:
-            DatasetSpec(own_reflectance=True, **settings)
-        assert error.value.where == "own reflectance"

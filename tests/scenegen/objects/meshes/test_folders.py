@@ -3,8 +3,6 @@
 import hashlib
 import json
 import pickle
-from collections.abc import Callable
-from pathlib import Path
 from unittest.mock import Mock
 
 import pytest
@@ -15,7 +13,6 @@ from scenegen.objects.meshes.listing import ModelFile, object_split
 from scenegen.objects.meshes.shapenet import open_shapenet
 from scenegen.objects.sources import folder_notes
 
-Make = Callable[..., Path]
 INSIDE = {1: "model.obj", 2: "models/model_normalized.obj"}
 MUG, BOWL, PLANE = "03797390", "02880940", "02691156"
 
@@ -92,13 +89,6 @@ def test_names_from_the_taxonomy(shapenet, taxonomy):
     assert refused.value.expected == "JSON"
 
 
-def test_one_name_for_two_synsets(make):
-    root = make(f"{PLANE}/a/model.obj", "01234567/a/model.obj")
-    taxonomy = [{"synsetId": s, "name": "a/b  c,x"} for s in (PLANE, "01234567")]
-    (root / "taxonomy.json").write_text(json.dumps(taxonomy))
-    assert open_shapenet(root).classes == ("a b c", f"a b c {PLANE}")
-
-
 def test_splits_by_hash():
     """70, 10 and 20 percent, by a rule that must never change."""
     for model_id in ("a", "caf\u00e9", "1a2b3c", ""):
@@ -172,14 +162,6 @@ def test_names_that_are_not_utf8_can_be_stored(make):
     assert found.models["mug"][1].path.exists()
     assert found.digest()
     assert open_objects(root, split=object_split("caf\\xe9")).models["mug"]
-
-
-def test_a_copy_in_another_format_moves_no_object_to_another_split(make):
-    root = make(*(f"c/{i}.obj" for i in range(20)))
-    before = {name: names_of(open_objects(root, split=name)) for name in ("train", "test")}
-    make(*(f"c/{i}.{suffix}" for i in range(20) for suffix in ("stl", "PLY")))
-    assert before == {name: names_of(open_objects(root, split=name)) for name in before}
-    assert len(open_objects(root).unused) == 40
 
 
 def test_the_digest_is_of_names_not_of_paths(shapenet, make):

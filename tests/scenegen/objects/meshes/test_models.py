@@ -58,20 +58,6 @@ def test_what_a_model_was_made_from_is_in_its_key(ball, disk, cleaned, monkeypat
     assert content_hash(b"", ".obj", "y") != content_hash(b"", ".off", "y")
 
 
-def test_refusals_are_kept_with_their_reasons(tmp_path, disk, cleaned):
-    bad = tmp_path / "bad.obj"
-    bad.write_text("v 0 0 0\n")
-    reasons = set()
-    for _ in range(3):
-        with pytest.raises(BadMeshError) as refused:
-            load_model(bad, "y", disk)
-        reasons.add(str(refused.value))
-    assert (cleaned.call_count, len(reasons)) == (1, 1)
-    with pytest.raises(BadMeshError):
-        load_model(tmp_path / "none.obj", "y", disk)
-    assert len(list((tmp_path / "cache").iterdir())) == 1
-
-
 @pytest.mark.parametrize(
     ("error", "where"), [(MemoryError(), "model"), (np.linalg.LinAlgError("odd"), "cleaning")]
 )

@@ -18,7 +18,7 @@ from shape_checks import (
 )
 
 from scenegen.objects.coarse_hulls import coarse_hull
-from scenegen.objects.meshes import hull, store
+from scenegen.objects.meshes import hull
 from scenegen.objects.meshes import models as model_files
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.folders import open_objects
@@ -137,28 +137,6 @@ def test_flat_models_have_hulls(turn, side, tmp_path):
     mesh = trimesh.Trimesh(disc, faces, process=False)
     (tmp_path / "flat" / "disc.ply").write_bytes(mesh.export(file_type="ply"))
     check_shape(MeshStore(open_objects(tmp_path), None).shape("flat/disc"))
-
-
-def test_shapes_in_memory_are_bounded(opened, monkeypatch):
-    monkeypatch.setattr(store, "MOST_KEPT", 100_000)
-    models = opened()
-    first = models.shape("odd/0")
-    assert models.shape("odd/0") is first
-    models.shape("odd/1")
-    assert models.shape("odd/0") is not first
-
-
-def test_digests_are_of_the_file_that_gave_the_shape(opened):
-    models, others = opened(), opened()
-    digest = models.digest("odd/0")
-    assert len(digest) == 16
-    assert int(digest, 16) >= 0
-    others.shape("odd/0")
-    file = models.folder.models["odd"][0]
-    file.path.write_bytes(bumpy(9).export(file_type="ply"))
-    assert others.digest("odd/0") == digest, "the shape in use is still the old one"
-    assert opened().digest("odd/0") != digest
-    assert len({models.digest(f"odd/{i}") for i in range(4)}) == 4
 
 
 def test_refusals_are_remembered(opened):

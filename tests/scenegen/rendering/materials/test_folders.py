@@ -81,74 +81,38 @@ def test_large_maps_are_reduced(tmp_path):
     assert made.base_color.shape == (1024, 1024, 3)
 
 
-def without_colours(root):
-    save(root / "Wood01_1K_Roughness.png", (9, 9, 9))
+GREY, WIDE = (9, 9, 9), np.zeros((2, 9000, 3), np.uint8)
+COLOR, ROUGH = "Wood01_1K_Color.png", "Wood01_1K_Roughness.png"
+# Pictures of a folder, by name: a colour and side in pixels, or bytes.
+BAD = [
+    ({}, SpecError, "colour"),
+    ({ROUGH: (GREY,)}, SpecError, "colour"),
+    ({"Tiles01_1K_Color.png": (GREY,), ROUGH: (GREY,)}, SpecError, ROUGH),
+    ({COLOR: (GREY,), ROUGH: (GREY, 32)}, SpecError, "32 x 32"),
+    ({"wood_diff_1k.png": (GREY,), "wood_diff_2k.png": (GREY, 128)}, SpecError, "128 x 128"),
+    ({"wood_diff_1k.png": (GREY,), "wood_diff_1k.jpg": (GREY,)}, SpecError, "color"),
+    ({"Thing01_1K_Color.png": (GREY,)}, SpecError, "name"),
+    ({COLOR: b"\x89PNG\r\n\x1a\n" + b"x" * 99}, FileFormatError, ""),
+    (
+        {"Wood01_diff_1k.png": (GREY,), "Wood01_nor_gl_1k.exr": b"v/1\x01" + b"x" * 99},
+        FileFormatError,
+        "",
+    ),
+    ({COLOR: (WIDE,)}, FileFormatError, "9000"),
+]
 
 
-def one_without_colour(root):
-    save(root / "Tiles01_1K_Color.png", (9, 9, 9))
-    save(root / "Wood01_1K_Roughness.png", (9, 9, 9))
-
-
-def several_sizes(root):
-    save(root / "Wood01_1K_Color.png", (9, 9, 9))
-    save(root / "Wood01_1K_Roughness.png", (9, 9, 9), 32)
-
-
-def two_resolutions(root):
-    save(root / "wood_diff_1k.png", (9, 9, 9))
-    save(root / "wood_diff_2k.png", (9, 9, 9), 128)
-
-
-def two_formats(root):
-    save(root / "wood_diff_1k.png", (9, 9, 9))
-    save(root / "wood_diff_1k.jpg", (9, 9, 9))
-
-
-def nameless(root):
-    save(root / "Thing01_1K_Color.png", (9, 9, 9))
-
-
-def damaged(root):
-    (root / "Wood01_1K_Color.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"x" * 99)
-
-
-def damaged_exr(root):
-    save(root / "Wood01_1K_Color.png", (9, 9, 9))
-    (root / "Wood01_nor_gl_1k.exr").write_bytes(b"v/1\x01" + b"x" * 99)
-    (root / "Wood01_diff_1k.png").write_bytes((root / "Wood01_1K_Color.png").read_bytes())
-
-
-def too_large(root):
-    save(root / "Wood01_1K_Color.png", np.zeros((2, 9000, 3), np.uint8))
-
-
-def empty(root):
-    del root
-
-
-@pytest.mark.parametrize(
-    ("make", "error", "word"),
-    [
-        (without_colours, SpecError, "colour"),
-        (one_without_colour, SpecError, "Wood01_1K_Roughness.png"),
-        (several_sizes, SpecError, "32 x 32"),
-        (two_resolutions, SpecError, "128 x 128"),
-        (two_formats, SpecError, "color"),
-        (nameless, SpecError, "name"),
-        (damaged, FileFormatError, ""),
-        (damaged_exr, FileFormatError, ""),
-        (too_large, FileFormatError, "9000"),
-        (empty, SpecError, "colour"),
-    ],
-)
-def test_bad_folders_are_refused(tmp_path, make, error, word):
-    make(tmp_path)
+@pytest.mark.parametrize(("files", "error", "word"), BAD)
+def test_bad_folders_are_refused(tmp_path, files, error, word):
+    for name, how in files.items():
+        if isinstance(how, bytes):
+            (tmp_path / name).write_bytes(how)
+        else:
+            save(tmp_path / name, *how)
     with pytest.raises(error) as caught:
         from_folder(tmp_path)
     assert str(tmp_path) in caught.value.where
     assert word in caught.value.found
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("ending", ["png", "jpg"])
@@ -160,8 +124,3 @@ def test_maps_that_are_cut_short_are_refused_before_they_are_used(tmp_path, endi
     (tmp_path / f"Wood01_1K_Color.{ending}").write_bytes(whole[: len(whole) // 2])
     with pytest.raises(FileFormatError):
         check_maps(from_folder(tmp_path))
-
-
-def test_a_folder_that_is_not_there_is_refused(tmp_path):
-    with pytest.raises(SpecError):
-        from_folder(tmp_path / "none")

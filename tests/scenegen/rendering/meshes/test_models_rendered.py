@@ -33,23 +33,6 @@ def test_an_image_is_the_same_alone_and_in_any_company(source, model_folder):
     assert all_bits(spec, some[::-1], objects) == alone[::-1]
 
 
-@pytest.mark.slow
-def test_hundreds_of_other_models_change_no_bit():
-    """At the far end of a lattice of 7 x 7 x 7, and at its beginning."""
-    spec = replace(FAMILIES, objects=(0, 100))
-    objects = objects_of(spec)
-    (scene,) = some_scenes(FAMILIES, objects, 1)
-    first, last = (
-        replace(scene, objects=(replace(scene.objects[0], shape=name),))
-        for name in ("bag/0007", "table/0007")
-    )
-    alone = [all_bits(spec, [one], objects)[0] for one in (first, last)]
-    bowls = [replace(scene.objects[0], shape=f"bowl/{i:04d}") for i in range(300)]
-    crowds = [replace(scene, objects=tuple(bowls[i : i + 100])) for i in (0, 100, 200)]
-    together = render(pack(spec, [*crowds, first, last]))
-    assert [bits(together, row) for row in (3, 4)] == alone
-
-
 @pytest.mark.parametrize(
     "limits",
     [

@@ -12,7 +12,6 @@ from PIL import Image
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
 from scenegen.objects.basic_shapes import unit_shape
-from scenegen.rooms.export.bop import diameter
 from scenegen.rooms.export.encoding import Encoding
 from scenegen.rooms.export.folder import CONVENTIONS, export_folder
 from scenegen.rooms.export.formats import FOLDER_FORMATS
@@ -255,14 +254,6 @@ def test_bop(path, out):
     )
 
 
-def test_diameter_is_the_largest_of_all_distances():
-    rng = np.random.default_rng(0)
-    for shape in ((1, 1, 1), (1, 0.2, 0.1)):
-        points = rng.normal(size=(300, 3)) * shape
-        every = np.linalg.norm(points[:, None] - points, axis=-1)
-        assert diameter(points) == every.max()
-
-
 @pytest.mark.parametrize("source", ["shapes", pytest.param("families", marks=pytest.mark.slow)])
 def test_bop_counts_what_lies_beyond_the_edge(source, make_rooms, tmp_path):
     """As BOP's scripts do, from the exported folder alone: ray casts on three by three images."""
@@ -384,10 +375,7 @@ def test_what_does_not_fit_is_refused_and_nothing_is_left(form, path, tmp_path):
     too_bright = Encoding(exposure=50.0)
     too_deep = replace(Encoding(), depth_unit=1e-6)
     with open_rooms(path) as rooms:
-        for encoding, forms in (
-            (too_bright, FOLDER_FORMATS),
-            (too_deep, ("nerfstudio", "bop")),
-        ):
+        for encoding, forms in ((too_bright, FOLDER_FORMATS), (too_deep, ("nerfstudio", "bop"))):
             if form in forms:
                 with pytest.raises(SpecError) as refused:
                     export_folder(rooms, form, tmp_path / "out", encoding=encoding)

@@ -10,7 +10,6 @@ from PIL import Image
 
 from scenegen import open_rooms
 from scenegen.objects.catalogue import objects_of
-from scenegen.rooms.export.encoding import Encoding
 from scenegen.rooms.export.folder import export_folder
 from scenegen.rooms.export.single import export_paths, export_room
 
@@ -37,12 +36,6 @@ def test_the_deepest_room_fits_into_png_files(tmp_path, deep):
     assert steps[0, 1] == about["depth"]["nothing"] == 0
     known = np.isfinite(deep.depth)
     np.testing.assert_allclose(steps[known] * 1e-3, deep.depth[known], rtol=0, atol=0.501e-3)
-
-
-def test_the_unit_of_depth_can_be_told(tmp_path, deep):
-    paths = export_paths(0, tmp_path, "a", "png")
-    export_room(deep, paths, "png", encoding=Encoding(depth_unit=2e-4))
-    assert np.asarray(Image.open(paths[1]))[0, 0] == round(DIAGONAL / 2e-4)
 
 
 @pytest.mark.parametrize(

@@ -12,10 +12,8 @@ import trimesh
 from scenegen import open_rooms
 from scenegen.camera import pixel_directions, transform_vectors
 from scenegen.common.errors import SpecError
-from scenegen.description.names import SHAPE_NAMES
-from scenegen.objects.scene_mesh import scene_parts
 from scenegen.rooms.export.encoding import Encoding
-from scenegen.rooms.export.formats import PICTURES, ROW_FORMATS
+from scenegen.rooms.export.formats import PICTURES
 from scenegen.rooms.export.single import export_paths, export_room
 
 
@@ -125,14 +123,6 @@ def test_what_does_not_fit_is_refused_before_a_file_is_written(tmp_path, holey):
         )
         for path in tmp_path.iterdir():
             path.unlink()
-
-
-def test_names_inside_files_have_no_blanks(tmp_path, simple):
-    paths = export_paths(7, tmp_path, "my rooms (2)", "obj")
-    export_room(simple, paths, "obj")
-    (name,) = words(paths[0], "mtllib")
-    assert (tmp_path / name[0]).is_file()
-    assert {path.name for path in paths} == {path.name for path in tmp_path.iterdir()}
 
 
 def test_ply_has_the_surfels(tmp_path, holey):
@@ -248,31 +238,6 @@ def test_normals_of_obj_are_those_of_the_corners(tmp_path, simple):
     np.testing.assert_allclose(normals[side], radial, atol=1e-4)
     flat = np.abs(normals[6:][~side[6:]])
     np.testing.assert_allclose(flat, np.broadcast_to((0, 1, 0), flat.shape), atol=1e-6)
-
-
-@pytest.mark.slow
-def test_meshes_of_100_rooms_give_the_depth(tmp_path, make_rooms):
-    path = make_rooms(tmp_path / "x.h5", 100, height=64, width=64, seed=12)
-
-    def mesh(room):
-        return trimesh.util.concatenate([part.mesh for part in scene_parts(room.scene)])
-
-    assert check_depth_by_embree(path, mesh) == set(SHAPE_NAMES)
-
-
-@pytest.mark.parametrize("form", ROW_FORMATS)
-def test_existing_files_are_kept_without_overwrite(tmp_path, simple, form):
-    paths = export(simple, tmp_path, form)
-    for path in paths:
-        path.write_text("mine")
-        others = [other.unlink() or other for other in paths if other != path]
-        with pytest.raises(FileExistsError):
-            export(simple, tmp_path, form)
-        assert path.read_text() == "mine"
-        export(simple, tmp_path, form, overwrite=True)
-        assert path.read_bytes()[:4] != b"mine"
-        assert all(other.exists() for other in others)
-    assert sorted(tmp_path.iterdir()) == sorted(paths), "no temporary files"
 
 
 def test_the_command_names_what_it_wrote(run, rooms_path):
