@@ -83,8 +83,9 @@ def test_some_rows(rooms):
 
 def test_values_that_are_not_finite(rooms):
     bad = np.where(np.eye(32), np.nan, rooms[0].depth)
-    with pytest.raises(PredictionError):
-        metrics.evaluate_room(bad, rooms[0])
+    for values in (bad, -rooms[0].depth):
+        with pytest.raises(PredictionError):
+            metrics.evaluate_room(values, rooms[0])
     penalised = metrics.evaluate_room(bad, rooms[0], non_finite="penalise")
     assert penalised["relief_iou"] == 0.0
     depth = [bad, *(room.depth for room in rooms[1:])]

@@ -337,3 +337,10 @@ def test_what_is_not_comparable_says_why():
 def test_what_a_file_says_is_cut_short_in_errors():
     error = refusal("k" * 10**6, "f" * 10**4, "e" * 10**4)
     assert max(map(len, (error.where, error.found, error.expected))) == LONGEST_SHOWN
+
+
+def test_names_beyond_ascii_are_escaped(tmp_path):
+    """One wide character would make the whole text take four times its memory when it is read."""
+    other = read_again(made_scores.simple_rooms("Größe \U0001f600"), tmp_path)
+    assert other.path.read_bytes().isascii()
+    assert other.method == "Größe \U0001f600"

@@ -289,3 +289,9 @@ def test_nothing_is_given_away_unless_asked(records):
         assert has(sheet, RIGHT) == 0
         unanswered = dataclasses.replace(record, answer=None, truth=None)
         assert np.array_equal(sheet, np.asarray(question_sheet([unanswered], False)))
+
+
+def test_shapes_beside_released_questions_are_nobodys(damaged):
+    path = damaged(lambda file: file.attrs.clear())
+    with open_questions(path) as questions:
+        assert questions.fields == ("questions", "answers")

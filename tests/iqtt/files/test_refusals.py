@@ -23,7 +23,7 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.content import seal
 
 
-def refused(path, place, read=open_questions) -> FileFormatError:
+def refused(path, place, read=open_questions):
     """Check that a file is refused in one line that says where it is wrong; return the error."""
     with pytest.raises(FileFormatError) as error:
         read(path)

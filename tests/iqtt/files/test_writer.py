@@ -1,7 +1,6 @@
 """The files of a split: the released layout and our group, told in full and truly."""
 
 import hashlib
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -30,13 +29,13 @@ TRUTH = {
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("made") / "split"
     make_split(folder, SPEC)
     return folder
 
 
-def everything(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
+def everything(file):
     found = {"/": file["/"]}
     file.visititems(found.__setitem__)
     return found

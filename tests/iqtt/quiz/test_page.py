@@ -133,3 +133,11 @@ def test_a_page_may_send_answers_to_one_address_only(split_folder, tmp_path, pos
     assert f"connect-src {origin};" in text
     assert text.count("</script>") == 2
     assert content_of(out)["contact"] == "</script>"
+
+
+def test_practice_is_of_the_validation_file(page, split_folder):
+    (told,) = content_of(page)["practice"]
+    with QuestionsFile(split_folder / "iqtt-val.h5") as val:
+        shown = picture(told["pictures"][1 + told["right"]])
+        rights = [srgb_bytes(record.radiance[1 + record.answer]) for record in val]
+    assert any(np.array_equal(shown, right) for right in rights)

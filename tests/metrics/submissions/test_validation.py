@@ -42,6 +42,7 @@ def test_everything_at_once(truths, tmp_path):
         file["normal"][...] *= -1
         file["normal"][4, 0, :] = 0.0
         file["normal"][6, 1, 1, 2] = np.nan
+        damaged_chunk("depth", 7)(file)
 
     path = edited(spoil)(tmp_path, truths.rooms)
     problems = validate(path, truths.rooms)
@@ -52,6 +53,7 @@ def test_everything_at_once(truths, tmp_path):
         ("row", "known", (99,)),
         ("row", "complete", (0, 1, 2)),
         ("depth", "finite", (3, 5)),
+        ("depth", "readable", (7,)),
         ("normal", "finite", (6,)),
         ("normal", "length", (4,)),
         ("normal", "hint", ()),
