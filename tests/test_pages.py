@@ -78,14 +78,8 @@ def test_a_wrong_number_is_noticed():
 
 
 BLOCKS = blocks("your-model.md")
-
-
 DOORS = ("bench import --depth", "bench run my_model.py", "metrics.evaluate(")
-
-
 SCORE_ANSWERS = "bench score answers.h5 --truth iqtt-split/iqtt-test-answers.h5"
-
-
 BATCHES = {
     "class Rooms(Dataset)": "torch.Size([16, 3, 32, 32]) torch.Size([16, 32, 32])\n" * 4,
     "def batches": "(16, 32, 32, 3) float32 (16, 32, 32)\n" * 4,

@@ -345,14 +345,8 @@ def test_new_files_must_have_their_digests(damaged):
 
 
 L = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 1, 1]]  # chiral
-
-
 FLAT = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0]]  # its mirror image is itself
-
-
 TILTED = [[0.8, 0.0, 0.6], [0.36, 0.8, -0.48], [-0.48, 0.6, 0.64]]
-
-
 OTHER = [[0.0, -1.0, 0.0], [0.6, 0.0, -0.8], [0.8, 0.0, 0.6]]
 
 
@@ -371,8 +365,6 @@ def faults(tmp_path, *questions, **more):
 
 
 GOOD = {"reference": view(L), "answers": [view(L, OTHER), view(mirrored(L), OTHER)], "key": 0}
-
-
 CASES = [
     (GOOD, set()),
     ({**GOOD, "key": 1}, {"wrong key"}),

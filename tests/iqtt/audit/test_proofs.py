@@ -127,8 +127,6 @@ def test_places_come_equally_often_up_to_one(counts, status):
 
 
 CUBES = np.tile(np.arange(3)[:, None] * [1, 0, 0], (2, 4, 1, 1))
-
-
 KINDS = [[-1, 0, 0]] * 2
 
 
@@ -161,8 +159,6 @@ def test_every_cube_shows_and_no_silhouette_is_larger_than_them(least, silhouett
 
 
 LEAN = np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0], [2, 1, 1]])  # no turn leaves it
-
-
 SPEC = replace(SplitSpec(), min_angle_degrees=30.0, min_sight_angle_degrees=20.0)
 
 
@@ -251,11 +247,7 @@ def test_shapes_in_two_splits():
 
 # A narrow lens from afar, so that what lies behind a cube is hidden by it.
 NARROW = SplitSpec(height=64, width=64, min_cube_pixels=5, fov_degrees=5)
-
-
 ROD = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [2, 1, 0]]
-
-
 OBLIQUE = rotation_matrix(np.array([0.8, 0.36, 0.48, 0.0]))
 
 

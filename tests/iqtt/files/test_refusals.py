@@ -208,8 +208,6 @@ def test_parts_that_are_not_there(split_folder):
 
 
 FLOATS = np.zeros((5, 4, 8, 8, 3), np.float32)
-
-
 IMAGES_OF_OTHERS = (
     FLOATS[..., 0], FLOATS[:, :3], FLOATS[:, :, :0], np.float32(3), h5py.Empty("f4"),
     FLOATS.astype(np.int16), FLOATS.astype(np.float64), FLOATS + 255, FLOATS * np.nan, FLOATS - 0.5,

@@ -88,20 +88,10 @@ def test_a_request_that_no_shape_meets_is_refused():
 
 
 ROD = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]
-
-
 TEE = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]]
-
-
 RING = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
-
-
 EDGE_ON = [[0, 0, 0], [1, 0, 0], [2, 1, 0], [3, 1, 0]]
-
-
 MOVES_OF = {n: 6 * n * (n - 1) for n in range(2, 9)}  # moves by the number of cubes
-
-
 TORN = [[0, 0, 0], [1, 0, 0], [5, 0, 0], [6, 0, 0]]
 
 

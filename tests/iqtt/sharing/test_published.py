@@ -94,11 +94,7 @@ LEAKS = {
     "the seed": seeded,
     "the command": lambda file: file.attrs.update(creation_command="iqtt make-split --seed 5"),
 }
-
-
 OF_ANY = ("the seed", "the command")  # which no file of the split may tell
-
-
 WHOLE, SHARD = "iqtt-test.h5", "iqtt-test-00001-of-00002.h5"
 
 

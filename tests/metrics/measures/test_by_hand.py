@@ -257,11 +257,7 @@ def test_silog_of_positive_depth_is_a_standard_deviation(seed):
 
 
 NOISE = np.random.default_rng(3)
-
-
 RELIEF = np.maximum(NOISE.normal(0.0, 0.15, 4000), 0.0)
-
-
 SPOT = np.where(np.arange(4000) == 9, 0.06, 0.0)  # an object of one pixel
 
 
@@ -315,11 +311,7 @@ def ball(centre, radius):
 
 
 BALL, HIT = ball([0.1, 0.1, -2.5], 0.5)
-
-
 IDS = np.where(HIT, 3, 0)
-
-
 INSIDE = inside_objects(IDS)
 
 
@@ -358,8 +350,6 @@ def test_flat_truth_has_no_correlation_and_no_object_has_no_score():
 
 
 DRAWS = np.random.default_rng(8)
-
-
 FLOORS = DRAWS.gamma(2.0, 0.1, 60)
 
 

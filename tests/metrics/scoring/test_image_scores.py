@@ -279,8 +279,6 @@ def test_where_nothing_stands_out_in_another_scene_nothing_of_it_is_found(closed
 
 
 TRUE = np.random.default_rng(0).uniform(1, 2, (6, 7))
-
-
 POINTS = back_project(TRUE, 40.0)
 
 

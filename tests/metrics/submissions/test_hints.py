@@ -148,8 +148,6 @@ MISTAKES = {
     "far minus depth": (lambda d, s: 3 - d, "disparity"),
     "z, blurred": (lambda d, s: -ndimage.gaussian_filter(d, (0, 6, 6)), "negative"),
 }  # fmt: skip
-
-
 SCALES = {
     "millimetres": (lambda d: 1000 * d, "1,000 times the truth, as if millimetres"),
     "centimetres": (lambda d: 100 * d, "100 times the truth, as if centimetres"),

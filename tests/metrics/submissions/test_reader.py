@@ -172,8 +172,6 @@ def test_json_under_any_name(tmp_path, name, start):
 
 
 SIZE = 2**17
-
-
 WIDE = '"\U0001f600"]'.encode()
 
 

@@ -211,8 +211,6 @@ def test_nothing_but_a_regular_file_is_a_truth(truths, tmp_path, path):
 
 
 FOV, CAMERA = "camera/fov_y_degrees", "camera/world_from_camera"
-
-
 SPOILED = [
     *(("depth", put("depth", (ROW, 0, 0), v)) for v in (np.inf, -np.inf, np.nan, 0.0, -1.0)),
     ("depth", put("object_id", (ROW, 0, 0), -1)),
