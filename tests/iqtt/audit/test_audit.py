@@ -73,6 +73,11 @@ def at_the_border(file):
     file["questions"][3, 1] = np.roll(image, -left, axis=1)
 
 
+def another_background(images):
+    images[(images == 255).all(axis=-1)] = 250
+    return images
+
+
 def scaled(image, factor):
     def change(values):
         values[image] *= factor
@@ -93,6 +98,7 @@ DAMAGES: list[tuple[str, Edit, str]] = [
     (VAL, changed("truth/shape_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
     (VAL, changed("truth/class_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
     (VAL, at_the_border, "framing, cast again"),
+    (VAL, changed("questions", ALL, another_background), "framing, cast again, ..."),
     *(
         (
             VAL,
@@ -152,6 +158,7 @@ def test_a_fair_split_passes_and_all_is_told(split_folder, monkeypatch):
 
 def test_files_that_cannot_be_audited(tmp_path):
     (tmp_path / "iqtt-val.h5").write_bytes(b"no HDF5")
+    (tmp_path / "x").mkdir()
     for paths, kind in (
         ([], SpecError),
         ([tmp_path / "x"], FileNotFoundError),

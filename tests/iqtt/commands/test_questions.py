@@ -168,3 +168,9 @@ def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path, check_refus
         file["answers"][0] = (file["answers"][0] + 1) % 3
     result = run("audit", "x")
     assert (result.exit_code, "FAIL" in result.stdout) == (1, True)
+
+
+def test_show_needs_answers_to_show_them(run, split, tmp_path, check_refusal):
+    shutil.copy(split / "iqtt-test.h5", tmp_path)
+    result = run("show", "iqtt-test.h5", "--answers")
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("no answers",))

@@ -1,6 +1,7 @@
 """Everything that can be wrong with a question file, and what the reader, info and verify say."""
 
 import os
+import shutil
 
 import h5py
 import numpy as np
@@ -18,6 +19,7 @@ from iqtt.files.reader import (
     open_tables,
     parts,
 )
+from iqtt.files.verify import verify_split
 from iqtt.questions.kinds import DISTRACTOR_KINDS
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.content import seal
@@ -247,3 +249,12 @@ def test_answers_of_other_questions(split_folder, damaged, released):
         assert str(asked) in mixed_up.value.expected
     with pytest.raises(FileNotFoundError):
         open_questions(path, answers=fewer.with_name("none.h5"))
+
+
+def test_questions_are_made_again(split_folder, tmp_path):
+    assert all(check.ok for check in verify_split(split_folder, items=2))
+    shutil.copytree(split_folder, tmp_path / "x")
+    with h5py.File(tmp_path / "x" / "iqtt-val.h5", "r+") as file:
+        file["questions"][0, 1] = file["questions"][0, 2]
+    failed = {check.name for check in verify_split(tmp_path / "x", items=2) if not check.ok}
+    assert "made again from the seed" in failed

@@ -44,7 +44,9 @@ def test_a_baseline_goes_all_the_way(truths, folder):
     assert bench("score", "oracle.h5", *truth, *beside).exit_code == 0
     assert "empty-room" in (folder / "both.html").read_text()
     assert read_scores(folder / "oracle.json").metrics["chamfer"].value == 0
-    compared = bench("compare", "empty-room.json", "oracle.json", "--html", "c.html")
+    compared = bench(
+        "compare", "empty-room.json", "oracle.json", "--html", "c.html", "--json", "c.json"
+    )
     assert (compared.exit_code, "better" in compared.stdout) == (0, True), compared.output
     assert "better in" in (folder / "c.html").read_text()
     for form, word in (("markdown", "| "), ("html", "<table"), ("latex", "\\toprule")):

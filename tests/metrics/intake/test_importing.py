@@ -199,6 +199,9 @@ def test_what_does_not_fit_is_named(names, words):
         matched(names)
     assert words in f"{caught.value.where} {caught.value.found}"
     assert ("--match" in caught.value.hint) == (words in ("best.png", "0_9.png"))
+    if len(names) != 4:
+        with pytest.raises(MatchError):
+            matched(names, by="name")
 
 
 def test_files_of_a_folder_or_a_pattern(tmp_path):

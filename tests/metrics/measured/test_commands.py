@@ -128,6 +128,7 @@ BAD = {
     "two units": (lambda: None, [*MM, "--scale", "2"]),
     "a normalised matrix": (matrix(_00=0.9, _11=1.2, _02=0.5, _12=0.5), [*MM, *CAMERA]),
     "a matrix of another size": (matrix(_00=600, _11=600, _02=320, _12=240), [*MM, *CAMERA]),
+    "an infinite matrix": (matrix(_00=float("inf")), [*MM, *CAMERA]),
     "a matrix that is none": (matrix(_22=2.0), [*MM, *CAMERA]),
     "no matrix": (text("K.json", "[1, 2"), [*MM, *CAMERA]),
     "a picture without group": (

@@ -10,12 +10,13 @@ import pytest
 from metrics.measured.protocols import ProtocolError
 from metrics.measured.reader import MeasuredFile
 from metrics.score_file import read_scores, write_scores
-from metrics.scoring.evaluate import open_runs, score, score_protocols
+from metrics.scoring.evaluate import open_runs, score, score_protocols, score_runs
 from metrics.scoring.runs import ScoringError, Settings
 from metrics.scoring.truth_digests import OtherTruthError
 from metrics.submissions.problems import JsonError
 from metrics.submissions.validation import validate
 from metrics.submissions.writer import RoomPredictionWriter
+from metrics.viewing import predicted_scenes
 from metrics.views.compare.compare import compare
 from metrics.views.leaderboard import rankings
 from metrics.views.protocols import protocols_report
@@ -189,3 +190,26 @@ def test_a_score_file_with_a_wrong_protocol_is_refused(measured, predicted, tmp_
     path.write_text(json.dumps(json.loads(path.read_text()) | edit))
     with pytest.raises(JsonError):
         read_scores(path)
+
+
+def test_images_are_recorded_in_3d(measured, predicted, tmp_path):
+    """Each a scene of its own, with points on the rays of its matrix, the worst image first."""
+    pytest.importorskip("rerun")
+    from recordings import points_of, recorded
+
+    from scenegen.viewing import write_recording
+
+    truth, worst = measured(), iter(range(12))
+    path = predicted(truth, lambda d, rng: d * (1.5 if next(worst) == 7 else 1.1))
+    with open_runs([path], truth) as runs:
+        scores = score_runs(runs, Settings(resamples=100), lambda done: None)
+        scenes = predicted_scenes(runs.files[0], runs.truth, scores)
+        write_recording(tmp_path / "x.rrd", "x", scenes)
+        view, picture = runs.truth.view(7), runs.truth.picture(7)
+    there = recorded(tmp_path / "x.rrd", "worst AbsRel first")
+    points, colors = points_of(there["/world/truth/view_0"][0])
+    expected = (view.rays * view.depth[..., None])[view.mask]
+    np.testing.assert_allclose(points, expected, rtol=1e-6)
+    np.testing.assert_array_equal(colors[:, :3], picture[view.mask])
+    points, _ = points_of(there["/world/prediction/view_0"][0])
+    np.testing.assert_allclose(points, 1.5 * expected, rtol=1e-5)

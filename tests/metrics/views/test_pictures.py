@@ -15,7 +15,7 @@ from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.scoring.evaluate import open_runs, score
 from metrics.scoring.metric_names import metric
-from metrics.views.examples import chosen_scenes, examples_of
+from metrics.views.examples import chosen_questions, chosen_scenes, examples_of
 from metrics.views.figures import (
     COLUMN,
     FigureError,
@@ -191,7 +191,11 @@ def test_charts_by_angle_show_the_baseline_of_each_angle():
     assert angle_floor(file, "35", "chamfer") == pytest.approx(0.3)
     assert angle_floor(file, "80", "chamfer") is None
     assert angle_floor(simple_rooms(), "35", "chamfer") is None
-    svg_of(svg_url(draw_groups, [simple_rooms(), simple_rooms("b")], "angle", "chamfer"))
+    drawn = simple_rooms()
+    names = ("view_angle_degrees", "empty_room_chamfer")
+    drawn.columns.update({name: file.columns[name] for name in names})
+    assert angle_floor(drawn, "35", "chamfer") == pytest.approx(0.3)
+    svg_of(svg_url(draw_groups, [drawn, simple_rooms("b")], "angle", "chamfer"))
 
 
 SHAPES, MULTIPLE, IQTT = "Shape scenes", "Multiple-shape scenes", "3D-IQTT"
@@ -230,3 +234,11 @@ def test_every_figure_is_there_once():
     assert Counter(f.table for f in set(FIGURES)) == {1: 12, 2: 40, 3: 16, 4: 22, 9: 24, 17: 10}
     assert len(FIGURES) == 124
     assert all(metric(figure.metric) for figure in FIGURES)
+
+
+def test_questions_are_spread_over_the_file():
+    right = np.arange(100) % 2 == 0
+    chosen = chosen_questions(right)
+    assert chosen["right"] == [0, 20, 40, 58, 78, 98]
+    assert all(not right[i] for i in chosen["wrong"])
+    assert chosen_questions(np.array([True])) == {"right": [0]}

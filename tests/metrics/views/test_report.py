@@ -14,14 +14,21 @@ from refusals import refused
 
 from iqtt.floors import Floor
 from metrics.measures.relief import empty_room
-from metrics.prediction_writer import RoomPredictionWriter
+from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import Skill
 from metrics.scoring.evaluate import open_runs, score
 from metrics.scoring.records import Submission
 from metrics.scoring.truth_digests import OtherTruthError
 from metrics.views.page import Section, html_page
 from metrics.views.report import html_report
-from metrics.views.score_tables import all_scores, group_tables, main_table, side_by_side, write_csv
+from metrics.views.score_tables import (
+    all_scores,
+    group_tables,
+    main_table,
+    side_by_side,
+    text_report,
+    write_csv,
+)
 from metrics.views.table import (
     Cell,
     Table,
@@ -242,3 +249,23 @@ def test_little_is_a_page_too(scores, tmp_path):
         page = Page(html_report(shown))
         assert scores.method in page.text
         assert "nan" not in page.text
+
+
+def test_examples_of_questions_say_what_is_right(truths, tmp_path):
+    path, answers = tmp_path / "x.h5", truths.iqtt.with_name("iqtt-test-answers.h5")
+    write_answers(path, truths.iqtt, method="m", answer=np.array([0, 1, 2, -1, 1, 0]))
+    scores = score([path], answers)
+    with open_runs([path], answers) as runs:
+        page = Page(html_report(scores, runs))
+    right = int(scores.items["iqtt_accuracy"].sum())
+    for count, how in ((right, "rightly"), (6 - right, "wrongly")):
+        assert f"{count} of {count} questions answered {how}" in page.text
+    assert len(page.pictures) == 6 * 4
+
+
+def test_groups_stand_in_the_order_of_their_numbers():
+    spans = ["120-150", "150-180", "30-60", "60-90", "90-120"]
+    group = {"iqtt_accuracy": make_score("iqtt_accuracy", 0.5)}
+    scores = iqtt_scores("a", [1, 0], by_rotation_angle=dict.fromkeys(spans, group))
+    shown = re.findall(r"\b(?:\d+)-(?:\d+)\b", text_report(scores, whole=True))
+    assert shown == ["30-60", "60-90", "90-120", "120-150", "150-180"]
