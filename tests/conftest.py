@@ -1,4 +1,4 @@
-"""Shared fixtures: tiny files, damaged copies, folders of meshes, the commands, a browser."""
+"""Shared fixtures: tiny files, damaged copies, folders of meshes, the commands."""
 
 import re
 import shutil
@@ -242,21 +242,3 @@ def pix2shape_files(truths: Any, make_rooms: Any, tmp_path_factory: pytest.TempP
 
     folder = tmp_path_factory.mktemp("pix2shape")
     return prepare(folder, Path(truths.rooms), Path(truths.iqtt), make_rooms)
-
-
-@pytest.fixture(scope="session")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Return the address that controls the session's Chromium."""
-    import browser
-
-    with browser.started(tmp_path_factory.mktemp("chromium")) as control:
-        yield control
-
-
-@pytest.fixture
-def visit(chromium: str) -> Any:
-    """Open an address in Chromium, as `browser.connected` says; return a `browser.Seen`."""
-    import browser
-
-    with browser.connected(chromium) as open_page:
-        yield open_page

@@ -22,18 +22,9 @@ def split_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from iqtt.questions.specs import SplitSpec
 
     spec = SplitSpec(
-        seed=5,
-        train=12,
-        labeled=6,
-        val=6,
-        test=6,
-        cubes=(5, 7),
-        lights=(1, 2),
-        height=32,
-        width=32,
-        min_cube_pixels=2,
-        with_depth=True,
-    )
+        seed=5, train=12, labeled=6, val=6, test=6, cubes=(5, 7), lights=(1, 2), height=32,
+        width=32, min_cube_pixels=2, with_depth=True,
+    )  # fmt: skip
     folder = tmp_path_factory.mktemp("iqtt") / "split"
     make_split(folder, spec, command="tests")
     return folder

@@ -3,7 +3,6 @@
 import os
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import h5py
 import numpy as np
@@ -17,7 +16,6 @@ from iqtt.files.reader import QuestionsFile
 from iqtt.files.split import ALL_FILES
 from iqtt.questions.kinds import question_kind
 from iqtt.questions.specs import SUITE, SplitSpec
-from iqtt.questions.views import Tally
 from iqtt.shapes.splits import TooFewShapesError
 from scenegen.common.errors import PlacementError, SpecError
 from scenegen.rendering.backend import versions
@@ -33,17 +31,17 @@ COMMAND = f"iqtt make-split --seed {SECRET}"
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Tally]:
+def made(tmp_path_factory):
     folder = tmp_path_factory.mktemp("made") / "split"
     return folder, make_split(folder, SPEC, command=COMMAND)
 
 
 @pytest.fixture
-def folder(made: tuple[Path, Tally]) -> Path:
+def folder(made):
     return made[0]
 
 
-def contents(folder: Path) -> dict[str, bytes]:
+def contents(folder):
     return {path.name: path.read_bytes() for path in folder.glob("*.h5")}
 
 
@@ -117,19 +115,11 @@ def test_a_table_does_not_depend_on_the_size_of_the_others(folder, tmp_path):
 @pytest.mark.parametrize(
     "changed",
     [
-        pytest.param(
-            {"cubes": (16, 16), "shapes": "tree", "train": 1, "labeled": 0}, marks=pytest.mark.slow
-        ),
-        pytest.param(
-            {"cubes": (12, 12), "distractors": "mirror", "test": 0}, marks=pytest.mark.slow
-        ),
         {"height": 24, "width": 40, "min_angle_degrees": 90},
         {"height": 40, "width": 24, "lights": (1, 4)},
         {"max_radius": 10},
         {"cubes": (5, 6), "max_radius": 2.2, "distractors": "other"},
-        {"cubes": (5, 5), "distractors": "other"},
         {"seed": 2**63 - 1, "background": (0, 0, 0)},
-        {"labeled": 3, "val": 6},
         {"labeled": 0},
         {"train": 0, "labeled": 0, "val": 0, "test": 5},
     ],
@@ -139,25 +129,21 @@ def test_odd_requests_are_answered_in_full(changed, tmp_path):
     done = []
     make_split(tmp_path / "split", spec, batch=1, progress=done.append)
     assert sum(done) == spec.train + spec.val + spec.test
-    sizes = {
-        "iqtt-train.h5": {"labeled/": spec.labeled, "unlabeled/": spec.train - spec.labeled},
-        "iqtt-val.h5": {"": spec.val},
-        "iqtt-test.h5": {"": spec.test},
-    }
-    for name, groups in sizes.items():
-        with h5py.File(tmp_path / "split" / name) as file:
-            for group, count in groups.items():
-                images = file[group + "questions"]
-                assert images.shape == (count, 4, spec.height, spec.width, 3)
-                raw = {image.tobytes() for image in images[:].reshape(-1, *images.shape[2:])}
-                assert len(raw) == 4 * count, "all images differ"
-                if f"{group}answers" in file:
-                    counts = np.bincount(file[f"{group}answers"][:], minlength=3)
-                    assert np.ptp(counts) <= 1
+    for name, group, count in (
+        ("train", "labeled/", spec.labeled), ("train", "unlabeled/", spec.train - spec.labeled),
+        ("val", "", spec.val), ("test", "", spec.test),
+    ):  # fmt: skip
+        with h5py.File(tmp_path / "split" / f"iqtt-{name}.h5") as file:
+            images = file[group + "questions"]
+            assert images.shape == (count, 4, spec.height, spec.width, 3)
+            raw = {image.tobytes() for image in images[:].reshape(-1, *images.shape[2:])}
+            assert len(raw) == 4 * count, "all images differ"
+            if f"{group}answers" in file:
+                assert np.ptp(np.bincount(file[f"{group}answers"][:], minlength=3)) <= 1
 
 
 @pytest.fixture(scope="module")
-def plain(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def plain(tmp_path_factory):
     folder = tmp_path_factory.mktemp("made") / "plain"
     make_split(folder, TINY)
     return folder
@@ -170,10 +156,7 @@ def test_plain_h5py_reads_every_type_and_compression(compression, dtype, plain, 
     spec = replace(TINY, image_dtype=dtype, with_depth=True)
     make_split(tmp_path / "split", spec, compression=compression)
     for name, path in (("iqtt-train.h5", "unlabeled/questions"), ("iqtt-val.h5", "questions")):
-        with (
-            h5py.File(plain / name) as whole,
-            h5py.File(tmp_path / "split" / name) as file,
-        ):
+        with h5py.File(plain / name) as whole, h5py.File(tmp_path / "split" / name) as file:
             images = file[path]
             assert images.dtype == dtype
             assert images.compression == (None if compression == "none" else compression)
@@ -244,7 +227,7 @@ def test_the_suite_has_a_split_of_each_kind_in_a_folder_of_its_own(tmp_path):
     """One that was stopped goes on, with the same seed only."""
     rows: list[int] = []
 
-    def stop(count: int) -> None:
+    def stop(count):
         rows.append(count)
         if sum(rows) > 7:
             raise StopError

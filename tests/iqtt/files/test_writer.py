@@ -45,14 +45,11 @@ def everything(file: h5py.File) -> dict[str, h5py.Group | h5py.Dataset]:
 def test_the_layout_is_the_released_one(folder):
     assert sorted(path.name for path in folder.glob("*.h5")) == sorted(FILES)
     images = (4, 24, 32, 3)
+    labeled = {"labeled/questions": (3, *images), "labeled/answers": (3,)}
     for name, public, parts in (
         (
             "train",
-            {
-                "labeled/questions": (3, *images),
-                "labeled/answers": (3,),
-                "unlabeled/questions": (4, *images),
-            },
+            labeled | {"unlabeled/questions": (4, *images)},
             {"labeled/": 3, "unlabeled/": 4},
         ),
         ("val", {"questions": (4, *images), "answers": (4,)}, {"": 4}),
@@ -119,15 +116,11 @@ def test_digests_are_of_what_was_written(folder, name):
         part = {"iqtt-train.h5": "labeled", "iqtt-test.h5": None}.get(name, "")
         assert told == (set() if part is None else {f"truth_digest_{part}".rstrip("_")})
         for key in told:
-            paths = (
-                f"truth/{part}/angle_degrees",
-                f"{part}/answers",
-                f"truth/{part}/distractor_kind",
-            )
-            lines = (
-                f"{p.split('/')[-1]} {digests[p.replace('//', '/').strip('/')]}\n" for p in paths
-            )
-            assert file.attrs[key] == hashlib.sha256("".join(lines).encode()).hexdigest()
+            names = ("angle_degrees", "answers", "distractor_kind")
+            paths = [f"{part}/{n}" if n == "answers" else f"truth/{part}/{n}" for n in names]
+            places = [path.replace("//", "/").strip("/") for path in paths]
+            lines = "".join(f"{n} {digests[p]}\n" for n, p in zip(names, places, strict=True))
+            assert file.attrs[key] == hashlib.sha256(lines.encode()).hexdigest()
 
 
 def test_fingerprints_are_of_the_public_settings_and_of_all_that_tables_tell(folder):

@@ -41,18 +41,13 @@ def test_a_baseline_goes_all_the_way(truths, folder):
     assert bench("score", "oracle.h5", *truth, *beside).exit_code == 0
     assert "empty-room" in (folder / "both.html").read_text()
     assert read_scores(folder / "oracle.json").metrics["chamfer"].value == 0
-    compared = bench(
-        "compare", "empty-room.json", "oracle.json", "--json", "c.json", "--html", "c.html"
-    )
-    assert compared.exit_code == 0, compared.output
-    assert "better" in compared.stdout
+    compared = bench("compare", "empty-room.json", "oracle.json", "--html", "c.html")
+    assert (compared.exit_code, "better" in compared.stdout) == (0, True), compared.output
     assert "better in" in (folder / "c.html").read_text()
     for form, word in (("markdown", "| "), ("html", "<table"), ("latex", "\\toprule")):
         ranked = bench("leaderboard", "empty-room.json", "oracle.json", "--format", form)
-        assert ranked.exit_code == 0, ranked.output
-        assert word in ranked.stdout
+        assert (ranked.exit_code, word in ranked.stdout) == (0, True), ranked.output
         assert ranked.stdout.index("oracle") < ranked.stdout.index("empty-room")
-        assert "as reported" in ranked.stdout
     assert "| " in bench("score", "oracle.h5", "--markdown").stdout
 
 
@@ -114,15 +109,6 @@ def test_a_mistake_is_one_line(arguments, words, folder, check_refusal):
     assert sorted(os.listdir(folder)) == ["broken.json"]
 
 
-def test_outputs_are_not_replaced_unless_told(truths, folder, check_refusal):
-    bench("baseline", "oracle", "--data", truths.rooms, "--out", "oracle.h5")
-    (folder / "x.json").write_text("mine")
-    refused = bench("score", "oracle.h5", "--json", "x.json")
-    check_refusal(refused.exit_code, refused.stdout, refused.stderr, ("x.json", "--overwrite"))
-    assert (folder / "x.json").read_text() == "mine"
-    assert bench("score", "oracle.h5", "--json", "x.json", "--overwrite").exit_code == 0
-
-
 @pytest.mark.parametrize("option", ["--json", "--csv", "--html"])
 def test_scores_never_replace_the_truth_that_a_submission_names(
     truths, folder, check_refusal, option
@@ -154,20 +140,3 @@ def test_what_is_viewed(truths, folder, check_refusal):
         check_refusal(result.exit_code, result.stdout, result.stderr, words)
     assert bench("view", path, *truth, "--out", "x.rrd").exit_code == 0
     assert len(recorded("x.rrd", "scene")["/about"]) > 1
-
-
-def test_score_gives_the_hints_of_validate(truths, folder):
-    from metrics.prediction_writer import RoomPredictionWriter
-    from scenegen import open_rooms
-
-    with (
-        open_rooms(truths.rooms) as rooms,
-        RoomPredictionWriter("mm.h5", truths.rooms, method="mm") as out,
-    ):
-        for row, room in enumerate(rooms):
-            out.add(row, 1000 * room.depth)
-    scored = bench("score", "mm.h5", "--truth", truths.rooms, "--all")
-    told = bench("validate", "mm.h5", "--truth", truths.rooms).stdout
-    assert scored.exit_code == 0
-    (hint,) = [line for line in told.splitlines() if line.startswith("hint")]
-    assert hint.removeprefix("hint").strip() in scored.stderr

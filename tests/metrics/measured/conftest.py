@@ -37,11 +37,10 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
             return Measured(image, depth, K, normal)
 
         sizes = [(48 - 2 * (i % 3), 64 - i % 2) for i in range(count)]
+        group = 2 if groups else 1
         rows = [
-            Source(
-                f"{i}.png", f"scene {i // 2 if groups else i}", size, lambda i=i, s=size: one(i, *s)
-            )
-            for i, size in enumerate(sizes)
+            Source(f"{i}.png", f"scene {i // group}", s, lambda i=i, s=s: one(i, *s))
+            for i, s in enumerate(sizes)
         ]
         write_measured(path, rows, source="tests", licence="CC0")
         return path

@@ -50,12 +50,6 @@ def test_a_kind_comes_back_and_is_scored_as_what_it_is(kind, truths, tmp_path):
     assert scores["relief_iou"].value > 0.999
 
 
-def test_depth_that_is_called_disparity_gets_a_hint(truths, tmp_path):
-    path = written("disparity", truths.rooms, tmp_path / "p.h5", lambda depth, _: depth)
-    (hint,) = validate(path, truths.rooms)
-    assert (hint.dataset, hint.is_hint) == ("disparity", True)
-
-
 POINTS = np.dstack([np.zeros((32, 32)), np.zeros((32, 32)), np.full((32, 32), -2.0)])
 DEPTH = np.full((32, 32), 2.0)
 
@@ -69,10 +63,8 @@ DEPTH = np.full((32, 32), 2.0)
         ("scale", [{"disparity": DEPTH}], "row 0: alignment"),
         ("median_scale", [{"points": POINTS}], "row 0: alignment"),
         ("none", [{"points": -POINTS}], "row 0: points"),
-        ("none", [{"points": DEPTH}], "row 0: points"),
         (None, [{"disparity": np.where(np.eye(32), np.nan, DEPTH)}], "row 0: disparity"),
         ("none", [{"depth": DEPTH, "fov_y_degrees": 180.0}], "row 0: fov_y_degrees"),
-        ("none", [{"depth": DEPTH, "fov_y_degrees": "40"}], "row 0: fov_y_degrees"),
         ("none", [{"depth": DEPTH, "fov_y_degrees": 4.0}, {"depth": DEPTH}], "1: fov_y_degrees"),
     ],
 )

@@ -63,6 +63,7 @@ def test_a_broken_submission(case, truths, tmp_path, monkeypatch, check_refusal)
     result = CliRunner().invoke(cli.bench, ["score", str(path), *options, "--json", "x.json"])
     if case.stage == "hint":
         assert result.exit_code == 0, result.output
+        assert all(word in result.stderr for word in case.words)
     else:
         check_refusal(result.exit_code, result.stdout, result.stderr, case.words)
     assert (tmp_path / "x.json").exists() == (case.stage == "hint")

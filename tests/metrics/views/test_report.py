@@ -1,7 +1,6 @@
 """Scores of one submission as text, Markdown, CSV and a page."""
 
 import csv
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -12,22 +11,13 @@ from refusals import refused
 
 from iqtt.floors import Floor
 from metrics.measures.relief import empty_room
-from metrics.prediction_writer import RoomPredictionWriter, write_answers
+from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import Skill
 from metrics.scoring.evaluate import open_runs, score
 from metrics.scoring.records import Submission
 from metrics.scoring.truth_digests import OtherTruthError
 from metrics.views.report import html_report
-from metrics.views.score_tables import (
-    all_scores,
-    group_tables,
-    main_table,
-    notes_of,
-    side_by_side,
-    text_report,
-    title_of,
-    write_csv,
-)
+from metrics.views.score_tables import all_scores, group_tables, main_table, side_by_side, write_csv
 from scenegen.common.text_table import with_interval
 from scenegen.rooms.reader import RoomsFile
 
@@ -59,37 +49,6 @@ def _value(scores, name):
     return [*with_interval(value.value, value.low, value.high)]
 
 
-def test_what_bench_score_prints_is_short_and_begins_with_warnings():
-    columns = {f"abs_rel{ending}": [0.1, 0.3, 0.2, 0.2] for ending in ("", "_after_scale")}
-    columns |= {f"{name}{ending}": [0.5] * 4 for name in ("rmse", "delta_1")
-                for ending in ("", "_after_scale")}  # fmt: skip
-    columns |= dict.fromkeys(("mse_depth", "chamfer", "hausdorff", "shape_error"), [0.2] * 4)
-    skills = {
-        "chamfer": SKILLS["chamfer"],
-        "shape_error": Skill(0, 0, 0, 0.2, "cut_out_shape_error"),
-    }
-    scores = rooms_scores("m", columns, [0, 0, 1, 1], skills=skills, truth_given=False)
-    lines = text_report(scores, width=100).splitlines()
-    assert len(lines) <= 25
-    assert max(map(len, lines)) <= 100
-    assert (
-        lines[0]
-        == "m on rooms.h5: 4 images, 2 scenes   alignment: none (metric)   unit: scene unit"
-    )
-    assert lines[1].startswith("WARNING  not comparable: ")
-    table = [line.split()[:2] for line in lines if line.startswith("  ") and "[" in line]
-    assert table[:2] == [["abs_rel", "down"], ["delta_1", "up"]]
-    notes = notes_of(scores)
-    assert len(notes) == 5
-    assert "none 0.2000 | scale 0.2000;" in next(n for n in notes if n.startswith("abs_rel by"))
-    baselines = next(note for note in notes if note.startswith("baselines: "))
-    assert ("empty room = " in baselines, "cut-out = " in baselines) == (True, True)
-    assert "shuffled" not in baselines
-    assert scores.meta.truth_digest[:12] in notes[-1]
-    whole = text_report(scores, whole=True)
-    assert all(name in whole for name in ("all metrics", "depth after each alignment"))
-
-
 def test_questions_have_the_baseline_of_their_kind():
     floors = (Floor("mirror", "outline", 0.5, 2500),)
     accuracy = {"iqtt_accuracy": Skill(0.0, None, None, 0.5, "outline")}
@@ -98,38 +57,9 @@ def test_questions_have_the_baseline_of_their_kind():
     scores = iqtt_scores("a", [1, 0], **by_kind, by_position=by_answer, question_floors=floors)
     row = cells_of(main_table(scores))["iqtt_accuracy"]
     assert (row[3], row[4:]) == ("0.5 outline", ["0", "baseline itself"])
-    assert any("chance is 0.33" in note for note in notes_of(scores))
     kinds, places = group_tables(scores)
     assert list(cells_of(places)) == ["C"]
     assert cells_of(kinds) == {"mirror": ["0.3333", "2", "-0.3333", "0.5000 outline"]}
-    known = iqtt_scores("a", [1, 0], kinds=["mirror", "near"])
-    assert "iqtt floors rooms.h5" in notes_of(known)[0]
-    assert "by kind of question" in text_report(known)
-    assert "by kind of question" not in text_report(iqtt_scores("a", [1, 0]))
-
-
-def test_titles_say_what_was_scored():
-    assert title_of(iqtt_scores("many", [1, 0], runs=3)) == (
-        "many on rooms.h5: 2 questions, mean of 3 runs"
-    )
-    fitted = simple_rooms(alignment="scale", truth_path="a/b\\c.h5")
-    assert title_of(fitted).split("   ")[:2] == [
-        "mine on c.h5: 4 images, 2 scenes",
-        "alignment: scale (fitted to the truth of each image)",
-    ]
-
-
-@pytest.mark.parametrize("form", ["text", "markdown", "html"])
-def test_groups_stand_in_the_order_of_their_numbers(form, tmp_path):
-    spans = ["120-150", "150-180", "30-60", "60-90", "90-120"]
-    group = {"iqtt_accuracy": make_score("iqtt_accuracy", 0.5)}
-    scores = iqtt_scores("a", [1, 0], by_rotation_angle=dict.fromkeys(spans, group))
-    if form == "html":
-        text = re.sub('data:[^"]*', "", html_report(scores))
-    else:
-        text = text_report(scores, form == "markdown", whole=True)
-    shown = re.findall(r"\b(?:\d+)-(?:\d+)\b", text)
-    assert shown == ["30-60", "60-90", "90-120", "120-150", "150-180"]
 
 
 def test_csv_holds_every_item_to_the_last_digit(tmp_path):
@@ -153,19 +83,16 @@ def test_the_page_is_whole_escapes_names_and_loads_nothing(rooms_path, tmp_path)
             out.add(row, empty + (row + 1) / len(rooms) * (room.depth - empty))
     scores = score([path], rooms_path)
     runs = (Submission(HOSTILE, "0" * 64, HOSTILE),)
-    meta = replace(scores.meta, truth_path=HOSTILE, submissions=runs)
+    meta = replace(scores.meta, truth_path=HOSTILE + CONTROLS, submissions=runs)
     hostile = replace(scores, method=HOSTILE, meta=replace(meta, truth_given=False))
-    controls = replace(scores, method=CONTROLS, meta=replace(meta, truth_path=CONTROLS))
     with open_runs([path], rooms_path) as runs:
-        text = html_report(hostile, runs, [replace(hostile, method=f"{HOSTILE}2")])
-        assert set(html_report(controls, runs)).isdisjoint(CONTROLS.replace("[2J", ""))
+        text = html_report(hostile, runs, [replace(hostile, method=f"{HOSTILE}{CONTROLS}")])
+    assert set(text).isdisjoint(CONTROLS.replace("[2J", ""))
     page = Page(text)
     assert len(page.pictures) == 3 * 2 * 6  # a third of the eight scenes each, in six pictures
     assert all(address.startswith("data:") for address in page.addresses)
     assert page.tags.isdisjoint({"script", "iframe", "form", "object"})
-    assert not any(name.startswith("on") or name == "style" for name in page.attributes)
-    assert "@import" not in text
-    assert len(text) < 600_000
+    assert not any(name.startswith("on") for name in page.attributes)
     assert HOSTILE in page.text
     assert {row[0].strip() for row in page.rows} >= set(scores.metrics)
     best, worst = (page.text.split(f"{place} 2 of 8 scenes")[1] for place in ("Best", "Worst"))
@@ -173,36 +100,15 @@ def test_the_page_is_whole_escapes_names_and_loads_nothing(rooms_path, tmp_path)
     assert "row 0 " in worst
 
 
-def test_other_methods_and_the_paper_stand_on_the_page():
+def test_other_methods_stand_beside_on_the_same_truth_alone():
     mine, other = simple_rooms(skills=SKILLS), simple_rooms("other", skills={})
     table = side_by_side([mine, other])
     assert table.head == ("", "mine", "other", "baseline")
     assert cells_of(table)["skill of chamfer"] == ["-0.2 [-0.5, -0.1]", "-", "empty room"]
     page = Page(html_report(mine, beside=[other]))
     assert ["hausdorff", "down", "0.5000"] in [row[:3] for row in page.rows]
-    rows = [row for row in page.rows if row[:3] == ["Pix2Shape", "Shape scenes", "35°"]]
-    assert rows == [["Pix2Shape", "Shape scenes", "35°", "-", "2", "0.112", "0.191", "0.021"]]
-    elsewhere = simple_rooms("other", digest="0" * 64)
     with refused(OtherTruthError, "other"):
-        html_report(mine, beside=[elsewhere])
-    group = {"iqtt_accuracy": make_score("iqtt_accuracy", 1 / 3)}
-    people = iqtt_scores("mine", [1, 0, 1], by_distractor={"other": group})
-    rows = [row for row in Page(html_report(people)).rows if row[0] == "Human Evaluation"]
-    assert rows[0][-1] == "0.7329 ± 0.148"
-    assert "Human Evaluation" not in html_report(iqtt_scores("mine", [1, 0, 1]))
-
-
-def test_examples_of_questions_say_what_is_right(truths, tmp_path):
-    path, answers = tmp_path / "x.h5", truths.iqtt.with_name("iqtt-test-answers.h5")
-    write_answers(path, truths.iqtt, method="m", answer=np.array([0, 1, 2, -1, 1, 0]))
-    scores = score([path], answers)
-    with open_runs([path], answers) as runs:
-        page = Page(html_report(scores, runs))
-    right = int(scores.items["iqtt_accuracy"].sum())
-    assert f"{right} of {right} questions answered rightly" in page.text
-    assert f"{6 - right} of {6 - right} questions answered wrongly" in page.text
-    assert page.text.count("no answer was given") == 1
-    assert len(page.pictures) == 6 * 4
+        html_report(mine, beside=[simple_rooms("other", digest="0" * 64)])
 
 
 @pytest.mark.parametrize(
