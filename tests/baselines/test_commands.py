@@ -79,14 +79,3 @@ def test_no_gpu_is_one_line(name, folder, check_refusal):
     result = bench(*f"train {name} {DATA} --out run --device cuda".split())
     check_refusal(result.exit_code, result.stdout, result.stderr, ("device", "cpu"))
     assert not (folder / "run").exists()
-
-
-@pytest.mark.parametrize(
-    ("name", "data", "other"),
-    [("chance", "rooms.h5", "nearest"), ("empty-room", "iqtt-test.h5", "outline")],
-)
-def test_data_of_the_other_task_is_answered_with_baselines_of_it(name, data, other, folder):
-    refused = bench("baseline", name, "--data", data, "--out", "x.h5")
-    assert refused.exit_code == 2
-    assert other in refused.stderr.splitlines()[-1]
-    assert not (folder / "x.h5").exists()

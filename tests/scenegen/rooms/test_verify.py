@@ -14,11 +14,9 @@ from h5_edits import attribute, edit_scene, gone, put, swap_rows, values
 from verified import checks_of
 
 from scenegen.common.errors import FileFormatError
-from scenegen.description.presets import preset_spec
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.content import datasets, seal
 from scenegen.files.verify import content_check, read_all
-from scenegen.rooms.make import make_dataset
 from scenegen.rooms.reader import RoomsFile
 from scenegen.rooms.verify import _within_tolerance
 
@@ -246,21 +244,6 @@ def test_damage_to_one_view_is_found_without_rendering(kind, items, views_path, 
     """Nor does rendering end in a traceback."""
     edit, expected = DAMAGE_TO_VIEWS[kind]
     assert expected <= set(failures(spoilt(views_path, tmp_path, edit), items))
-
-
-@pytest.mark.parametrize(
-    "name", ["material/shininess", pytest.param("material/specular", marks=pytest.mark.slow)]
-)
-def test_highlights_that_are_not_the_stored_materials_are_found(name, tmp_path):
-    """The image check by itself: the JSON says the same as the arrays."""
-    spec = preset_spec("specular", height=32, width=32, objects=(2, 2), lights=(3, 3))
-    make_dataset(tmp_path / "x.h5", spec, 3)
-    key = name.split("/")[1]
-    with h5py.File(tmp_path / "x.h5", "r+") as file:
-        file[name][:, 1:] = 0.5 * file[name][:, 1:]
-        for row in range(3):
-            edit_scene(row, lambda s: [o.update({key: 0.5 * o[key]}) for o in s["objects"]])(file)
-    assert set(failures(tmp_path / "x.h5")) == {"content", "image", "fingerprint"}
 
 
 @pytest.mark.parametrize("how", [{"shadows": True}, {"spp": 4}], ids=str)

@@ -4,11 +4,9 @@ import math
 
 import pytest
 import torch
-from refusals import refused
 
 from baselines.pix2shape.network.architecture import NetworkSpec
 from baselines.pix2shape.network.polar import PolarEncoder
-from scenegen.common.errors import SpecError
 
 SPEC = NetworkSpec(
     size=32, width=0.02, z_scene=6, z_view=2, camera=False, spherical=True, encoder="polar"
@@ -37,10 +35,3 @@ def test_a_turned_picture_has_the_same_scene_and_another_view():
     assert (turned[:, 6:] - code[:, 6:]).abs().max() > 1e-2
     assert (mirrored[:, :6] - code[:, :6]).abs().max() > 1e-2, "handedness is seen"
     assert code[:, :6].norm(dim=1) == pytest.approx(math.sqrt(6), rel=1e-5)
-
-
-def test_no_camera_is_told():
-    with refused(SpecError, "encoder"):
-        NetworkSpec(encoder="polar")
-    with refused(SpecError, "encoder", expected="one of paper, polar"):
-        NetworkSpec(encoder="resnet")
