@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.errors import SceneGenError
+from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.description.specs import MAX_PIXELS
+from scenegen.files.exr import exr_channels
+from scenegen.files.pictures import is_turned, opened_picture, upright
 
 Array = NDArray[Any]
 MOST_CHANNELS = 4
@@ -50,6 +52,9 @@ def read_array(path: Path, name: str | None = None, vectors: bool = False) -> Ar
         return reader(path, name, vectors)
     except ArrayFileError:
         raise
+    except FileFormatError as error:
+        hint = error.hint or (_AS_NUMBERS if reader is _picture else "")
+        raise ArrayFileError(error.where, error.found, error.expected, hint) from error
     except Exception as error:  # of five libraries, which share no class of errors
         reason = " ".join(str(error).split()) or type(error).__name__
         raise ArrayFileError(path, f"a file that cannot be read ({reason:.120})") from error
@@ -88,25 +93,20 @@ def _npz(path: Path, name: str | None, vectors: bool) -> Array:
 
 
 def _picture(path: Path, _name: str | None, vectors: bool) -> Array:
-    from PIL import Image, UnidentifiedImageError
-
-    try:
-        opened = Image.open(path)
-    except UnidentifiedImageError as error:  # such as a TIFF file of three floats a pixel
-        raise ArrayFileError(path, "a picture of an unknown kind", "", _AS_NUMBERS) from error
-    with opened as picture:
-        _check_size(path, (picture.height, picture.width), MAX_PIXELS)
+    with opened_picture(path, MAX_PIXELS) as picture:
         pictures = getattr(picture, "n_frames", 1)
         if pictures > 1:
             raise ArrayFileError(path, f"{pictures} pictures", "one")
         if picture.mode in ("P", "PA"):
             raise ArrayFileError(path, "colours of a palette", "numbers", _AS_NUMBERS)
-        if picture.format == "PNG" and picture.mode not in ("L", "I", "I;16", "F", "1"):
-            return _colour_png(path, vectors)
-        return _channels(path, np.asarray(picture), vectors)
+        is_colour_png = picture.format == "PNG" and picture.mode not in ("L", "I", "I;16", "F", "1")
+        if is_colour_png and is_turned(picture):
+            raise ArrayFileError(path, "EXIF data that turn it", "none", "save it without them")
+        values = _colour_png(path) if is_colour_png else np.asarray(upright(picture))
+        return _channels(path, values, vectors)
 
 
-def _colour_png(path: Path, vectors: bool) -> Array:
+def _colour_png(path: Path) -> Array:
     """Read a PNG file of several channels; Pillow would cut 16 bits to 8."""
     import png
 
@@ -114,7 +114,7 @@ def _colour_png(path: Path, vectors: bool) -> Array:
         width, height, rows, about = png.Reader(file=file).asDirect()
         kind = np.uint16 if about["bitdepth"] > 8 else np.uint8
         values = np.array([np.asarray(row, kind) for row in rows])
-    return _channels(path, values.reshape(height, width, about["planes"]), vectors)
+    return values.reshape(height, width, about["planes"])
 
 
 def _pfm(path: Path, _name: str | None, vectors: bool) -> Array:
@@ -149,7 +149,7 @@ def _channels(path: Path, values: Array, vectors: bool) -> Array:
 
 
 def _exr(path: Path, name: str | None, vectors: bool) -> Array:
-    channels = _exr_channels(path)
+    channels = exr_channels(path, MAX_PIXELS)
     if vectors:
         return np.dstack([channels[channel] for channel in _three_of(channels, name, path)])
     if name is None and set(channels) in ({"R", "G", "B"}, {"R", "G", "B", "A"}):
@@ -159,24 +159,6 @@ def _exr(path: Path, name: str | None, vectors: bool) -> Array:
         expected = repr(name) if name else f"one that ends in {', '.join(DEPTH_CHANNELS)}"
         raise ArrayFileError(path, _listed(channels), expected, "name one with --array")
     return channels[chosen[0]]
-
-
-def _exr_channels(path: Path) -> dict[str, Array]:
-    """Return all channels by name; before it stands that of the part, where there are several."""
-    import OpenEXR
-
-    with OpenEXR.File(str(path), header_only=True) as file:
-        for part in file.parts:
-            low, high = part.header["dataWindow"]
-            size = (int(high[1] - low[1]) + 1, int(high[0] - low[0]) + 1)
-            _check_size(path, size, MAX_PIXELS)
-    with OpenEXR.File(str(path), separate_channels=True) as file:
-        several = len(file.parts) > 1
-        return {
-            f"{part.name()}.{name}" if several else name: np.asarray(channel.pixels)
-            for part in file.parts
-            for name, channel in part.channels.items()
-        }
 
 
 def _depths_of(channels: Mapping[str, Array]) -> list[str]:

@@ -15,7 +15,6 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from metrics.intake.array_files import read_array
 from metrics.intake.outputs import image_of, planar_from_distance
@@ -31,7 +30,7 @@ from scenegen.files.input_file import (
     open_file,
     open_unchecked,
 )
-from scenegen.files.pictures import picture_size, read_picture
+from scenegen.files.pictures import opened_picture, picture_size, read_picture
 from scenegen.files.places import files_below
 
 Array = NDArray[Any]
@@ -88,7 +87,7 @@ def _row(name: str, group: str, picture: Path, measure: Measure, *files: Path) -
     """Return a row of a picture, whose depth and matrix `measure` reads from files."""
 
     def read() -> Measured:
-        return Measured(read_picture(picture, MAX_PIXELS), *measure(*files))
+        return Measured(read_picture(picture, MAX_PIXELS), *measure(*files), file=picture)
 
     return Source(name, group, picture_size(picture, MAX_PIXELS), read)
 
@@ -117,7 +116,7 @@ def _of_moge(place: Path) -> tuple[Array, Array]:
     about = _json(_other(place / "meta.json", "camera"))
     codes = read_array(path).astype(np.float64)
     try:
-        with Image.open(path) as image:
+        with opened_picture(path, MAX_PIXELS) as image:
             near, far = (float(image.info[name]) for name in ("near", "far"))
             unit = float(image.info.get("unit", 1.0))  # of older files, metres
         height, width = codes.shape

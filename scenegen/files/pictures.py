@@ -3,12 +3,12 @@
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import IO, TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
 from scenegen.files.new_file import written_beside
@@ -20,55 +20,105 @@ DEFAULT_ROWS = 12
 MAX_ROWS = 400
 ENDINGS = (".png", ".jpg", ".jpeg", ".webp", ".tif", ".tiff")
 LARGEST_SIDE = {".webp": 16_383, ".jpg": 65_500, ".jpeg": 65_500, ".gif": 65_535}  # of the formats
-READ = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp", ".ppm")  # endings
-ORIENTATION, TURNED = 0x0112, (5, 6, 7, 8)  # of EXIF, and its values that swap the sides
+READ = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp", ".ppm", ".pgm")  # endings
+ORIENTATION = 0x0112  # of EXIF
+SWAPPED = (5, 6, 7, 8)  # its values that swap the sides
+
+
+@contextmanager
+def opened_picture(source: Path | IO[bytes], most: int) -> "Iterator[Image]":
+    """Open a picture; all of the project are read so. Its size is known, its pixels are not yet.
+
+    Raises FileFormatError for what is no picture, has more than `most` pixels, or cannot be read
+    within the block; OSError.
+    """
+    from PIL import Image, UnidentifiedImageError
+
+    where = source if isinstance(source, Path) else "picture"
+    try:
+        with Image.open(source) as picture:
+            if picture.width * picture.height > most:
+                found = f"{picture.height}x{picture.width}"
+                raise FileFormatError(where, found, f"at most {most:,} pixels")
+            yield picture
+    except (UnidentifiedImageError, Image.DecompressionBombError) as error:
+        raise FileFormatError(where, "what is no picture", ", ".join(READ)) from error
+    except (OSError, ValueError, SyntaxError) as error:
+        if isinstance(error, SceneGenError) or (isinstance(error, OSError) and error.filename):
+            raise
+        reason = " ".join(str(error).split())
+        raise FileFormatError(where, f"a picture that cannot be read ({reason:.120})") from error
 
 
 def picture_size(path: Path, most: int) -> tuple[int, int]:
     """Return height and width of a picture, from its head, as `read_picture` returns it.
 
-    Raises FileFormatError for what is no picture, or has more than `most` pixels; OSError.
+    Raises as `opened_picture`.
     """
-    with _opened(path, most) as picture:
-        turned = picture.getexif().get(ORIENTATION) in TURNED
-        return picture.size if turned else picture.size[::-1]
+    with opened_picture(path, most) as picture:
+        is_turned_later = picture.format != "TIFF"  # whose head Pillow turns itself
+        swapped = is_turned_later and picture.getexif().get(ORIENTATION) in SWAPPED
+        return picture.size if swapped else picture.size[::-1]
+
+
+def is_turned(picture: "Image") -> bool:
+    """Return whether a picture has EXIF data that turn it."""
+    return bool(picture.getexif().get(ORIENTATION, 1) != 1)
 
 
 def read_picture(path: Path, most: int) -> NDArray[np.uint8]:
     """Return a picture as it is to be seen, (H, W, 3) sRGB bytes, turned as its EXIF data say.
 
-    Raises as `picture_size`, and FileFormatError for a damaged one.
+    Raises as `opened_picture`.
     """
-    from PIL import ImageOps
-
-    with _opened(path, most) as picture:
-        return np.asarray(as_rgb(ImageOps.exif_transpose(picture)))
+    with opened_picture(path, most) as picture:
+        return np.asarray(as_rgb(picture))
 
 
 def as_rgb(picture: "Image") -> "Image":
-    """Return a picture of any mode in 8 bits and three channels."""
-    if picture.mode.startswith("I"):  # 16 bits, which `convert` would cut off
-        picture = picture.convert("I").point(lambda value: value / 256)
+    """Return a picture of any mode in 8 bits and three channels, turned as its EXIF data say.
+
+    Raises ValueError for numbers of 32 bits, which have no white.
+    """
+    picture = _turned(picture)
+    if picture.mode == "I":
+        picture = picture.point(lambda value: value / 256)
     return picture.convert("RGB")
 
 
-@contextmanager
-def _opened(path: Path, most: int) -> "Iterator[Image]":
-    from PIL import Image, UnidentifiedImageError
+def shares_of(picture: "Image", side: int) -> NDArray[np.float32]:
+    """Return a picture's values, (H, W, 3), 0 to 1, at most `side` a side, turned as `as_rgb`.
 
-    try:
-        with Image.open(path) as picture:
-            if picture.width * picture.height > most:
-                found = f"{picture.height}x{picture.width}"
-                raise FileFormatError(path, found, f"at most {most:,} pixels")
-            yield picture
-    except (UnidentifiedImageError, Image.DecompressionBombError) as error:
-        raise FileFormatError(path, "what is no picture", ", ".join(READ)) from error
-    except (OSError, ValueError, SyntaxError) as error:
-        if isinstance(error, OSError) and error.filename:
-            raise
-        reason = " ".join(str(error).split())
-        raise FileFormatError(path, f"a picture that cannot be read ({reason:.120})") from error
+    16 bits of grey keep their precision. Raises as `as_rgb`.
+    """
+    from PIL import Image
+
+    turned, white = _turned(picture), 65_535
+    if turned.mode == "I":
+        picture = Image.fromarray(np.asarray(turned, np.float32))
+    else:
+        picture, white = turned.convert("RGB"), 255
+    if max(picture.size) > side:
+        picture = picture.reduce(-(-max(picture.size) // side))
+    values = np.asarray(picture, np.float32) / np.float32(white)
+    return values if values.ndim == 3 else np.repeat(values[..., None], 3, axis=2)
+
+
+def _turned(picture: "Image") -> "Image":
+    """Return a picture turned as its EXIF data say; of 16 bits a channel in the mode "I"."""
+    picture = upright(picture)
+    if picture.mode.startswith("I"):  # of which `convert` to bytes would cut off what is white
+        picture = picture.convert("I")
+    if picture.mode == "F" or (picture.mode == "I" and np.asarray(picture).max() > 65_535):
+        raise ValueError("numbers of 32 bits, expected 8 or 16")
+    return picture
+
+
+def upright(picture: "Image") -> "Image":
+    """Return a picture turned as its EXIF data say."""
+    from PIL import ImageOps
+
+    return ImageOps.exif_transpose(picture)
 
 
 def pick_rows(

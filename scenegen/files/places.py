@@ -10,6 +10,7 @@ import re
 import secrets
 import shutil
 import tempfile
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
@@ -19,6 +20,7 @@ from typing import Any, cast
 from scenegen.common.errors import SceneGenError
 
 SEPARATOR = "://"
+MOST_WAYS = 3  # by which `files_below` enters the same folder
 
 
 def as_place(path: str | Path) -> Path:
@@ -95,22 +97,29 @@ def remove_folder(folder: Path) -> None:
 def files_below(folder: Path, pattern: str = "*") -> list[Path]:
     """Return the files in a folder and the folders below it, in order; links are followed.
 
-    A folder that several links lead to is entered once, so links in a circle end.
+    A file that several paths lead to comes once: with the first that matches, those without a link
+    first. A link to a folder that it lies in is not followed. Longer circles end, as no folder is
+    entered by more than MOST_WAYS.
 
     Args:
         pattern: of the path within the folder, with "/" before it; `*` stands for anything.
     """
-    entered, files = set[str](), []
-    for place, folders, names in os.walk(folder, followlinks=True):
-        real = os.path.realpath(place)
-        if real in entered:
-            folders.clear()
-            continue
-        entered.add(real)
-        folders.sort()
-        paths = [Path(place, name) for name in names]
-        files += [p for p in paths if fnmatchcase(f"/{p.relative_to(folder).as_posix()}", pattern)]
-    return sorted(path for path in files if path.is_file())
+    entered, files, roots = Counter[str](), dict[tuple[str, str], Path](), [folder]
+    for root in roots:  # which grow: what links lead to comes after all else
+        for place, folders, names in os.walk(root):
+            real = os.path.realpath(place)
+            entered[real] += 1
+            if entered[real] > MOST_WAYS:
+                folders.clear()
+                continue
+            folders.sort()
+            links = (path for name in folders if (path := Path(place, name)).is_symlink())
+            roots += [link for link in links if not Path(real).is_relative_to(link.resolve())]
+            for name in names:
+                path = Path(place, name)
+                if fnmatchcase(f"/{path.relative_to(folder).as_posix()}", pattern):
+                    files.setdefault((real, name), path)
+    return sorted(path for path in files.values() if path.is_file())
 
 
 def upload(file: Path, place: Path) -> None:

@@ -23,7 +23,7 @@ from scenegen.objects.meshes.store import MeshStore
 USUALLY_UP = {".stl": "z", ".glb": "y"}  # as printers and CAD have it, and as glTF demands
 COLORED = {
     ".ply": rb"property \w+ red\b",
-    ".glb": rb'"(COLOR_0|baseColorTexture|baseColorFactor)"',
+    ".glb": rb'"(COLOR_0|baseColor(Texture|Factor)|diffuse(Texture|Factor))"',
     ".obj": rb"(?m)^v([ \t]+[-+.\deE]+){6}\s*$",
 }
 HEAD = 2**16  # bytes of a file that are searched for colours

@@ -159,12 +159,19 @@ _SHARED = ("wood", "metal", "paint", "glow", "leather")  # all parts of an objec
 _PLAIN = ("wood", "plastic", "ceramic", "paint")  # of meshes that tell none
 
 
+REPEAT, CLAMP, MIRROR = range(3)  # how a picture goes on beyond its edges
+
+
 class Texture(NamedTuple):
-    """A picture on a surface: linear RGB, 0 to 1, (H, W, 3) float32, row 0 at v = 0; it repeats."""
+    """A picture on a surface: linear RGB, 0 to 1, (H, W, 3) float32, row 0 at v = 0.
+
+    `wrap` tells how it goes on along u and v.
+    """
 
     color: Array
     roughness: float
     metallic: float
+    wrap: tuple[int, int] = (REPEAT, REPEAT)
 
 
 class Paint(NamedTuple):

@@ -5,7 +5,9 @@ itself is read, so pictures and materials in files beside it do not count.
 """
 
 import io
-from typing import Any
+import re
+import warnings
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
@@ -15,15 +17,36 @@ from scipy.spatial import cKDTree
 from scenegen.common.srgb import decoded
 from scenegen.objects.meshes.clean import clean_mesh
 from scenegen.objects.meshes.errors import BadMeshError
+from scenegen.objects.meshes.materials import (
+    MeshMaterial,
+    Unread,
+    glb_material,
+    mtl_material,
+    plain_glb,
+)
+from scenegen.objects.meshes.readers.text import utf8
 
 Array = NDArray[Any]
 NEAR = 1e-5  # distance of centres of the same triangle, in bounding radii; or more, of others
 SAME_PLANE = 1e-4  # distance of corners from a triangle's plane, in bounding radii
 CANDIDATES = 8, 64  # triangles that may be of the same polygon; first few, then many
+HEAD = 2**16  # bytes of an OBJ file that are searched for colours beyond 1
+_NUMBER = rb"[ \t]+[-+.\deE]+"
+LARGE_COLOR = re.compile(
+    rb"(?m)^v(?:%b){3}(?=(?:%b){3}\s*$)(?:%b){0,2}[ \t]+0*([2-9]|[1-9]\d)" % ((_NUMBER,) * 3)
+)
+
+
+class Piece(NamedTuple):
+    """A mesh of trimesh's, what its file says about its surface, and where pictures lie, (V, 2)."""
+
+    mesh: trimesh.Trimesh
+    material: MeshMaterial | None
+    uv: Array | None
 
 
 def corner_colors(
-    data: bytes, suffix: str, up: str, vertices: Array, faces: Array
+    data: bytes, suffix: str, up: str, vertices: Array, faces: Array, unread: Unread
 ) -> NDArray[np.float32]:
     """Return linear RGB, 0 to 1, at the corners of a cleaned mesh's faces, (F, 3, 3).
 
@@ -33,42 +56,66 @@ def corner_colors(
         data, suffix: content of the file, and the suffix of its name.
         up: the axis, "y" or "z", that points up in the file.
         vertices, faces: of the cleaned mesh, (V, 3) and (F, 3).
+        unread: gets what is not read.
 
     Raises BadMeshError as `read_triangles` and `matched`.
     """
-    triangles, meshes = read_triangles(data, suffix.lower())
+    triangles, pieces = read_triangles(data, suffix.lower(), unread)
     if not len(triangles):
         return np.ones((len(faces), 3, 3), np.float32)
     is_linear = suffix.lower() == ".glb"
-    colors = np.concatenate([colors_of(mesh, is_linear) for mesh in meshes])
+    colors = np.concatenate([colors_of(piece, is_linear) for piece in pieces])
     face, theirs, ours = matched(triangles, up, vertices, faces)
     corner = np.linalg.norm(ours[:, :, None] - theirs[:, None], axis=-1).argmin(axis=2)
     return np.asarray(colors[face[:, None], corner].astype(np.float32))
 
 
 def read_triangles(
-    data: bytes, suffix: str, resolver: Any = None
-) -> tuple[Array, list[trimesh.Trimesh]]:
-    """Return a file's triangles in its own frame, (n, 3, 3), and trimesh's meshes that have them.
+    data: bytes, suffix: str, unread: Unread, resolver: Any = None
+) -> tuple[Array, list[Piece]]:
+    """Return a file's triangles in its own frame, (n, 3, 3), and the pieces that have them.
 
     Raises BadMeshError where trimesh cannot read the file. `resolver` finds the files beside it.
     """
-    triangles, meshes = [np.zeros((0, 3, 3))], []
+    triangles, pieces = [np.zeros((0, 3, 3))], list[Piece]()
+    materials: dict[int, MeshMaterial] = {}
     try:
-        scene: Any = trimesh.load_scene(
-            io.BytesIO(data), file_type=suffix[1:], resolver=resolver, process=False
-        )
+        if suffix == ".glb":
+            data, lying = plain_glb(data, unread)
+        elif suffix == ".obj":
+            data = utf8(data)
+            if LARGE_COLOR.search(data, 0, HEAD):
+                words = "has colours of vertices above 1, which are taken for 1"
+                unread.setdefault("colours", f"{words}: divide them by 255")
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Pillow's of many pixels, which are counted
+            scene: Any = trimesh.load_scene(
+                io.BytesIO(data), file_type=suffix[1:], resolver=resolver, process=False
+            )
         for node in scene.graph.nodes_geometry:
             matrix, name = scene.graph[node]
             mesh = scene.geometry[name]
             if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
                 placed = trimesh.transform_points(mesh.triangles.reshape(-1, 3), matrix)
                 triangles.append(placed.reshape(-1, 3, 3))
-                meshes.append(mesh)
+                told, uv, made = mesh.visual, None, None
+                if told.kind == "texture":
+                    key = id(told.material)
+                    if key not in materials:
+                        materials[key] = (
+                            glb_material(told.material, lying[int(told.material.name)], unread)
+                            if suffix == ".glb"
+                            else mtl_material(told.material, getattr(resolver, "is_linear", False))
+                        )
+                    made = materials[key]
+                    uv = None if told.uv is None else made.moved(told.uv)
+                pieces.append(Piece(mesh, made, uv))
+    except BadMeshError:
+        raise
     except Exception as error:  # trimesh raises what its parsers meet
         problem = f"{type(error).__name__}: {error}"
         raise BadMeshError("colours", problem, hint="export it without them") from error
-    return np.concatenate(triangles), meshes
+    return np.concatenate(triangles), pieces
 
 
 def matched(triangles: Array, up: str, vertices: Array, faces: Array) -> tuple[Array, Array, Array]:
@@ -103,28 +150,28 @@ def matched(triangles: Array, up: str, vertices: Array, faces: Array) -> tuple[A
     return cleaned.kept[match], theirs[match], ours
 
 
-def colors_of(mesh: Any, vertex_colors_are_linear: bool) -> Array:
-    """Return the linear colours of the corners of trimesh's triangles, (n, 3, 3)."""
+def colors_of(piece: Piece, vertex_colors_are_linear: bool) -> Array:
+    """Return the linear colours of the corners of a piece's triangles, (n, 3, 3)."""
+    mesh, material, uv = piece
     visual, faces = mesh.visual, mesh.faces
-    ones = np.ones((len(faces), 3, 3))
+    colors = np.ones((len(faces), 3, 3))
     if visual.kind in ("vertex", "face"):
         stored = visual.vertex_colors[faces] if visual.kind == "vertex" else visual.face_colors
         rgb = np.asarray(stored, np.float64)[..., :3] / 255
         linear = rgb if vertex_colors_are_linear else decoded(rgb)
-        return ones * (linear if linear.ndim == 3 else linear[:, None])
-    if visual.kind != "texture":
-        return ones
-    material = visual.material
-    factor = getattr(material, "baseColorFactor", None)  # linear, as glTF has it
-    image = getattr(material, "baseColorTexture", getattr(material, "image", None))
-    colors = ones if factor is None else ones * (np.asarray(factor, np.float64)[:3] / 255)
+        return colors * (linear if linear.ndim == 3 else linear[:, None])
+    if material is None:
+        return colors
+    if material.factor is not None:
+        colors = colors * material.factor
     more = visual.vertex_attributes.get("color")  # those of glTF beside a material
     if more is not None and vertex_colors_are_linear:
         most = np.iinfo(more.dtype).max if more.dtype.kind == "u" else 1
         colors = colors * (more[faces][..., :3].astype(np.float64) / most)
-    if image is not None and visual.uv is not None:
-        texels = trimesh.visual.color.uv_to_interpolated_color(visual.uv, image)
-        return np.asarray(colors * decoded(texels[:, :3].astype(np.float64) / 255)[faces])
-    if factor is None and image is None and hasattr(material, "diffuse"):
-        return np.asarray(ones * decoded(np.asarray(material.diffuse, np.float64)[:3] / 255))
-    return colors
+    if material.picture is None or uv is None:
+        return colors
+    kept = np.clip(uv, 0, 1)
+    away = np.where(uv == kept, uv, uv - np.floor(uv)), kept, np.abs(uv - 2 * np.round(uv / 2))
+    uv = np.stack([away[wrap][:, axis] for axis, wrap in enumerate(material.wrap)], axis=1)
+    texels = trimesh.visual.color.uv_to_interpolated_color(uv, material.picture)
+    return np.asarray(colors * decoded(texels[:, :3].astype(np.float64) / 255)[faces])

@@ -36,7 +36,7 @@ class MeshStore:
         self._files = {file.name: file for files in folder.models.values() for file in files}
         self._disk = DiskCache(cache_dir)
         self._digests: dict[str, str] = {}
-        self._lacks = False
+        self._unread: set[str] = set()  # kinds that were told
         self._shapes: Recent[UnitShape] = Recent(MOST_KEPT)
 
     def __reduce__(self) -> Any:
@@ -68,12 +68,20 @@ class MeshStore:
         """Return the own colours of a model. Raises BadMeshError."""
         from scenegen.objects.meshes.colors import corner_colors  # imports trimesh, which is slow
 
-        path = self._files[name].path
+        path, unread = self._files[name].path, dict[str, str]()
         try:
             mesh = model.vertices, model.faces
-            return corner_colors(read_bytes(path), path.suffix, self.folder.up, *mesh)
+            return corner_colors(read_bytes(path), path.suffix, self.folder.up, *mesh, unread)
         except BadMeshError as error:
             raise error.inside(name) from error
+        finally:
+            self._warn(name, unread)
+
+    def _warn(self, name: str, unread: dict[str, str]) -> None:
+        """Tell what is not read of a model; of each kind the first model tells enough."""
+        for kind in unread.keys() - self._unread:
+            self._unread.add(kind)
+            warnings.warn(f"{name} {unread[kind]}", stacklevel=3)
 
     def paint(self, name: str) -> Paint | None:
         """Return what a model's file and those beside it say about its surface, if they do.
@@ -84,21 +92,16 @@ class MeshStore:
 
         model = self._load(name)
         path, up = self._files[name].path, self.folder.up
-        lacking: list[str] = []
+        unread: dict[str, str] = {}
         with self._told(name):
             try:
-                paint = paint_of(path, up, model.vertices, model.faces, lacking)
+                paint = paint_of(path, up, model.vertices, model.faces, unread)
             except (BadMeshError, MemoryError):
                 raise
             except Exception as error:  # one bad picture must not stop a run
                 problem = f"{type(error).__name__}: {error}"
                 raise BadMeshError("colours and pictures", problem, "readable ones") from error
-        if lacking and not self._lacks:  # the first tells enough
-            self._lacks = True
-            warnings.warn(
-                f"{name} names {lacking[0]!r}, which cannot be read; such models are plain",
-                stacklevel=2,
-            )
+        self._warn(name, unread)
         return paint
 
     @contextmanager

@@ -1,23 +1,21 @@
 """Materials that others made: folders of maps as ambientCG and Poly Haven deliver them."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
 import numpy as np
-import OpenEXR
-from PIL import Image
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.recent import recent
 from scenegen.common.srgb import decoded
+from scenegen.files.exr import exr_picture
+from scenegen.files.pictures import opened_picture, picture_size, shares_of
 from scenegen.files.places import files_below
 from scenegen.rendering.materials.material import Array, Material, slopes_of
 
-Result = TypeVar("Result")
 MOST_PIXELS = 8192  # of a map's side
 KEPT_PIXELS = 1024  # to which larger maps are reduced
 # What a map is, by the end of its file's name; ambientCG writes Color, Poly Haven diff.
@@ -110,12 +108,12 @@ def check_maps(served: Mapping[str, tuple[MapFiles, ...]]) -> None:
     )
     pictures = [path for path in paths if path.suffix.lower() != ".exr"]  # which were decoded
     with ThreadPoolExecutor() as threads:
-        for _ in threads.map(lambda path: _opened(path, _decoded), pictures):
+        for _ in threads.map(_decoded, pictures):
             pass
 
 
 def _decoded(path: Path) -> None:
-    with Image.open(path) as picture:
+    with opened_picture(path, MOST_PIXELS**2) as picture:
         picture.draft(None, (64, 64))  # JPEG files are decoded at an eighth of their size
         picture.load()
 
@@ -134,38 +132,17 @@ def _check(where: Path, files: list[tuple[str, Path]]) -> None:
 
 
 def _size(path: Path) -> tuple[int, int]:
-    if path.suffix.lower() == ".exr":
-        height, width = _opened(path, _exr).shape[:2]
-    else:
-        width, height = _opened(path, _picture_size)
+    is_exr, most = path.suffix.lower() == ".exr", MOST_PIXELS**2
+    height, width = exr_picture(path, most).shape[:2] if is_exr else picture_size(path, most)
     if max(width, height) > MOST_PIXELS:
         raise FileFormatError(path, f"{width} x {height} pixels", f"at most {MOST_PIXELS} a side")
     return width, height
 
 
-def _picture_size(path: Path) -> tuple[int, int]:
-    with Image.open(path) as picture:
-        return picture.size
-
-
-def _opened(path: Path, read: Callable[[Path], Result]) -> Result:
-    try:
-        return read(path)
-    except Exception as error:  # the readers raise what their formats meet
-        problem = f"{type(error).__name__}: {error}"
-        raise FileFormatError(path, problem, "a picture") from error
-
-
-def _exr(path: Path) -> Array:
-    channels = OpenEXR.File(str(path)).channels()
-    pixels = channels.get("RGB", channels.get("RGBA", next(iter(channels.values())))).pixels
-    return np.asarray(pixels, np.float32)
-
-
 @recent(400_000_000)
 def read_maps(maps: MapFiles) -> Material:
     """Return a material from its files. Raises FileFormatError where one cannot be read."""
-    fields = {kind: _opened(path, _pixels) for kind, path in maps.files}
+    fields = {kind: _pixels(path) for kind, path in maps.files}
     color = fields["color"]
     rough = fields["roughness"].mean(axis=2) if "roughness" in fields else 0.6
     height = _height(fields["normal"], maps.metres) if "normal" in fields else None
@@ -180,20 +157,11 @@ def read_maps(maps: MapFiles) -> Material:
 def _pixels(path: Path) -> Array:
     """Return a picture's values, (H, W, 3) float32, 0 to 1; row 0 is its lower edge."""
     if path.suffix.lower() == ".exr":
-        values = _exr(path)
-        values = values[..., None].repeat(3, axis=2) if values.ndim == 2 else values[..., :3]
+        values = exr_picture(path, MOST_PIXELS**2)
         step = -(-max(values.shape) // KEPT_PIXELS)
         return np.ascontiguousarray(values[::-step, ::step])
-    with Image.open(path) as opened:
-        if opened.mode.startswith("I"):  # 16 bits
-            picture, most = Image.fromarray(np.asarray(opened, np.float32)), 65535.0
-        else:
-            picture, most = opened.convert("RGB"), 255.0
-    if max(picture.size) > KEPT_PIXELS:
-        picture = picture.reduce(-(-max(picture.size) // KEPT_PIXELS))
-    values = np.asarray(picture, np.float32) / np.float32(most)
-    values = values[..., None].repeat(3, axis=2) if values.ndim == 2 else values
-    return np.ascontiguousarray(values[::-1])
+    with opened_picture(path, MOST_PIXELS**2) as picture:
+        return np.ascontiguousarray(shares_of(picture, KEPT_PIXELS)[::-1])
 
 
 def _height(normal: Array, metres: float) -> Array:

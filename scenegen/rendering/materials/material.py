@@ -27,6 +27,7 @@ class Material:
         bumps: factor of the slopes.
         metallic, specular: 0 to 1.
         metres: length of one repeat, in metres of texture coordinates.
+        wrap: how maps go on along u and v: `furnishing.REPEAT`, CLAMP or MIRROR.
         radiance: linear RGB that its front shines with; such a material reflects nothing.
     """
 
@@ -38,6 +39,7 @@ class Material:
     metallic: float = 0.0
     specular: float = 0.5
     metres: float = 1.0
+    wrap: tuple[int, int] = (0, 0)
     radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def texels(self) -> Array:

@@ -4,6 +4,7 @@ A data set names them by digests of their bytes. Their places are told to each p
 """
 
 import hashlib
+import re
 from collections.abc import Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
 from scenegen.description.specs import InteriorSpec
+from scenegen.files.exr import exr_picture
 from scenegen.files.places import files_below
 from scenegen.rendering.backend import point_to_llvm
 from scenegen.rendering.materials.folders import MapFiles, check_maps, from_folder
@@ -23,6 +25,9 @@ from scenegen.rendering.pictures.places import ASSETS
 Array = NDArray[Any]
 MEAN = 0.09  # radiance that the upper half of the surroundings is scaled to, that of a clear sky
 MOST_COLUMNS = 4096
+MOST_PIXELS = 2**28  # of a file
+HEAD = 2**16  # bytes in which an HDR file tells its order
+ENVIRONMENT = "an equirectangular picture in HDR or EXR"
 
 
 def materials_of(spec: InteriorSpec) -> Mapping[str, tuple[MapFiles, ...]] | None:
@@ -80,22 +85,10 @@ def read_environment(place: Path) -> Array:
     Raises FileFormatError where it is broken, has a low dynamic range, or is not twice as wide as
     high.
     """
-    point_to_llvm()  # before Dr.Jit is imported, with Mitsuba
-    import mitsuba
-
-    mi: Any = mitsuba
-    if mi.variant() is None:  # bitmaps need one
-        mi.set_variant("scalar_rgb")
-    expected = "an equirectangular picture in HDR or EXR"
     if not place.is_file():
-        raise FileFormatError(place, "no such file", expected)
-    try:
-        bitmap = mi.Bitmap(str(place))
-    except Exception as error:  # Mitsuba raises RuntimeError for whatever it meets
-        raise FileFormatError(place, "no picture that can be read", expected) from error
-    if bitmap.component_format() not in (mi.Struct.Type.Float16, mi.Struct.Type.Float32):
-        raise FileFormatError(place, "a low dynamic range", expected)
-    values = np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+        raise FileFormatError(place, "no such file", ENVIRONMENT)
+    is_exr, expected = place.suffix.lower() == ".exr", ENVIRONMENT
+    values = exr_picture(place, MOST_PIXELS) if is_exr else _radiance(place)
     rows, columns = values.shape[:2]
     if columns != 2 * rows or rows < 2:
         raise FileFormatError(place, f"{columns} x {rows} pixels", f"{expected}, twice as wide")
@@ -106,6 +99,37 @@ def read_environment(place: Path) -> Array:
     if mean == 0.0:
         raise FileFormatError(place, "a black upper half", f"{expected}, with the sky above")
     return np.asarray(values * np.float32(MEAN / mean))
+
+
+def _radiance(place: Path) -> Array:
+    """Return the colours of an HDR file, (H, W, 3) float32. Raises FileFormatError."""
+    point_to_llvm()  # before Dr.Jit is imported, with Mitsuba
+    import mitsuba
+
+    mi: Any = mitsuba
+    if mi.variant() is None:  # bitmaps need one
+        mi.set_variant("scalar_rgb")
+    with place.open("rb") as file:
+        head, _, size = file.read(HEAD).partition(b"\n\n")
+    order, _, pixels = size.partition(b"\n")
+    if head.startswith(b"#?"):
+        if b"xyze" in head:
+            raise FileFormatError(place, "colours as XYZE", "RGBE, 32-bit_rle_rgbe")
+        if not re.fullmatch(rb"-Y +\d+ +\+X +\d+\s*", order):
+            found = f"pixels in the order {order[:40].decode(errors='replace')!r}"
+            raise FileFormatError(place, found, "-Y HEIGHT +X WIDTH: rows from above")
+    try:
+        bitmap = mi.Bitmap(str(place))
+        if bitmap.component_format() not in (mi.Struct.Type.Float16, mi.Struct.Type.Float32):
+            raise FileFormatError(place, "a low dynamic range", ENVIRONMENT)
+        return np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
+    except FileFormatError:
+        raise
+    except Exception as error:  # Mitsuba raises RuntimeError for whatever it meets
+        is_old = head.startswith(b"#?") and not pixels.startswith(b"\2\2") and b"\1\1\1" in pixels
+        found = "run lengths of the oldest kind" if is_old else "no picture that can be read"
+        hint = "save it again, such as with oiiotool or ImageMagick" if is_old else ""
+        raise FileFormatError(place, found, ENVIRONMENT, hint) from error
 
 
 def _reduced(values: Array, step: int) -> Array:

@@ -14,6 +14,7 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.objects.furniture.furnishing import CLAMP, REPEAT
 from scenegen.rendering.meshes.unit_scene import triangle_mesh
 from scenegen.rendering.pictures.lights import (
     Lights,
@@ -82,7 +83,7 @@ class ClosedRoom(NamedTuple):
         self, d: Any, flat: Any, normal: Any, uv: Any, gradients: Sequence[Any], row: Sequence[Any]
     ) -> "Lobes":
         """Return what a surface does with light, from its texture coordinates and material."""
-        texel = _texel(self.texels, uv, *row[:4])
+        texel = _texel(self.texels, uv, row[0], row[1], row[2], row[3], row[6:8])
         red, green, blue, rough = (mi.Float((texel >> (8 * k)) & 255) / 255 for k in range(4))
         color = mi.Color3f(red * red, green * green, blue * blue)
         both = _texel(
@@ -149,15 +150,24 @@ def _cross(a: Array, b: Array) -> Array:
     return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=1)
 
 
-def _texel(values: Any, uv: Any, first: Any, width: Any, height: Any, metres: Any) -> Any:
+def _texel(
+    values: Any, uv: Any, first: Any, width: Any, height: Any, metres: Any, wrap: Any = (0, 0)
+) -> Any:
     """Return the value of a map at a point, of the nearest pixel.
 
     Those are mostly smaller than a picture's: its samples average them.
     """
-    u, v = uv.x / metres, uv.y / metres
-    x = mi.UInt32(dr.minimum((u - dr.floor(u)) * width, width - 1))
-    y = mi.UInt32(dr.minimum((v - dr.floor(v)) * height, height - 1))
+    u, v = (_wrapped(*x) for x in ((uv.x / metres, wrap[0]), (uv.y / metres, wrap[1])))
+    x = mi.UInt32(dr.minimum(u * width, width - 1))
+    y = mi.UInt32(dr.minimum(v * height, height - 1))
     return dr.gather(mi.UInt32, values, mi.UInt32(first) + y * mi.UInt32(width) + x)
+
+
+def _wrapped(x: Any, wrap: Any) -> Any:
+    """Return the place in a map, 0 to 1, of any place along an axis."""
+    mirrored = dr.abs(x - 2 * dr.round(0.5 * x))
+    beyond = dr.select(wrap == CLAMP, dr.clip(x, 0, 1), mirrored)
+    return dr.select(wrap == REPEAT, x - dr.floor(x), beyond)
 
 
 class Lobes(NamedTuple):

@@ -36,8 +36,8 @@ class Tables:
     Attributes:
         of_face: row of each triangle's material, (F,) uint32.
         rows: of M materials, (M, 16) float32: first texel, width and height of its colours; metres
-            of a repeat; metallic, specular, two unused; first value, width and height of its
-            slopes, and their factor; radiance, linear RGB; one unused.
+            of a repeat; metallic, specular, wrap along u and v; first value, width and height of
+            its slopes, and their factor; radiance, linear RGB; one unused.
         texels, slopes: as from `Material.texels` and `material.slopes_of`.
     """
 
@@ -87,8 +87,8 @@ class _Collector:
         key = f"{owner} texture", part
         if key not in self.numbers:
             self.numbers[key] = len(self.materials)
-            color, roughness, metallic = texture
-            self.materials.append(Material(color, roughness, metallic=metallic))
+            color, roughness, metallic, wrap = texture
+            self.materials.append(Material(color, roughness, metallic=metallic, wrap=wrap))
         return self.numbers[key]
 
     def add(self, corners: Array, normals: Array, uv: Array, rows: Array) -> None:
@@ -164,7 +164,7 @@ def tables_of(materials: Sequence[Material], of_face: Array) -> Tables:
     for row, one in zip(rows, materials, strict=True):
         texels.append(one.texels())
         row[:4] = first_texel, texels[-1].shape[1], texels[-1].shape[0], one.metres
-        row[4:6] = one.metallic, one.specular
+        row[4:8] = one.metallic, one.specular, *one.wrap
         row[12:15] = one.radiance
         first_texel += _padded(texels[-1].size)
         if one.slopes is not None:

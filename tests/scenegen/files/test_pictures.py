@@ -1,11 +1,22 @@
 """Which rows are shown, and pictures that are written whole or not at all."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.files.pictures import pick_rows, picture_size, read_picture, save_picture
+from scenegen.files.pictures import (
+    is_turned,
+    opened_picture,
+    pick_rows,
+    picture_size,
+    read_picture,
+    save_picture,
+    shares_of,
+    upright,
+)
 
 
 def test_choice_of_rows():
@@ -47,20 +58,61 @@ def test_a_sheet_that_a_format_cannot_hold(tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["s.png"]
 
 
-def test_a_picture_is_read_as_it_is_seen(tmp_path):
-    """Turned as its EXIF data say, and 16 bits of grey as 8."""
-    values = np.arange(2 * 3 * 3, dtype=np.uint8).reshape(2, 3, 3)
-    turned = Image.Exif()
-    turned[0x0112] = 6  # the first row is the right-hand side
-    Image.fromarray(values).save(tmp_path / "turned.png", exif=turned)
-    assert picture_size(tmp_path / "turned.png", 6) == (3, 2)
-    np.testing.assert_array_equal(
-        read_picture(tmp_path / "turned.png", 6), np.rot90(values, axes=(1, 0))
-    )
-    grey = np.array([[0, 255, 256], [513, 40_000, 65_535]], np.uint16)
-    Image.fromarray(grey).save(tmp_path / "grey.png")
-    seen = read_picture(tmp_path / "grey.png", 6)
-    np.testing.assert_array_equal(seen, np.repeat((grey >> 8)[..., None], 3, axis=2))
+SEEN = np.arange(2 * 3 * 3, dtype=np.uint8).reshape(2, 3, 3) * 10
+STORED = {  # by orientation in EXIF
+    1: SEEN, 2: SEEN[:, ::-1], 3: SEEN[::-1, ::-1], 4: SEEN[::-1], 5: SEEN.swapaxes(0, 1),
+    6: np.rot90(SEEN), 7: SEEN[::-1, ::-1].swapaxes(0, 1), 8: np.rot90(SEEN, -1),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("orientation", STORED)
+@pytest.mark.parametrize("name", ["a.png", "a.tiff", "a.webp"])
+def test_a_picture_is_turned_as_its_exif_data_say(tmp_path, name, orientation):
+    exif, path = Image.Exif(), tmp_path / name
+    exif[0x0112] = orientation
+    stored = Image.fromarray(np.ascontiguousarray(STORED[orientation]))
+    stored.save(path, exif=exif, **({"lossless": True} if name == "a.webp" else {}))
+    assert picture_size(path, 6) == (2, 3)
+    np.testing.assert_array_equal(read_picture(path, 6), SEEN)
+    with opened_picture(path, 6) as picture:
+        np.testing.assert_array_equal(shares_of(picture, 9), SEEN / np.float32(255))
+    with opened_picture(path, 6) as picture:
+        assert is_turned(picture) == (orientation > 1)
+        np.testing.assert_array_equal(np.asarray(upright(picture)), SEEN)
+
+
+GREY = np.array([[0, 255, 256], [513, 40_000, 65_535]], np.uint16)
+
+
+@pytest.mark.parametrize(
+    ("name", "picture"),
+    [
+        ("a.png", Image.fromarray(GREY)),
+        ("a.tiff", Image.fromarray(GREY)),
+        ("a.tif", Image.frombytes("I;16B", (3, 2), GREY.astype(">u2").tobytes())),
+        ("b.tif", Image.fromarray(GREY.astype(np.int32))),
+    ],
+)
+def test_16_bits_of_grey_become_8(tmp_path, name, picture):
+    picture.save(tmp_path / name)
+    seen = read_picture(tmp_path / name, 6)
+    np.testing.assert_array_equal(seen, np.repeat((GREY >> 8)[..., None], 3, axis=2))
     for read in (picture_size, read_picture):
         with pytest.raises(FileFormatError):
-            read(tmp_path / "grey.png", 5)
+            read(tmp_path / name, 5)
+
+
+def test_numbers_without_a_white_are_no_picture(tmp_path):
+    for values in (np.float32(GREY), np.int32(GREY) * 2):
+        Image.fromarray(values).save(tmp_path / "a.tiff")
+        with pytest.raises(FileFormatError):
+            read_picture(tmp_path / "a.tiff", 6)
+
+
+def test_one_module_opens_pictures():
+    """All others call it, so that each is turned and has its levels."""
+    root = Path(__file__).parents[3]
+    paths = [path for name in ("scenegen", "iqtt", "metrics", "baselines")
+             for path in (root / name).rglob("*.py")]  # fmt: skip
+    opening = [p.name for p in paths if "Image.open(" in p.read_text() and p.name != "pictures.py"]
+    assert not opening

@@ -132,3 +132,8 @@ def test_files_below_follow_links_that_end(tmp_path):
     names = [path.relative_to(tmp_path).as_posix() for path in files_below(tmp_path / "a", "*.png")]
     assert names == ["a/1.png", "a/b/2.png", "a/b/linked/3.png"]
     assert [path.name for path in files_below(tmp_path, "*/b/*.png")] == ["2.png", "3.png"]
+    (tmp_path / "0").symlink_to(tmp_path / "a")  # of two paths the one without a link counts
+    for name in ("again", "once more"):
+        (tmp_path / "a/b" / name).symlink_to(tmp_path)
+    names = [path.relative_to(tmp_path).as_posix() for path in files_below(tmp_path, "*.png")]
+    assert names == ["a/1.png", "a/b/2.png", "beside/3.png"]

@@ -63,6 +63,30 @@ def test_surroundings_are_equirectangular_and_of_high_range(tmp_path):
             read_environment(path)
 
 
+FLAT, RGBE = bytes((128, 64, 32, 129)) * 128, b"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n"
+OLD_RUNS = bytes((128, 64, 32, 129, 1, 1, 1, 127))
+
+
+def test_hdr_files_are_read_from_above_as_rgb(tmp_path):
+    from scenegen.rendering.pictures.assets import read_environment
+
+    path = tmp_path / "a.hdr"
+    path.write_bytes(RGBE + b"-Y 8 +X 16\n" + FLAT)
+    np.testing.assert_allclose(np.divide(*read_environment(path)[0, 0, :2]), 2.0)
+    for head, body, word in (
+        (RGBE + b"+Y 8 +X 16\n", FLAT, "+Y 8 +X 16"),
+        (RGBE + b"-Y 8 -X 16\n", FLAT, "-Y 8 -X 16"),
+        (RGBE.replace(b"rgbe", b"xyze") + b"-Y 8 +X 16\n", FLAT, "XYZE"),
+        (RGBE + b"-Y 8 +X 16\n", OLD_RUNS, "run"),
+        (RGBE + b"-Y 8 +X 16\n", FLAT[:99], ""),
+    ):
+        path.write_bytes(head + body)
+        read_environment.cache_clear()
+        with pytest.raises(FileFormatError) as error:
+            read_environment(path)
+        assert word in error.value.found
+
+
 def test_large_surroundings_keep_the_light_of_a_small_sun(tmp_path, monkeypatch):
     from scenegen.rendering.pictures import assets
 

@@ -62,3 +62,18 @@ def test_points_of_lamps_are_uniform_by_area(lights):
     np.testing.assert_allclose(
         np.asarray(density) * cosine / np.asarray(distance) ** 2, 0.2, rtol=0.02
     )
+
+
+def test_maps_repeat_end_or_are_mirrored_beyond_their_edges(variant):
+    import mitsuba as mi
+
+    from scenegen.rendering.pictures.closed_rooms import _wrapped
+
+    places = [-1.25, -0.25, 0.0, 0.25, 1.0, 1.25, 3.2]
+    for wrap, expected in enumerate((
+        [0.75, 0.75, 0.0, 0.25, 0.0, 0.25, 0.2],
+        [0.0, 0.0, 0.0, 0.25, 1.0, 1.0, 1.0],
+        [0.75, 0.25, 0.0, 0.25, 1.0, 0.75, 0.8],
+    )):  # fmt: skip
+        found = _wrapped(mi.Float(places), mi.Float(wrap))
+        np.testing.assert_allclose(np.asarray(found), expected, atol=1e-6)

@@ -18,12 +18,17 @@ _NOT_FINITE = (math.nan, math.nan, math.nan)
 
 def lines(data: bytes) -> Iterator[bytes]:
     """Return the lines of UTF-8, Latin-1 or UTF-16 text, with any line ending."""
+    return iter(io.BytesIO(utf8(data)))
+
+
+def utf8(data: bytes) -> bytes:
+    """Return such text without a mark of its encoding, with line ends that have a newline."""
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         data = data.decode("utf-16", "replace").encode("utf-8", "replace")
     data = data.removeprefix(codecs.BOM_UTF8)
     if b"\n" not in data:
         data = data.replace(b"\r", b"\n")
-    return iter(io.BytesIO(data))
+    return data
 
 
 def point(words: list[bytes]) -> tuple[float, float, float]:

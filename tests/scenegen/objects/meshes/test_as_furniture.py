@@ -1,5 +1,7 @@
 """Meshes as furniture: their own textures and colours, their size and front, rooms with them."""
 
+import base64
+import io
 import json
 import struct
 import zlib
@@ -13,13 +15,14 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from scenegen import open_rooms
-from scenegen.common.srgb import encoded
+from scenegen.common.srgb import decoded, encoded
 from scenegen.objects.catalogue import changed_meshes, furniture_models
 from scenegen.objects.families.members import MEMBERS
-from scenegen.objects.furniture.furnishing import furnishing
+from scenegen.objects.furniture.furnishing import CLAMP, MIRROR, REPEAT, furnishing
 from scenegen.objects.furniture.shapes import piece
-from scenegen.objects.meshes import limits, textures
+from scenegen.objects.meshes import limits, materials, textures
 from scenegen.objects.meshes.as_furniture import mesh_furniture
+from scenegen.objects.meshes.colors import corner_colors
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFile, ModelFolder
 from scenegen.objects.meshes.store import MeshStore
@@ -130,9 +133,9 @@ def test_colours_without_pictures_and_files_that_tell_nothing(tmp_path):
 
 def test_too_large_pictures_are_refused_and_large_ones_reduced(tmp_path, monkeypatch):
     path = quad(tmp_path / "models")
-    monkeypatch.setattr(textures, "KEPT_PIXELS", 1)
+    monkeypatch.setattr(materials, "KEPT_PIXELS", 1)
     assert store_of(path).paint("thing/a").textures[0].color.shape == (1, 1, 3)
-    monkeypatch.setattr(textures, "MOST_PIXELS", 1)
+    monkeypatch.setattr(materials, "MOST_PIXELS", 1)
     store = store_of(path)
     with pytest.raises(BadMeshError):
         store.paint("thing/a")
@@ -279,7 +282,7 @@ def test_pictures_of_glb_files_are_moved_and_mirrored_as_they_tell(tmp_path):
         store = store_of(tmp_path / "a.glb")
         paint, mesh = store.paint("thing/a"), store.shape("thing/a").mesh
         corners = mesh.vertices[mesh.faces].astype(float)
-        assert paint.textures[0][1:] == pytest.approx((0.2, 0.0))
+        assert paint.textures[0][1:3] == pytest.approx((0.2, 0.0))
         color = shown(paint, corners, [-corners.max() / 2] * 2)
         return np.rint(encoded(color) * 255).astype(int).tolist()
 
@@ -315,3 +318,181 @@ def test_vertex_colours_beside_a_material_count(tmp_path):
     data = trimesh.Scene(box).export(file_type="glb")
     (tmp_path / "a.glb").write_bytes(rewritten(data, change))
     assert store_of(tmp_path / "a.glb").paint("thing/a").textures[0].color.tolist() == [[[1, 0, 0]]]
+
+
+RED, GOLD = (200, 100, 50), (255, 200, 60)
+GLOSS = "KHR_materials_pbrSpecularGlossiness"
+
+
+def base(document):
+    return document["materials"][0]["pbrMetallicRoughness"].pop("baseColorTexture")
+
+
+def glossy(**told):
+    def change(document):
+        extension = {"diffuseTexture": base(document), **told}
+        document["materials"][0] = {
+            "extensions": {GLOSS: {k: v for k, v in extension.items() if v}}
+        }
+
+    return change
+
+
+def source(name, number, **fallback):
+    """Picture 1 is of a format that nobody reads."""
+
+    def change(document):
+        document["images"].append({"uri": "data:image/ktx2;base64,q0tUWCAyMLs="})
+        document["textures"] = [{"extensions": {name: {"source": number}}, **fallback}]
+
+    return change
+
+
+def uri(name):
+    return lambda document: document.update(images=[{"uri": name}])
+
+
+def with_extension(name):
+    return lambda document: document["materials"][0].update(extensions={name: {}})
+
+
+def factor(document):
+    document["materials"][0]["pbrMetallicRoughness"]["baseColorFactor"] = [0.5, 1, 1, 1]
+
+
+PNG = io.BytesIO()
+Image.new("RGB", (2, 2), RED).save(PNG, "PNG")
+INSIDE = "data:image/png;base64," + base64.b64encode(PNG.getvalue()).decode()
+HALF = np.rint(encoded(np.array(0.5) * decoded(200 / 255)) * 255)
+
+
+@pytest.mark.parametrize(
+    ("change", "color", "unread"),
+    [
+        (lambda document: None, RED, set()),
+        (factor, (HALF, *RED[1:]), set()),
+        (glossy(), RED, set()),
+        (glossy(specularFactor=[0.2, 0.2, 0.2], glossinessFactor=0.3), RED, set()),
+        (glossy(diffuseFactor=[0.0, 0.0, 0.0, 1.0], specularFactor=decoded(np.array(GOLD) / 255)
+                .tolist()), GOLD, set()),
+        (source("EXT_texture_webp", 0), RED, set()),
+        (source("EXT_texture_avif", 0), RED, set()),
+        (source("KHR_texture_basisu", 1, source=0), RED, set()),
+        (source("KHR_texture_basisu", 1), None, {"picture"}),
+        (uri("wood%20%C3%A9.png"), GOLD, set()),
+        (uri("wood é.png"), GOLD, set()),
+        (uri(INSIDE), RED, set()),
+        (uri("none.png"), None, {"picture"}),
+        (uri("data:image/ktx2;base64,q0tUWCAyMLs="), None, {"picture"}),
+        (uri("../../secret.png"), None, {"picture"}),
+        (uri("..%2F..%2Fsecret.png"), None, {"picture"}),
+        (with_extension("KHR_materials_sheen"), RED, {"KHR_materials_sheen"}),
+        (with_extension("KHR_materials_unlit"), RED, set()),
+        (lambda document: document["materials"][0].update(emissiveFactor=[1, 1, 1]), RED,
+         {"emission"}),
+    ],
+)  # fmt: skip
+def test_materials_of_glb_files_are_read_or_told(tmp_path, change, color, unread):
+    """By `paint_of` in rooms, and by `corner_colors` as own colours."""
+    box, folder = trimesh.creation.box(), tmp_path / "root" / "models"
+    folder.mkdir(parents=True)
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.new("RGB", (2, 2), RED))
+    box.visual = trimesh.visual.TextureVisuals(np.full((8, 2), 0.5), material)
+    (folder / "a.glb").write_bytes(rewritten(box.export(file_type="glb"), change))
+    for place in (folder / "wood é.png", tmp_path / "secret.png"):
+        Image.new("RGB", (2, 2), GOLD).save(place)
+    mesh = store_of(folder / "a.glb").shape("thing/a").mesh
+    told = {}
+    paint = textures.paint_of(folder / "a.glb", "y", mesh.vertices, mesh.faces, told)
+    assert told.keys() == unread
+    if color is None:
+        assert paint is None
+        return
+    assert encoded(paint.textures[0].color[0, 0]) * 255 == pytest.approx(color, abs=0.6)
+    data = (folder / "a.glb").read_bytes()
+    colors = corner_colors(data, ".glb", "y", mesh.vertices, mesh.faces, {})
+    if color is RED:  # pictures beside a file are no part of its own colours
+        assert encoded(colors[0, 0]) * 255 == pytest.approx(RED, abs=0.6)
+
+
+@pytest.mark.parametrize(("diffuse", "seen"), [(RED, (RED, 0.0)), ((0, 0, 0), (GOLD, 1.0))])
+def test_glossy_materials_that_are_dark_and_shine_are_metal(tmp_path, diffuse, seen):
+    material = trimesh.visual.material.PBRMaterial(
+        baseColorTexture=Image.new("RGB", (2, 2), diffuse),
+        metallicRoughnessTexture=Image.new("RGBA", (2, 2), (*GOLD, 51)),
+    )
+    box = trimesh.creation.box()
+    box.visual = trimesh.visual.TextureVisuals(np.full((8, 2), 0.5), material)
+
+    def change(document):
+        shiny = document["materials"][0]["pbrMetallicRoughness"].pop("metallicRoughnessTexture")
+        glossy(specularGlossinessTexture=shiny)(document)
+
+    (tmp_path / "a.glb").write_bytes(rewritten(box.export(file_type="glb"), change))
+    (texture,) = store_of(tmp_path / "a.glb").paint("thing/a").textures
+    assert encoded(texture.color[0, 0]) * 255 == pytest.approx(seen[0], abs=0.6)
+    assert texture[1:3] == pytest.approx((1 - 51 / 255, seen[1]))
+
+
+@pytest.mark.parametrize(
+    ("told", "wrap", "seen"),
+    [
+        ({}, (REPEAT, REPEAT), 0.2),
+        ({"wrapS": 33071}, (CLAMP, REPEAT), 1.0),
+        ({"wrapS": 33648, "wrapT": 33071}, (MIRROR, CLAMP), 0.8),
+    ],
+)
+def test_pictures_of_glb_files_go_on_as_their_samplers_tell(tmp_path, told, wrap, seen):
+    """Coordinates of 3.2 along u: what is shown there as own colour, and what rooms get."""
+    ramp = np.zeros((2, 256, 3), np.uint8)
+    ramp[..., 1] = np.arange(256)
+    material = trimesh.visual.material.PBRMaterial(baseColorTexture=Image.fromarray(ramp))
+    box = trimesh.creation.box()
+    box.visual = trimesh.visual.TextureVisuals(np.full((8, 2), (3.2, 0.5)), material)
+
+    def change(document):
+        document["samplers"], document["textures"][0]["sampler"] = [told], 0
+
+    (tmp_path / "a.glb").write_bytes(rewritten(box.export(file_type="glb"), change))
+    store = store_of(tmp_path / "a.glb")
+    paint = store.paint("thing/a")
+    assert paint.textures[0].wrap == wrap
+    kept = {REPEAT: 0.2, CLAMP: 3.2, MIRROR: 1.2}[wrap[0]]
+    period = 2 if wrap[0] == MIRROR else 4
+    np.testing.assert_allclose(paint.uv[..., 0] % period, kept, atol=1e-5)
+    colors = store.shape("thing/a").make_colors()
+    np.testing.assert_allclose(encoded(colors[..., 1]), seen, atol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("head", "color"),
+    [
+        ("", decoded(np.array([128, 64, 0]) / 255)),
+        ("# Blender 3.6.0 MTL File: 'a.blend'\n", [128 / 255, 64 / 255, 0]),
+    ],
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_colours_of_mtl_files_are_srgb_but_those_of_blender(tmp_path, head, color, encoding):
+    path = quad(tmp_path / "models", material="")
+    text = f"{head}newmtl m\nKd {128 / 255} {64 / 255} 0\n"
+    path.with_name("a.mtl").write_text(text, encoding=encoding)
+    path.write_text(path.read_text(), encoding=encoding)
+    (texture,) = store_of(path).paint("thing/a").textures
+    np.testing.assert_allclose(texture.color[0, 0], color, atol=5e-3)
+
+
+def test_options_and_percents_of_pictures_of_mtl_files(tmp_path):
+    path = quad(tmp_path / "models", "a b.png", "map_Kd -clamp on")
+    mtl = path.with_name("a.mtl")
+    mtl.write_text(mtl.read_text().replace("a b.png", "a%20b.png"))
+    assert store_of(path).paint("thing/a").textures[0].wrap == (CLAMP, CLAMP)
+
+
+@pytest.mark.parametrize(("most", "told"), [(1, set()), (255, {"colours"})])
+def test_colours_of_vertices_up_to_255_are_told(tmp_path, most, told):
+    path = quad(tmp_path / "models", material="")
+    text = "".join(f"v {x} {y} 0 {most} {0.5 * most:g} 0\n" for x, y in ((0, 0), (1, 0), (1, 1)))
+    path.write_text(f"{text}f 1 2 3\n")
+    mesh, unread = store_of(path).shape("thing/a").mesh, {}
+    textures.paint_of(path, "y", mesh.vertices, mesh.faces, unread)
+    assert unread.keys() == told

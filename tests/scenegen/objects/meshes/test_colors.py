@@ -43,7 +43,7 @@ def of(mesh, suffix, up="y"):
     data = mesh.export(file_type=suffix[1:])
     data = data.encode() if isinstance(data, str) else data
     clean = clean_mesh(*parse_mesh(data, suffix), up)
-    colors = corner_colors(data, suffix, up, clean.vertices, clean.faces)
+    colors = corner_colors(data, suffix, up, clean.vertices, clean.faces, {})
     return clean.vertices[clean.faces], colors
 
 
@@ -77,7 +77,7 @@ def test_vertex_colours_of_ply_are_srgb(up):
 def test_without_colours_all_are_one():
     assert (of(trimesh.creation.icosphere(1), ".stl")[1] == 1).all()
     with pytest.raises(BadMeshError):
-        corner_colors(b"glTF", ".glb", "y", np.eye(3), np.array([[0, 1, 2]]))
+        corner_colors(b"glTF", ".glb", "y", np.eye(3), np.array([[0, 1, 2]]), {})
 
 
 @pytest.fixture(scope="module")

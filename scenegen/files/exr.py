@@ -1,0 +1,70 @@
+"""OpenEXR files: their channels, and the picture among them."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from scenegen.common.errors import FileFormatError
+
+Array = NDArray[Any]
+WHOLE = (
+    "Composite.Combined.",
+    "Combined.",
+    "rgba.",
+    "beauty.",
+)  # layers that show all, by renderer
+
+
+def exr_channels(path: Path, most: int) -> dict[str, Array]:
+    """Return all channels by name; before it stands that of the part, where there are several.
+
+    Raises FileFormatError for what is no such file, or has more than `most` pixels.
+    """
+    import OpenEXR
+
+    try:
+        with OpenEXR.File(str(path), header_only=True) as file:
+            for part in file.parts:
+                low, high = part.header["dataWindow"]
+                height, width = int(high[1] - low[1]) + 1, int(high[0] - low[0]) + 1
+                if height * width > most:
+                    raise FileFormatError(path, f"{height}x{width}", f"at most {most:,} pixels")
+        with OpenEXR.File(str(path), separate_channels=True) as file:
+            several = len(file.parts) > 1
+            return {
+                f"{part.name()}.{name}" if several else name: np.asarray(channel.pixels)
+                for part in file.parts
+                for name, channel in part.channels.items()
+            }
+    except FileFormatError:
+        raise
+    except Exception as error:  # the library raises what it meets
+        reason = " ".join(str(error).split())
+        raise FileFormatError(path, f"a file that cannot be read ({reason:.120})") from error
+
+
+def exr_picture(path: Path, most: int) -> Array:
+    """Return the colours of a file, (H, W, 3) float32, linear; a single channel is grey.
+
+    Of several layers that which shows all is taken. Raises FileFormatError, naming the channels,
+    where none is, and as `exr_channels`.
+    """
+    channels = exr_channels(path, most)
+    threes = {}
+    for name in channels:
+        layer, letters = name[:-1], "rgb" if name.endswith("r") else "RGB"
+        names = [layer + letter for letter in letters]
+        if name == names[0] and channels.keys() >= set(names):
+            threes[layer] = names
+    ends = ([layer for layer in threes if layer.endswith(end)] for end in WHOLE)
+    layers = [""] if "" in threes else next(filter(None, ends), [*threes])
+    names = threes[layers[0]] if len(layers) == 1 else []
+    grey = list(channels) if len(channels) == 1 else ["Y"]
+    if not threes and channels.keys() >= set(grey) and not {"RY", "BY"} & channels.keys():
+        names = grey * 3
+    if len({channels[name].shape for name in names}) != 1:
+        found = f"the channels {', '.join(list(channels)[:12])}"
+        raise FileFormatError(path, found, "R, G and B of one layer", "save that layer alone")
+    return np.stack([channels[name] for name in names], axis=-1).astype(np.float32)
