@@ -38,7 +38,7 @@ METRICS = (
 )
 # Of each metric, the errors that it is there to see.
 FOR = {
-    "abs_rel": ("scale", "smooth", "bias"), "delta_1": ("scale",), "delta_1.03": ("scale", "smooth"),
+    "abs_rel": ("scale", "smooth", "bias"), "delta_1": ("scale",), "delta_1.03": ("smooth",),
     "silog": ("smooth", "bias"), "scale_log2": ("scale",), "points_rel": ("scale", "smooth"),
     "boundary_f1": ("blur", "moved"), "flying_points": ("blur", "flying"),
     "relative_normal_degrees": ("bumps", "noise"), "ordinal_accuracy": ("smooth", "flat"),

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-REMOVED = np.arange(20) / 20.0  # fractions of the pixels that are left out
+STEPS = 20
+REMOVED = np.arange(STEPS) / STEPS  # fractions of the pixels that are left out
 EDGES = 0.1  # fraction of the pixels with the steepest brightness
 
 
@@ -31,7 +32,7 @@ def sparsification(errors: Array, confidence: Array) -> Array:
     mean = np.bincount(group, errors) / count
     kept = np.sort(group)[::-1]  # the surest first
     total = np.concatenate([[0.0], np.cumsum(mean[kept])])
-    left = np.maximum(np.ceil((1.0 - REMOVED) * len(errors)).astype(np.int64), 1)
+    left = -(-len(errors) * np.arange(STEPS, 0, -1) // STEPS)
     return np.asarray(total[left] / left)
 
 

@@ -221,7 +221,8 @@ def _further(
             pairs = triangle_pairs(image, mask, row)
             scores["flat"] = relative_normal_scores(image, pairs)["flat"]
             image[mask] = points
-            scores |= scores_of_pairs(pair, scores["boundary_f1"], fitted, image, pairs, order)
+            found = scores_of_pairs(pair, scores["boundary_f1"], fitted, image, pairs, order)
+            scores |= {n: value for n, value in found.items() if "measured" in metric(n).tasks}
         else:
             scores["ordinal_accuracy"] = ordinal_scores(fitted, order)["ordinal_accuracy"]
     if normal is not None and truth.normal is not None:

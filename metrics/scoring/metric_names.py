@@ -367,11 +367,11 @@ TABLE: Sequence[Metric] = (
     _error("ause_abs_rel", "AUSE of AbsRel",
            "area between the mean absolute relative error of the most confident pixels and that of"
            " the pixels with the least error, over the fraction left out.", "ratio",
-           of="confidence", baselines=(RANDOM_ORDER, EDGE_DISTANCE)),
+           of="confidence", baselines=(RANDOM_ORDER, EDGE_DISTANCE), **_ANYWHERE),
     _error("aurg_abs_rel", "AURG of AbsRel",
            "area between the mean absolute relative error and that of the most confident pixels,"
            " over the fraction left out; 0 for a random order.", "ratio", of="confidence",
-           smallest=-math.inf, higher_is_better=True),
+           smallest=-math.inf, higher_is_better=True, **_ANYWHERE),
     _angle("normal_mean_degrees", "Normals, mean",
            "mean angle between predicted and true normals.", **_NORMAL),
     _angle("normal_median_degrees", "Normals, median", "median of these angles in the image.",
@@ -505,7 +505,8 @@ def _forms(rows: Iterable[Metric]) -> Iterator[Metric]:
 
 def _scores_of_baselines() -> Iterator[Metric]:
     for begins, baseline in BASELINES.items():
-        tasks = ("rooms", "measured") if begins in (FLAT, RAMP) else ("rooms",)
+        anywhere = begins in (FLAT, RAMP, RANDOM_ORDER, EDGE_DISTANCE)
+        tasks = ("rooms", "measured") if anywhere else ("rooms",)
         changes: dict[str, Any] = {"redefined": False, "tasks": tasks}
         changes |= {"lacking": "partner"} if begins == OTHER_SCENE else {}
         form = Form(f"{begins}*", baseline.name, f"that of {baseline.definition}", changes)

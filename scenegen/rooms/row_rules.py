@@ -15,6 +15,7 @@ from scenegen.camera import pixel_directions, transform_points, transform_vector
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.description.specs import Request
 from scenegen.files.rows import RowBlock
+from scenegen.layout import CORRUPTION
 from scenegen.objects.catalogue import Objects, changed_meshes
 from scenegen.rendering.ground_truth import visible_pixels
 from scenegen.rendering.packing import SceneBatch, pack
@@ -47,13 +48,14 @@ _FURTHER_RULES = {
 }
 
 
-def row_rules(spec: Request) -> dict[str, str]:
+def row_rules(rooms: RoomsFile) -> dict[str, str]:
     """Return what is checked of each row, by name of the check."""
-    return {**_pixel_rules(spec), **{name: _FURTHER_RULES[name] for name in spec.truth}}
+    further = {name: _FURTHER_RULES[name] for name in rooms.spec.truth}
+    return {**_pixel_rules(rooms.spec, CORRUPTION in rooms.attributes), **further}
 
 
-def _pixel_rules(spec: Request) -> dict[str, str]:
-    if spec.shading == "path":
+def _pixel_rules(spec: Request, corrupted: bool) -> dict[str, str]:
+    if spec.shading == "path" or corrupted:
         return {**_RULES, "image": "finite and not negative"}
     if spec.spp > 1 or spec.shadows:
         return {**_RULES, "image": "finite, and no darker than ambient light alone"}
@@ -86,7 +88,9 @@ def row_problems(
             "depth": _depth_problems(room, points),
             "normal": _normal_problems(room),
             "object_id": _object_problems(rooms.spec, room, shown),
-            "image": _image_problems(rooms.spec, room, points, batch),
+            "image": _image_problems(
+                rooms.spec, room, points, batch, CORRUPTION in rooms.attributes
+            ),
         }
         yield from ((name, problem) for name, some in found.items() for problem in some)
         if rooms.spec.truth:
@@ -179,12 +183,14 @@ def _object_problems(spec: Request, room: Room, shown: Array) -> Iterable[str]:
         yield f"too few objects show {spec.min_visible_pixels} pixels"
 
 
-def _image_problems(spec: Request, room: Room, points: Array, batch: SceneBatch) -> Iterable[str]:
+def _image_problems(
+    spec: Request, room: Room, points: Array, batch: SceneBatch, corrupted: bool
+) -> Iterable[str]:
     radiance = room.radiance
     if not np.isfinite(radiance).all() or (radiance < 0).any():
         yield "a value is negative or not finite"
         return
-    if spec.shading == "path":
+    if spec.shading == "path" or corrupted:
         return
     if spec.spp > 1 or spec.shadows:
         # With shadows, or the mean of several samples, only a lower bound is known: ambient light.

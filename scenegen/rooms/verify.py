@@ -87,7 +87,7 @@ def verify_file(
 
     step = max(1, BLOCK_PIXELS // (rooms.spec.height * rooms.spec.width))
     digests, broken = read_all(rooms, step, look, progress)
-    rules = row_rules(rooms.spec)
+    rules = row_rules(rooms)
     scenes = {"scene": digests.get("scene", "")}
     same = fingerprint(rooms.spec.to_json(), scenes) == rooms.fingerprint
     layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"

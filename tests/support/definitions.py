@@ -636,17 +636,17 @@ def pairs(view, z: Array, P: Array, boundary_f1: float) -> dict[str, float]:
         "_between": everywhere[view.ids[everywhere[:, 0]] != view.ids[everywhere[:, 1]]],
         "_within": np.concatenate([one_object(view, everywhere), alone]),
     }
-    for name, p in asked.items():
-        t = view.t[p]
-        p = p[t.max(1) > 1.02 * t.min(1)]
+    for name, both in asked.items():
+        t = view.t[both]
+        p = both[t.max(1) > 1.02 * t.min(1)]
         if len(p):
             right = np.sign(z[p[:, 0]] - z[p[:, 1]]) == np.sign(view.t[p[:, 0]] - view.t[p[:, 1]])
             scores[f"ordinal_accuracy{name}"] = right.mean()
     i, j = everywhere.T
     unordered = ((z[i] < z[j]) != (view.t[i] < view.t[j])).mean()
     near = []
-    for fitted in (disparity_fit(z, view.t), line(z / abs(z).max(), view.t)):
-        fitted = np.maximum(fitted, 1e-4)
+    for fit_z in (disparity_fit(z, view.t), line(z / abs(z).max(), view.t)):
+        fitted = np.maximum(fit_z, 1e-4)
         limit = 1.25**0.125
         near.append(((fitted < limit * view.t) & (view.t < limit * fitted)).mean())
     turned = np.radians(np.mean(errors)) if errors else 0
@@ -724,7 +724,7 @@ def confidence(errors: Array, sure: Array) -> dict[str, float]:
 def sparsified(errors: Array, sure: Array) -> Array:
     same = {x: errors[sure == x].mean() for x in set(sure.tolist())}
     sorted_errors = np.array([same[x] for x in sorted(sure.tolist(), reverse=True)])
-    counts = [max(int(np.ceil((1 - k / 20) * len(errors))), 1) for k in range(20)]
+    counts = [(len(errors) * (20 - k) + 19) // 20 for k in range(20)]
     return np.array([sorted_errors[:n].mean() for n in counts])
 
 

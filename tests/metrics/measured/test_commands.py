@@ -15,6 +15,7 @@ import cli
 from metrics.measured.reader import MeasuredFile
 from metrics.score_file import read_scores
 from metrics.scoring.metric_names import OBJECT_SCORES
+from metrics.views.score_tables import confidence_warnings
 
 MODEL = "def infer(image):\n    return {'depth_metric': image[..., 0] / 25.0 + 0.1}\n"
 K = [[60.0, 0.0, 32.0], [0.0, 60.0, 24.0], [0.0, 0.0, 1.0]]
@@ -215,3 +216,49 @@ def test_a_broken_mat_is_one_line(edit, tmp_path):
     done = bench("truth", "--layout", "nyu", "--data", path, "--out", tmp_path / "mine.h5")
     assert (done.exit_code, done.stderr.strip().count("\n")) == (2, 0), done.output
     assert not (tmp_path / "mine.h5").exists()
+
+
+def test_stereo_disparity_is_depth_in_metres(here):
+    """Depth = focal length in pixels x baseline / (disparity + offset), as Middlebury stores it."""
+    for i in range(8):
+        disparity = 60.0 * 0.2 / scene(i, 48, 64) - 1.5
+        np.save(f"gt/depth_{i}.npy", disparity.astype(np.float32))
+    more = ("--kind", "disparity", "--focal-baseline", "12", "--disparity-offset", "1.5")
+    command = ("truth", "--images", "rgb/*.png", "--depth", "gt/*.npy", "--out", "stereo.h5")
+    assert bench(*command, *more).exit_code == 0
+    with MeasuredFile("stereo.h5") as file:
+        assert file.read("depth", 3) == pytest.approx(scene(3, 48, 64), rel=1e-5)
+    for wrong in (
+        ("--kind", "disparity"),
+        (*more, "--unit", "cm"),
+        (*more, "--scale", "2"),
+        more[2:],
+    ):
+        result = bench(*command, *wrong, "--overwrite")
+        assert (result.exit_code, result.output.count("Traceback")) == (2, 0)
+
+
+def test_confidence_comes_in_and_is_scored(here):
+    assert made("--unit", "mm", "--invalid", "0", "--intrinsics", "K.json").exit_code == 0
+    rng = np.random.default_rng(1)
+    for i in range(8):
+        depth = scene(i, 48, 64)
+        error = np.abs(rng.normal(0.0, 0.1, depth.shape))
+        np.save(f"p_{i}.npy", depth * (1.0 + error))
+        np.save(f"e_{i}.npy", error)
+    found = {}
+    for meaning in ("confidence", "error"):
+        result = bench(
+            "import", "--depth", "p_*.npy", "--unit", "m", "--data", "mine.h5", "--out",
+            f"{meaning}.h5", "--confidence", "e_*.npy", "--confidence-is", meaning,
+        )  # fmt: skip
+        assert result.exit_code == 0, result.output
+        result = bench("score", f"{meaning}.h5", "--truth", "mine.h5", "--json",
+                       f"{meaning}.json", "--html", f"{meaning}.html")  # fmt: skip
+        assert result.exit_code == 0, result.output
+        found[meaning] = read_scores(f"{meaning}.json")
+    right, wrong = found["error"].metrics, found["confidence"].metrics
+    assert right["ause_abs_rel"].value == pytest.approx(0.0, abs=1e-6)
+    assert found["error"].skills["ause_abs_rel"].value == pytest.approx(1.0, abs=1e-4)
+    assert wrong["aurg_abs_rel"].value < 0.0 < right["aurg_abs_rel"].value
+    assert [bool(confidence_warnings(found[m])) for m in ("confidence", "error")] == [True, False]
