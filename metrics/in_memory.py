@@ -85,7 +85,7 @@ def evaluate_room(
         truth.world_from_camera,
         truth.truth.get("room/size"),
     )
-    reference = reference_of(view)
+    reference = reference_of(view, row=truth.index)
     scores = score_prediction(predicted, view, reference, non_finite=non_finite).scores
     own = {name: value for name, value in scores.items() if not name.startswith(OTHER_SCENE)}
     return own | reference.floors
