@@ -112,7 +112,7 @@ def l1_scale(p: Array, t: Array, weights: Array) -> float:
         return 0.0
     p, t, weights = p[some], t[some], weights[some]
     with np.errstate(over="ignore"):  # a point that hardly weighs
-        return max(float(_weighted_median(t / p, weights * np.abs(p))), 0.0)
+        return max(float(weighted_median(t / p, weights * np.abs(p))), 0.0)
 
 
 def l1_scale_shift(p: Array, t: Array, weights: Array) -> tuple[float, float]:
@@ -131,7 +131,7 @@ def l1_scale_shift(p: Array, t: Array, weights: Array) -> tuple[float, float]:
     def tangent(s: float) -> tuple[float, float, float]:
         """Return the sum, a slope of it, and the shift, all at this scale."""
         rest = t - s * p
-        b = float(_weighted_median(rest, weights))
+        b = float(weighted_median(rest, weights))
         signs = np.sign(b - rest)
         pulls = weights * signs
         at = signs == 0.0
@@ -216,7 +216,7 @@ def _l1_from_near(
     return (scale, shift) if kept else None
 
 
-def _weighted_median(values: Array, weights: Array) -> float:
+def weighted_median(values: Array, weights: Array) -> float:
     """Return the smallest value up to which half of all weight lies.
 
     Of many values, those far below and far above that of some are each taken as one value.

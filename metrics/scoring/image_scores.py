@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures.alignment import Alignment, align
+from metrics.measures.alignment import Alignment, align, weighted_median
 from metrics.measures.behind import behind_scores, hidden_from
 from metrics.measures.boundaries import boundary_scores
 from metrics.measures.confidence import confidence_scores
@@ -66,6 +66,7 @@ from metrics.scoring.metric_names import (
     FLAT,
     HALF,
     LEANING,
+    LIFTED,
     OBJECT_SCORES,
     OTHER_SCENE,
     RAMP,
@@ -88,7 +89,7 @@ from scenegen.camera import (
 Array = NDArray[Any]
 NonFinite = Literal["error", "penalise"]
 F_SCORE_THRESHOLDS = (0.01, 0.02, 0.05)  # scene units: edges of the room
-_BLIND = [name for name, begins in SKILLED.items() if {EMPTY_ROOM, RAMP} <= {*begins}]
+_WITHOUT_SHAPE = [name for name, begins in SKILLED.items() if LIFTED in begins]
 
 
 @dataclass(frozen=True)
@@ -201,6 +202,7 @@ def _floors(
         scores["object_depth_error"] = _mean(error)
     scores |= boundary_scores(empty, truth.depth, mask)
     scores |= point_map_scores(room.points, surface.points)
+    scores |= relative_normal_scores(_image(room.points, mask), reference.pairs)
     scores |= {
         "shape_error": flat_error((empty - truth.depth)[at], inside[at]),
         "shape_normal_degrees": _mean_angle(facing, truth.normal, at),
@@ -215,7 +217,7 @@ def _floors(
     for number in np.unique(truth.object_id[truth.object_id > 0]).tolist():
         own = truth.object_id == number
         flat[own] = np.median(truth.depth[own])
-    pairs = relative_normal_scores(_image(surface.points, mask), reference.pairs)
+    flat_pairs = relative_normal_scores(_image(surface.points, mask), reference.pairs)["flat"]
     floors |= {
         f"{CUT_OUT}shape_error": flat_error(truth.depth[at].astype(np.float64), inside[at]),
         f"{CUT_OUT}shape_normal_degrees": one_normal_degrees(truth.normal[at], inside[at]),
@@ -223,7 +225,7 @@ def _floors(
             reference.normals[derived_at], inside[derived_at]
         ),
         f"{CUT_OUT}boundary_f1": boundary_scores(flat, truth.depth, mask)["boundary_f1"],
-        f"{CUT_OUT}relative_normal_degrees": pairs["flat"],
+        f"{CUT_OUT}relative_normal_degrees": flat_pairs,
         f"{HALF}flying_points": flying_points(
             at_half_resolution(truth.depth, mask), truth.depth, reference.other
         ),
@@ -232,11 +234,18 @@ def _floors(
         floors[f"{LEANING}shape_error"] = flat_error((empty / 2.0 - truth.depth)[at], inside[at])
     rays = pixel_directions(*mask.shape, fov)[mask]
     down = (np.nonzero(mask)[0] + 0.5) / len(mask)
-    for guess, values in ((FLAT, np.ones_like(down)), (RAMP, 2.0 - down)):
-        fitted = align(values, true, "scale_shift")
+    at = truth.object_id[mask] > 0
+    near, weights = room.depth[mask] - true, at / true
+    lift = max(weighted_median(near[at], weights[at]), 0.0) if at.any() else 0.0
+    guesses_of_depth = {
+        LIFTED: room.depth[mask] - lift * at,
+        FLAT: align(np.ones_like(down), true, "scale_shift"),
+        RAMP: align(2.0 - down, true, "scale_shift"),
+    }
+    for guess, fitted in guesses_of_depth.items():
         scores = depth_scores(DepthPair(fitted, true))
         scores |= point_map_scores(rays * fitted[:, None], surface.points)
-        floors |= {guess + name: value for name, value in scores.items() if name in _BLIND}
+        floors |= {guess + name: value for name, value in scores.items() if name in _WITHOUT_SHAPE}
     return floors
 
 

@@ -490,7 +490,7 @@ def empty_room_scores(view) -> dict[str, float]:
     Z = view.Z[view.mask]
     scores = geometry(view, Z, Z[:, None] * view.rays, "depth")
     names = {"chamfer", "hausdorff", "mse_depth", "object_depth_error", "object_completeness"}
-    names |= {"abs_rel", "delta_1", "points_rel", "boundary_f1"}
+    names |= {"abs_rel", "delta_1", "points_rel", "boundary_f1", "relative_normal_degrees"}
     names |= {"behind_depth_error", "shape_error", "derived_shape_normal_degrees"}
     found = {f"empty_room_{name}": scores[name] for name in names & scores.keys()}
     # The plane that a pixel sees is that on which its world point lies.
@@ -732,11 +732,13 @@ def sparsified(errors: Array, sure: Array) -> Array:
 
 
 def blind(view) -> dict[str, float]:
-    """Return the scores of one depth for all pixels, and of depth that falls to the lower edge."""
+    """Return the scores of a constant, of depth that falls downwards, and of lifted masks."""
     scores = {}
     down = (view.pixel[:, 0] + 0.5) / view.H
-    for name, a in (("flat", np.ones(len(down))), ("ramp", 2 - down)):
-        z = line(a, view.t)
+    own, Z = view.ids > 0, view.Z[view.mask]
+    lift = max(weighted_median((Z - view.t)[own], (1 / view.t)[own]), 0) if own.any() else 0
+    guesses = {"flat": line(np.ones(len(down)), view.t), "ramp": line(2 - down, view.t)}
+    for name, z in {**guesses, "lifted": np.where(own, Z - lift, Z)}.items():
         found = depth_scores(z, view.t) | points_scores(z[:, None] * view.rays, view.T)
         scores |= {f"{name}_{one}": found[one] for one in ("abs_rel", "delta_1", "points_rel")}
     half = flying(view, half_resolution(view))
@@ -838,7 +840,7 @@ def skills(columns: dict[str, Array]) -> dict[str, float]:
     """Return the skills of a submission that was shown the scored view."""
     found = {}
     kinds = ("empty_room", "cut_out", "balls", "blocks", "other_scene", "flat", "ramp")
-    kinds += ("half_resolution", "random_order")
+    kinds += ("half_resolution", "random_order", "lifted")
     for name, values in columns.items():
         higher = name in ("delta_1", "boundary_f1")
         floors = [f"{kind}_{name}" for kind in kinds if f"{kind}_{name}" in columns]
