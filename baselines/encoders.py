@@ -66,7 +66,7 @@ def encoder(name: str, device: str = "cpu") -> tuple[str, Features]:
         axes = {3: (1,), 4: (2, 3)}  # tokens (N, T, D), or a map (N, D, h, w)
         return [layer.float().mean(dim=axes[layer.ndim]).cpu().numpy() for layer in layers]
 
-    title = Path(named).name if Path(named).exists() else named
+    title = Path(named).resolve().name if Path(named).exists() else named
     return f"{title}@{revision[:7]}" if revision else title, features
 
 

@@ -90,7 +90,7 @@ def _mean_depth(rooms: RoomsFile, train: str | Path) -> Array:
         same_rooms = training.fingerprint == rooms.fingerprint
         if same_rooms or training.spec.seed == rooms.spec.seed:
             message = f"the test file's seed, {rooms.spec.seed}, and so its cameras and places"
-            hint = "render training rooms with another --seed"
+            hint = "scenegen render --seed makes others"
             raise SpecError("train", message, "another seed", hint)
         sizes = [f"images of {file.spec.height}x{file.spec.width}" for file in (training, rooms)]
         if sizes[0] != sizes[1]:

@@ -87,7 +87,7 @@ class TrainingRooms:
         if single:
             scene = int(rooms.read("scene_index", int(single[0])))
             expected = "two or more of every scene, as silhouettes of one view tell no shape"
-            hint = "render the file with --views 0,35,80"
+            hint = "scenegen render --views 0,35,80 makes them"
             raise SpecError(f"{rooms.path}: scene {scene}", "one view", expected, hint)
         self.fingerprint, self.data = rooms.fingerprint, rooms.spec.to_json()
         self._silhouettes = Silhouettes(rooms, settings.silhouettes)

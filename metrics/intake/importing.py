@@ -60,6 +60,7 @@ def import_rooms(
                         *size_of(rooms, row),
                         frame=reading.frame,
                         missing=reading.missing,
+                        zeros="say --invalid 0",
                     )
                     writer.add(row, **fitted.values)
                 progress(1)

@@ -83,7 +83,7 @@ def _with_partner(pairs: list[tuple[list[int], list[int]]]) -> Tensor:
     matched = torch.tensor([row for row, sides in enumerate(pairs) if any(sides)], dtype=torch.long)
     if not len(matched):
         expected = f"views of a scene at most {WIDEST:.0f} degrees apart"
-        raise SpecError("rooms", "no such views", expected, "render with --views 0,10,20")
+        raise SpecError("rooms", "no such views", expected, "use scenegen render --views 0,10,20")
     return matched
 
 

@@ -7,6 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 import cli
+from metrics.intake.outputs import KEYS
 from metrics.submissions.reader import open_predictions
 from scenegen.rooms.reader import RoomsFile
 
@@ -86,6 +87,10 @@ def infer(image):
     print("looking")
     return {"depth_metric": np.full(image.shape[:2], 1.5)}
 """
+
+
+def test_the_help_names_all_keys_that_models_return():
+    assert all(key in bench("run", "--help").output for key in KEYS)
 
 
 def test_a_model_is_run(truths, tmp_path, capfd):

@@ -42,6 +42,9 @@ def test_by_name_and_by_order():
     ]  # fmt: skip
 
 
+NOT_BY_NUMBER = ("best.png", "0_9.png", "a_1.png and b_1.png", "0.npy and 0.png")
+
+
 @pytest.mark.parametrize(
     ("names", "words"),
     [
@@ -59,7 +62,7 @@ def test_what_does_not_fit_is_named(names, words):
     with pytest.raises(MatchError) as caught:
         matched(names)
     assert words in f"{caught.value.where} {caught.value.found}"
-    assert ("--match" in caught.value.hint) == (words in ("best.png", "0_9.png"))
+    assert ("--match" in caught.value.hint) == (words in NOT_BY_NUMBER)
     if len(names) != 4:
         with pytest.raises(MatchError):
             matched(names, by="name")
