@@ -1,6 +1,7 @@
 """Shared fixtures: tiny files, damaged copies, folders of meshes, the commands, a browser."""
 
 import re
+import shlex
 import shutil
 import signal
 import sys
@@ -36,7 +37,7 @@ def _messages_name_options_that_there_are() -> Iterator[None]:
 
     def looked_at(runner: Any, group: Any, args: Any = None, **more: Any) -> Result:
         result = invoke(runner, group, args, **more)
-        given = args if isinstance(args, list) else []
+        given = shlex.split(args) if isinstance(args, str) else list(args or ())
         for option, before in named_options(result.stderr):
             command = command_named(before) or command_of(group, given)
             known = {name for p in command.params for name in (*p.opts, *p.secondary_opts)}
