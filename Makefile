@@ -6,19 +6,6 @@ WORKERS ?= 2
 
 PIP = $(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt
 
-# Tests of pages need Chromium. It is installed where that can be done, while pip installs packages,
-# and they are skipped where it cannot. Libraries are compiled when they are first imported.
-define INSTALL_WITH_BROWSER
-@{ for name in chromium chromium-browser google-chrome google-chrome-stable; do \
-  command -v $$name > /dev/null && exit 0; \
-done; \
-if [ "$$(id -u)" = 0 ] && command -v apt-get > /dev/null; then \
-  { apt-get update -qq && DEBIAN_FRONTEND=noninteractive apt-get install -y -qq --no-install-recommends chromium; } > /dev/null 2>&1; \
-fi; \
-command -v chromium > /dev/null || echo "No Chromium: tests of pages are skipped, or fail with CI=true."; } & \
-$(PIP) --no-compile -e '.[$(1)]'; status=$$?; wait; exit $$status
-endef
-
 .PHONY: demo demo-summary demo-model docs test test-all check bench gpu results torture harnesses dist clean
 
 demo: $(VENV)/.runtime
@@ -152,10 +139,11 @@ $(VENV)/.model: $(BIN)/python pyproject.toml constraints.txt
 	$(PIP) -e '.[model]'
 	touch $@ $(VENV)/.runtime
 
+# Without bytecode: libraries are compiled when they are first imported.
 $(VENV)/.test: $(BIN)/python pyproject.toml constraints.txt
-	$(call INSTALL_WITH_BROWSER,test)
+	$(PIP) --no-compile -e '.[test]'
 	touch $@ $(VENV)/.runtime $(VENV)/.model
 
 $(VENV)/.dev: $(BIN)/python pyproject.toml constraints.txt
-	$(call INSTALL_WITH_BROWSER,dev)
+	$(PIP) --no-compile -e '.[dev]'
 	touch $@ $(VENV)/.runtime $(VENV)/.model $(VENV)/.docs $(VENV)/.test

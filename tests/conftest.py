@@ -1,23 +1,20 @@
-"""Shared fixtures: tiny files, damaged copies, folders of meshes, the commands, a browser."""
+"""Shared fixtures: tiny files, damaged copies, folders of meshes, the commands."""
 
 import re
 import shlex
 import shutil
 import signal
 import sys
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import CliRunner
 from named_options import command_named, command_of, named_options
 
 TINY = {"height": 32, "width": 32, "min_visible_pixels": 3, "seed": 3}
 
-Edit = Callable[[h5py.File], Any]
 
 # Under nohup, or in the background of a shell, signals are ignored, which the processes of tests
 # would inherit. Those that are handled here have their defaults there.
@@ -28,14 +25,14 @@ if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN
 
 
 @pytest.fixture(autouse=True, scope="session")
-def _messages_name_options_that_there_are() -> Iterator[None]:
+def _messages_name_options_that_there_are():
     """Look at all messages of commands that tests call: an option is one of the command.
 
     Or it is one of the last command that the message names before it, or was given.
     """
     invoke = CliRunner.invoke
 
-    def looked_at(runner: Any, group: Any, args: Any = None, **more: Any) -> Result:
+    def looked_at(runner, group, args=None, **more):
         result = invoke(runner, group, args, **more)
         given = shlex.split(args) if isinstance(args, str) else list(args or ())
         for option, before in named_options(result.stderr):
@@ -44,13 +41,13 @@ def _messages_name_options_that_there_are() -> Iterator[None]:
             assert option in {*known, *given, "--help"}, result.stderr
         return result
 
-    CliRunner.invoke = looked_at  # type: ignore[method-assign]
+    CliRunner.invoke = looked_at
     yield
-    CliRunner.invoke = invoke  # type: ignore[method-assign]
+    CliRunner.invoke = invoke
 
 
 @pytest.fixture(autouse=True)
-def _untried(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+def _untried(request, monkeypatch):
     """Open files without a trial in another process, except where a test is marked `tried`.
 
     A trial takes 0.2 s, and most tests are about files that HDF5 can read.
@@ -60,7 +57,7 @@ def _untried(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.fixture(autouse=True)
-def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+def _own_cache(tmp_path_factory, monkeypatch):
     """Keep models in no folder but the tests' own, whatever an earlier test said."""
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.getbasetemp() / "cache"))
     store = sys.modules.get("scenegen.objects.families.store")
@@ -69,14 +66,12 @@ def _own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Mon
 
 
 @pytest.fixture(scope="session")
-def make_rooms() -> Callable[..., Path]:
+def make_rooms():
     """Write a tiny file of rooms; settings override those of TINY, `how` goes to make_dataset."""
     from scenegen.description.specs import DatasetSpec
     from scenegen.rooms.make import make_dataset
 
-    def make(
-        path: Path, count: int = 6, how: dict[str, Any] | None = None, **settings: Any
-    ) -> Path:
+    def make(path, count=6, how=None, **settings):
         spec = DatasetSpec(**{**TINY, **settings})
         make_dataset(path, spec, count, **{"command": "tests", **(how or {})})
         return path
@@ -85,13 +80,13 @@ def make_rooms() -> Callable[..., Path]:
 
 
 @pytest.fixture(scope="session")
-def rooms_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def rooms_path(make_rooms, tmp_path_factory):
     """Return a file of 8 rooms that no test changes."""
     return make_rooms(tmp_path_factory.mktemp("rooms") / "rooms.h5", 8)
 
 
 @pytest.fixture(scope="session")
-def interior_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def interior_path(tmp_path_factory):
     """Return a file of one small closed room, seen once."""
     from scenegen.description.presets import preset_spec
     from scenegen.rooms.make import make_dataset
@@ -102,17 +97,17 @@ def interior_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="session")
-def float_path(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def float_path(make_rooms, tmp_path_factory):
     """Return a file of 5 rooms with float32 images, higher than wide."""
     path = tmp_path_factory.mktemp("rooms") / "float.h5"
     return make_rooms(path, 5, height=48, width=40, image_dtype="float32", min_visible_pixels=6)
 
 
 @pytest.fixture
-def damaged(rooms_path: Path, tmp_path: Path) -> Callable[[Edit], Path]:
+def damaged(rooms_path, tmp_path):
     """Return a function that copies the 8 rooms and lets `edit` at the copy."""
 
-    def damage(edit: Edit) -> Path:
+    def damage(edit):
         path = tmp_path / "damaged.h5"
         shutil.copy(rooms_path, path)
         with h5py.File(path, "r+") as file:
@@ -123,7 +118,7 @@ def damaged(rooms_path: Path, tmp_path: Path) -> Callable[[Edit], Path]:
 
 
 @pytest.fixture(scope="session")
-def truths(tmp_path_factory: pytest.TempPathFactory) -> Any:
+def truths(tmp_path_factory):
     """Return the truths that submissions predict, `submissions.Truths`; no test changes them."""
     from submissions import make_truths
 
@@ -131,20 +126,14 @@ def truths(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 @pytest.fixture
-def released(tmp_path: Path) -> Callable[..., Path]:
+def released(tmp_path):
     """Return a function that writes a file as released, with nothing but images and answers.
 
     Arguments: for each part its number of questions, and its answers or None. Options: of
     `create_dataset` for the questions.
     """
 
-    def write(
-        name: str = "iqtt-val.h5",
-        tables: dict[str, tuple[int, Any]] | None = None,
-        dtype: str = "float32",
-        size: tuple[int, int] = (20, 24),
-        **options: Any,
-    ) -> Path:
+    def write(name="iqtt-val.h5", tables=None, dtype="float32", size=(20, 24), **options):
         rng = np.random.default_rng(3)
         with h5py.File(tmp_path / name, "w") as file:
             for part, (count, answers) in (tables or {"": (5, np.arange(5) % 3)}).items():
@@ -160,7 +149,7 @@ def released(tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def meshes(tmp_path: Path) -> Path:
+def meshes(tmp_path):
     """Return a folder of three mugs, one of them broken, and two bowls."""
     import trimesh
 
@@ -176,7 +165,7 @@ def meshes(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def shapenet(tmp_path: Path) -> Path:
+def shapenet(tmp_path):
     """Return a folder laid out as ShapeNetCore version 2, with mugs and bowls."""
     import trimesh
 
@@ -190,20 +179,20 @@ def shapenet(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Result]:
+def run(tmp_path, monkeypatch):
     """Run `scenegen ...` inside this process, in a folder of its own."""
     import cli
 
     monkeypatch.chdir(tmp_path)
 
-    def call(*arguments: object) -> Result:
+    def call(*arguments):
         command = [str(argument) for argument in arguments]
         return CliRunner().invoke(cli.scenegen, command, catch_exceptions=False)
 
     return call
 
 
-def refusal(code: int, out: str, err: str, words: tuple[str, ...] = ()) -> str:
+def refusal(code, out, err, words=()):
     """Check that a command failed as the project promises; return its one line of error.
 
     Exit code 2, nothing on standard output, one line of error (after click's usage lines where it
@@ -222,16 +211,16 @@ def refusal(code: int, out: str, err: str, words: tuple[str, ...] = ()) -> str:
 
 
 @pytest.fixture(scope="session")
-def check_refusal() -> Callable[..., str]:
+def check_refusal():
     """Return `refusal`, for commands that a test started by itself."""
     return refusal
 
 
 @pytest.fixture
-def refuses(run: Callable[..., Result], tmp_path: Path) -> Callable[..., str]:
+def refuses(run, tmp_path):
     """Run a command that must fail as `refusal` says, and leave the disk as it was."""
 
-    def call(*arguments: object, words: tuple[str, ...] = ()) -> str:
+    def call(*arguments, words=()):
         before = contents(tmp_path)
         result = run(*arguments)
         line = refusal(result.exit_code, result.stdout, result.stderr, words)
@@ -242,10 +231,10 @@ def refuses(run: Callable[..., Result], tmp_path: Path) -> Callable[..., str]:
 
 
 @pytest.fixture
-def verdict(run: Callable[..., Result]) -> Callable[..., tuple[int, dict[str, str], str]]:
+def verdict(run):
     """Run verify; return exit code, "ok" or "FAIL" by name of the check, and the output."""
 
-    def call(path: Path, *options: object) -> tuple[int, dict[str, str], str]:
+    def call(path, *options):
         result = run("verify", path, *options)
         lines = re.findall(r"^(ok|FAIL) +(\S+(?: \S+)*)", result.stdout, re.MULTILINE)
         return result.exit_code, {name: word for word, name in lines}, result.output
@@ -253,34 +242,16 @@ def verdict(run: Callable[..., Result]) -> Callable[..., tuple[int, dict[str, st
     return call
 
 
-def contents(folder: Path) -> dict[str, int]:
+def contents(folder):
     """Return names and sizes of all that lies in a folder."""
     return {str(path): path.lstat().st_size for path in folder.rglob("*")}
 
 
 @pytest.fixture(scope="session")
-def pix2shape_files(truths: Any, make_rooms: Any, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def pix2shape_files(truths, make_rooms, tmp_path_factory):
     """Return a folder of rooms, questions and weights that no test changes."""
     pytest.importorskip("torch")
     from pix2shape_commands import prepare
 
     folder = tmp_path_factory.mktemp("pix2shape")
     return prepare(folder, Path(truths.rooms), Path(truths.iqtt), make_rooms)
-
-
-@pytest.fixture(scope="session")
-def chromium(tmp_path_factory: pytest.TempPathFactory) -> Any:
-    """Return the address that controls the session's Chromium."""
-    import browser
-
-    with browser.started(tmp_path_factory.mktemp("chromium")) as control:
-        yield control
-
-
-@pytest.fixture
-def visit(chromium: str) -> Any:
-    """Open an address in Chromium, as `browser.connected` says; return a `browser.Seen`."""
-    import browser
-
-    with browser.connected(chromium) as open_page:
-        yield open_page

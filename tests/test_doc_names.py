@@ -1,4 +1,4 @@
-"""Pages name modules, commands and options that there are."""
+"""Pages name modules, folders, commands and options that there are."""
 
 import ast
 import re
@@ -122,12 +122,3 @@ def test_what_benchmarks_and_examples_import_is_there():
             if isinstance(node, ast.ImportFrom) and re.match(PACKAGES, node.module or ""):
                 names = [f"{node.module}.{alias.name}" for alias in node.names]
                 assert [name for name in names if not is_there(name)] == [], path
-
-
-def test_what_is_gone_is_seen():
-    assert is_there("scenegen.open_rooms")
-    assert not is_there("benchmarks.stages")
-    assert not is_there("scenegen.nothing")
-    assert wrong_in("bench scores a.h5") == "scores"
-    assert wrong_in("bench score a.h5 --truths b.h5 --json c.json") == "--truths"
-    assert wrong_in("bench score a.h5 --truth b.h5 | head") is None

@@ -324,10 +324,7 @@ COMMANDS = {
         "depth behind the camera": ("rooms.h5", h5_edits.put("depth", 1, -1)),
         "infinite depth": ("rooms.h5", h5_edits.put("depth", 1, np.inf)),
         "normals of NaN": ("rooms.h5", h5_edits.put("normal", 1, np.nan)),
-        "far depth": (
-            "predictions.h5",
-            h5_edits.replaced("depth", lambda v: v + np.float64(9e99)),
-        ),
+        "far depth": ("predictions.h5", h5_edits.replaced("depth", lambda v: v + np.float64(9e99))),
     },
     "bench score answers.h5 --truth iqtt-test-answers.h5": {
         "kind": ("iqtt-test-answers.h5", h5_edits.values("truth/distractor_kind", lambda v: v + 99))

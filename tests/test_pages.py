@@ -3,8 +3,12 @@
 Pages with a test of what they print are run there.
 """
 
+import json
+
 import pytest
-from page_blocks import ROOT, blocks, run_block
+from page_blocks import ROOT, blocks, missing_lines, run_block
+
+from metrics.submissions.reader import open_predictions
 
 RUN_ELSEWHERE = {"tutorial.md", "vlm.md", "your-model.md"}
 CLUSTER = {"cluster.md"}  # needs a scheduler and its workers
@@ -30,3 +34,99 @@ def test_the_blocks_run(page, tmp_path):
         run_block("bash", "", BEFORE[page], tmp_path)
     for language, title, code in runnable(page):
         run_block(language, title, home + code if language == "bash" else code, tmp_path)
+
+
+SMALLER = (("--n 200", "--n 20"), ("--test 200", "--test 20"))  # --n 2000 becomes --n 200
+
+
+def printed_by_page(folder, smaller=()):
+    """Run the page with smaller numbers; return (text of the page, what was printed) pairs."""
+    printed, pairs = "", []
+    for language, title, written in blocks("tutorial.md"):
+        if language == "text":
+            pairs.append((written, printed))
+            continue
+        code = written
+        for words, fewer in smaller:
+            code = code.replace(words, fewer)
+        printed = run_block(language, title, code, folder) or printed
+    assert len(pairs) >= 6
+    for name in ("mine.html", "leaderboard.md"):
+        assert "kernel ridge" in (folder / name).read_text()
+    return pairs
+
+
+def test_the_blocks_run_on_a_tenth_of_the_rows(tmp_path):
+    """One test, so that one worker runs the page, once."""
+    for text, printed in printed_by_page(tmp_path, SMALLER):
+        begins = [line.split()[0] for line in printed.splitlines() if line.strip()]
+        names = [line.split()[0] for line in text.splitlines()]
+        assert [name for name in names if name.isidentifier() and name not in begins] == []
+
+
+@pytest.mark.slow
+def test_the_blocks_print_what_the_page_says(tmp_path):
+    pairs = printed_by_page(tmp_path)
+    assert [missing_lines(*pair) for pair in pairs] == [[]] * len(pairs)
+
+
+def test_a_wrong_number_is_noticed():
+    line = "  chamfer  -1.2562  [-1.4430, -1.0969]  0: empty room\n"
+    assert missing_lines(line, line.replace("1.2562", "1.2570")) == []
+    for wrong in (line.replace("-1.2562", "1.2562"), line.replace("1.2562", "1.3"), line[:-6]):
+        assert missing_lines(line, wrong) == [line.rstrip("\n")]
+
+
+BLOCKS = blocks("your-model.md")
+DOORS = ("bench import --depth", "bench run my_model.py", "metrics.evaluate(")
+SCORE_ANSWERS = "bench score answers.h5 --truth iqtt-split/iqtt-test-answers.h5"
+BATCHES = {
+    "class Rooms(Dataset)": "torch.Size([16, 3, 32, 32]) torch.Size([16, 32, 32])\n" * 4,
+    "def batches": "(16, 32, 32, 3) float32 (16, 32, 32)\n" * 4,
+    "load_dataset": "(16, 32, 32, 3) (16, 32, 32)\n" * 4,
+}
+
+
+def shorter(code):
+    return code.replace("--n 32 --size 64", "--n 8 --size 32").replace("TOLD = 180", "TOLD = 1")
+
+
+def test_the_programs_read_every_row_and_what_they_write_can_be_scored(tmp_path):
+    """One test, so that one worker runs the page, once; with fewer and smaller rooms to score."""
+    pytest.importorskip("datasets")
+    printed = {
+        code: run_block(language, title, shorter(code), tmp_path)
+        for language, title, code in BLOCKS
+    }
+    for words, lines in BATCHES.items():
+        assert [text for code, text in printed.items() if words in code] == [lines]
+    (scored,) = [text for code, text in printed.items() if "bench validate" in code]
+    assert scored.startswith("mine.h5: valid\nmine on rooms.h5: 8 images, 8 scenes ")
+    ((code, reached),) = [pair for pair in printed.items() if "RoomStream" in pair[0]]
+    assert len(code.splitlines()) <= 35
+    assert 0 <= float(reached) < 1
+    (training,) = [text for code, text in printed.items() if "metrics.evaluate(" in code]
+    first, second, last = (line.split() for line in training.splitlines())
+    assert float(second[2]) < float(first[2])  # half the shift has half the error
+    assert float(last[0]) == pytest.approx(0.025, rel=1e-3)
+    assert json.loads((tmp_path / "mine.json").read_text())["summary"]["comparable"]
+    doors = (next(c for c in printed if words in c) for words in DOORS)
+    assert all(len(code.splitlines()) <= 10 for code in doors)
+    with open_predictions(tmp_path / "letters.h5") as found:
+        assert found.answers.tolist() == [0, 1, 2] * 3
+    assert "9 questions" in run_block("bash", "", SCORE_ANSWERS, tmp_path)
+
+
+@pytest.mark.slow
+def test_the_page_runs(tmp_path):
+    def smaller(code):
+        return code.replace("--size 256", "--size 64").replace("--train 10", "--train 10 --size 64")
+
+    printed = [
+        run_block(language, title, smaller(code), tmp_path)
+        for language, title, code in blocks("vlm.md")
+        if language != "json"
+    ]
+    rows = dict(line.split()[:2] for line in printed[1].splitlines() if len(line.split()) == 2)
+    assert float(rows["circular_accuracy"]) == 0.0
+    assert 0 <= float(rows["accuracy"]) <= 0.7

@@ -53,6 +53,8 @@ MISTAKES = [
     ("train cnn --data iqtt-test.h5 --out run", ("iqtt-test.h5", "no training questions")),
     (f"train cnn {DATA} --out run --set depth=34", ("depth", "18 or 50")),
     (f"train cnn {DATA} --out run", ("iqtt-train.h5", "32x32", "64")),
+    (f"train cnn {DATA} --out run --set colour=1", ("--set", "'colour'")),
+    (f"train cnn {DATA} --out run --resume --seed 2", ("--resume",)),
     (f"train ptm {DATA} --out run", ("ptm",)),
     (f"train cnn {DATA} --out run --minutes 5 --iterations 3", ("--minutes", "--iterations")),
     ("baseline cnn --data iqtt-test.h5", ("weights", "bench train cnn")),
@@ -68,3 +70,12 @@ def test_a_mistake_is_one_line_and_leaves_nothing(line, words, folder, check_ref
     result = bench(*line.split())
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
     assert files_in(folder) == before
+
+
+@pytest.mark.parametrize("name", ["cnn", "rezende"])
+def test_no_gpu_is_one_line(name, folder, check_refusal):
+    if pytest.importorskip("torch").cuda.is_available():
+        pytest.skip("there is one")
+    result = bench(*f"train {name} {DATA} --out run --device cuda".split())
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("device", "cpu"))
+    assert not (folder / "run").exists()

@@ -8,7 +8,8 @@ import pytest
 
 pytest.importorskip("numba")
 
-from baselines.cubes.answer import answer_scores, decode, explain, write_cubes
+from baselines.cubes.answer import answer_scores, decode, explain, obeys_rules, write_cubes
+from baselines.cubes.filling import SIDE
 from baselines.cubes.segmentation import labelings
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.polycube import ROTATIONS, canonical, is_chiral, mirror
@@ -81,6 +82,20 @@ def test_a_picture_without_a_shape_has_scores(image):
     assert np.isfinite(
         answer_scores(images, SplitSpec(height=64, width=64, min_cube_pixels=8))
     ).all()
+
+
+def test_only_shapes_of_the_split_count():
+    def obeys(cubes):
+        filled = np.zeros((SIDE, SIDE, SIDE), bool)
+        filled[tuple(np.transpose(cubes))] = True
+        return obeys_rules(filled.ravel(), np.full(3, -SIDE / 2 - 0.5), SPEC)
+
+    middle = CHAIN + SIDE // 2 - 1  # its box has three cells along each axis
+    assert obeys(middle)
+    assert not obeys(middle + 1)
+    assert not obeys(middle[:-1])
+    cross = [(5 + a, 5, 5) for a in range(-2, 3)] + [(5, 5 + a, 5) for a in (-2, -1, 1, 2)]
+    assert not obeys(cross)  # it branches
 
 
 def test_a_released_file_is_answered(tmp_path):

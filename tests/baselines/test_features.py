@@ -12,7 +12,7 @@ from refusals import refused
 from baselines.features import cosines_with_reference, probe_scores, read_features, write_features
 from cli import bench
 from iqtt import open_questions
-from scenegen.common.errors import SceneGenError, SpecError
+from scenegen.common.errors import FileFormatError, SceneGenError, SpecError
 
 
 def told_by_one(count: int, seed: int) -> tuple[np.ndarray, np.ndarray]:
@@ -64,6 +64,18 @@ def test_features_that_do_not_fit_are_refused(values: np.ndarray, truths, tmp_pa
     np.save(tmp_path / "f.npy", values)
     with open_questions(truths.iqtt) as questions, pytest.raises(SceneGenError):
         read_features(tmp_path / "f.npy", 6, questions)
+
+
+def test_a_probe_needs_features_of_its_own_data(truths, train_questions, tmp_path, monkeypatch):
+    monkeypatch.setattr("baselines.features.FOLDS", 1)
+    for name, width in {"f.npy": 5, "g.npy": 6}.items():
+        np.save(tmp_path / name, np.ones((6 if width == 5 else 3, 4, width)))
+    data, out = (truths.iqtt, tmp_path / "b.h5"), (tmp_path / "f.npy",)
+    how = {"train": train_questions, "train_features": tmp_path / "g.npy"}
+    with refused(FileFormatError, "g.npy", "6 numbers a picture"):
+        write_features(*data, *out, **how)
+    with refused(SpecError, "labels", "7"):
+        write_features(*data, *out, labels=7)
 
 
 def with_head(text: str) -> bytes:

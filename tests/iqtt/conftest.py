@@ -1,9 +1,6 @@
 """Shared fixtures: a tiny split of ours, damaged copies of its files, and files as released."""
 
 import shutil
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
 
 import h5py
 import pytest
@@ -12,38 +9,27 @@ from hypothesis import settings
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no failure
 settings.load_profile("unhurried")
 
-Edit = Callable[[h5py.File], Any]
-
 
 @pytest.fixture(scope="session")
-def split_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def split_folder(tmp_path_factory):
     """Return the files of a split that no test changes: 6 + 6, 6 and 6 questions, with depth."""
     from iqtt.files.make import make_split
     from iqtt.questions.specs import SplitSpec
 
     spec = SplitSpec(
-        seed=5,
-        train=12,
-        labeled=6,
-        val=6,
-        test=6,
-        cubes=(5, 7),
-        lights=(1, 2),
-        height=32,
-        width=32,
-        min_cube_pixels=2,
-        with_depth=True,
-    )
+        seed=5, train=12, labeled=6, val=6, test=6, cubes=(5, 7), lights=(1, 2), height=32,
+        width=32, min_cube_pixels=2, with_depth=True,
+    )  # fmt: skip
     folder = tmp_path_factory.mktemp("iqtt") / "split"
     make_split(folder, spec, command="tests")
     return folder
 
 
 @pytest.fixture
-def damaged(split_folder: Path, tmp_path: Path) -> Callable[..., Path]:
+def damaged(split_folder, tmp_path):
     """Return a function that copies a file of the split and lets `edit` at the copy."""
 
-    def damage(edit: Edit, name: str = "iqtt-val.h5") -> Path:
+    def damage(edit, name="iqtt-val.h5"):
         path = tmp_path / name
         shutil.copy(split_folder / name, path)
         with h5py.File(path, "r+") as file:
@@ -54,13 +40,13 @@ def damaged(split_folder: Path, tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def few_explained(monkeypatch: pytest.MonkeyPatch) -> None:
+def few_explained(monkeypatch):
     """Lay the wrong answers of two questions on the reference; all take most of an audit's time."""
     monkeypatch.setattr("iqtt.audit.audit.EXPLAINED", 2)
 
 
 @pytest.fixture
-def failing(split_folder: Path, tmp_path: Path, few_explained: None) -> Callable[..., set[str]]:
+def failing(split_folder, tmp_path, few_explained):
     """Let `edit` at a copy of a file of the split; return the audit's proofs that then fail.
 
     It is audited together with copies of others. That the content has changed is asserted here, and
@@ -68,7 +54,7 @@ def failing(split_folder: Path, tmp_path: Path, few_explained: None) -> Callable
     """
     from audit_tables import audited
 
-    def fail(edit: Edit, name: str = "iqtt-val.h5", *others: str) -> set[str]:
+    def fail(edit, name="iqtt-val.h5", *others):
         folder = tmp_path / "split"
         folder.mkdir()
         for copied in (name, *others):

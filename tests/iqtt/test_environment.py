@@ -15,9 +15,7 @@ SMALL = {"cubes": (6, 7), "size": 64}
 @pytest.mark.parametrize(
     ("kind", "cubes"), [("matched", 10), ("mirror-pair", (6, 7)), ("near", 7), ("other", (5, 9))]
 )
-def test_questions_are_right_repeatable_and_never_of_test_shapes(
-    kind: str, cubes: int | tuple[int, int]
-) -> None:
+def test_questions_are_right_repeatable_and_never_of_test_shapes(kind, cubes):
     letters = set()
     for index in range(6):
         made, again = (question(3, index, kind=kind, cubes=cubes, size=64) for _ in range(2))
@@ -34,7 +32,7 @@ def test_questions_are_right_repeatable_and_never_of_test_shapes(
     assert len(letters) > 1
 
 
-def test_angles_and_cubes_are_as_asked() -> None:
+def test_angles_and_cubes_are_as_asked():
     for index in range(3):
         made = question(0, index, kind="other", cubes=5, angle=(60.0, 110.0), size=64)
         assert (made.cubes, made.kind) == (5, "other")
@@ -43,7 +41,7 @@ def test_angles_and_cubes_are_as_asked() -> None:
     assert difficulty_of("matched", 11, 180) == 1
 
 
-def test_entries_score_letters() -> None:
+def test_entries_score_letters():
     entries = Questions(3, seed=1, kind="other", **SMALL)
     assert len(list(entries)) == 3
     assert entries[-1]["metadata"]["index"] == 2
@@ -57,6 +55,6 @@ def test_entries_score_letters() -> None:
     "settings",
     [{"kind": "nonsense"}, {"cubes": 2}, {"angle": (90, 20)}, {"size": 1}, {"answers": 5}],
 )
-def test_what_cannot_be_asked_is_refused(settings: dict) -> None:
+def test_what_cannot_be_asked_is_refused(settings):
     with pytest.raises(SceneGenError):
         question(0, 0, **settings)

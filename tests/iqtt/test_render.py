@@ -11,11 +11,11 @@ from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from iqtt import render as module
 from iqtt.questions import views
-from iqtt.questions.distractors import Pools, make_pools
+from iqtt.questions.distractors import make_pools
 from iqtt.questions.packing import pack_questions
 from iqtt.questions.specs import SplitSpec
 from iqtt.questions.views import Tally
-from iqtt.render import Rendered, groups, render_question, render_questions
+from iqtt.render import groups, render_question, render_questions
 from iqtt.shapes.polycube import box_centre
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import PlacementError
@@ -31,11 +31,11 @@ FLOAT = replace(SPEC, image_dtype="float32")
 
 
 @cache
-def pools_of(spec: SplitSpec) -> Pools:
+def pools_of(spec):
     return make_pools(spec)
 
 
-def rendered(spec: SplitSpec, split: str, group: str = "", **options) -> list[Rendered]:
+def rendered(spec, split, group="", **options):
     first, count = groups(spec, split)[group]
     batches = list(render_questions(pools_of(spec), split, first, count, **options))
     size = options.get("batch", module.DEFAULT_BATCH)
@@ -43,7 +43,7 @@ def rendered(spec: SplitSpec, split: str, group: str = "", **options) -> list[Re
     return [one for batch in batches for one in batch]
 
 
-def bits(one: Rendered) -> tuple:
+def bits(one):
     """All that is told of a question, and its pixels."""
     parts = [vars(one), vars(one.question), vars(one.question.shapes)]
     values = [part[name] for part in parts for name in sorted(part)]
@@ -53,7 +53,7 @@ def bits(one: Rendered) -> tuple:
     )
 
 
-def look(spec: SplitSpec, one: Rendered, k: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def look(spec, one, k):
     """Image, cube and depth that trimesh's rays find, and the shading equation gives."""
     cubes = one.question.shapes.cubes[k]
     boxes = [trimesh.creation.box(bounds=[c, c + 1]) for c in cubes.astype(float)]
@@ -185,17 +185,16 @@ def test_depth_comes_only_where_it_was_asked_for():
     assert one.images.tobytes() == other.images.tobytes()
 
 
-def test_other_settings_of_the_image_leave_shapes_and_views_alone():
-    plain = rendered(FLOAT, "val")
-    for changed in (
-        {"image_dtype": "float16"},
-        {"background": (0.0, 0.0, 0.0)},
-        {"ambient": (0.1,) * 3},
-    ):
-        for one, other in zip(rendered(replace(FLOAT, **changed), "val"), plain, strict=True):
-            assert one.depth.tobytes() == other.depth.tobytes()
-            assert (one.question.world_from_shape == other.question.world_from_shape).all()
-            assert (one.images != other.images).any()
+@pytest.mark.parametrize(
+    "changed",
+    [{"image_dtype": "float16"}, {"background": (0.0, 0.0, 0.0)}, {"ambient": (0.1,) * 3}],
+)
+def test_other_settings_of_the_image_leave_shapes_and_views_alone(changed):
+    other = replace(FLOAT, **changed)
+    for one, plain in zip(rendered(other, "val"), rendered(FLOAT, "val"), strict=True):
+        assert one.depth.tobytes() == plain.depth.tobytes()
+        assert (one.question.world_from_shape == plain.question.world_from_shape).all()
+        assert (one.images != plain.images).any()
 
 
 def test_questions_that_a_split_does_not_have():

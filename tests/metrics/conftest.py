@@ -1,21 +1,16 @@
 """Rooms for the metric tests, what hints say of some, and questions that people answered."""
 
-from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 from hypothesis import settings
-from numpy.typing import ArrayLike, NDArray
 
 from metrics.submissions.hints.tasks import room_hints
 from metrics.submissions.reader import open_predictions
 from scenegen.camera import pixel_directions
 from scenegen.rooms.reader import RoomsFile
-
-Depth = NDArray[np.float64]
 
 # The first example pays for imports and the machine may be busy.
 settings.register_profile("unhurried", deadline=None)
@@ -23,13 +18,11 @@ settings.load_profile("unhurried")
 
 
 @pytest.fixture(scope="session")
-def room_depth(
-    make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory
-) -> Callable[[int, int], Depth]:
+def room_depth(make_rooms, tmp_path_factory):
     """Planar depth (size, size) of a room, by seed and image size."""
 
     @cache
-    def depth(seed: int, size: int) -> Depth:
+    def depth(seed, size):
         path = tmp_path_factory.mktemp("depth") / "room.h5"
         with RoomsFile(make_rooms(path, 1, height=size, width=size, seed=seed)) as rooms:
             return rooms.read("depth", 0).astype(np.float64)
@@ -38,14 +31,14 @@ def room_depth(
 
 
 @pytest.fixture(scope="session")
-def hint_truth(make_rooms: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def hint_truth(make_rooms, tmp_path_factory):
     """16 rooms, higher than wide, with more pixels than hints look at."""
     path = tmp_path_factory.mktemp("hints") / "rooms.h5"
     return make_rooms(path, 16, height=80, width=68, seed=11, min_visible_pixels=20)
 
 
 @pytest.fixture(scope="session")
-def room_arrays(hint_truth: Path) -> tuple[Depth, ...]:
+def room_arrays(hint_truth):
     """Depth (N, H, W), normals (N, H, W, 3), rotations (N, 3, 3), lengths of rays (H, W)."""
     with h5py.File(hint_truth) as file:
         depth, normal = file["depth"][()].astype("f8"), file["normal"][()].astype("f8")
@@ -58,16 +51,10 @@ def room_arrays(hint_truth: Path) -> tuple[Depth, ...]:
 
 
 @pytest.fixture
-def hints(hint_truth: Path, tmp_path: Path) -> Callable[..., list[str]]:
+def hints(hint_truth, tmp_path):
     """What hints say to predictions, written without any check."""
 
-    def told(
-        depth: Depth,
-        normal: Depth | None = None,
-        rows: ArrayLike | None = None,
-        alignment: str = "none",
-        truth: Path = hint_truth,
-    ) -> list[str]:
+    def told(depth, normal=None, rows=None, alignment="none", truth=hint_truth):
         path = tmp_path / "predictions.h5"
         with RoomsFile(truth) as rooms:
             with h5py.File(path, "w") as file:
@@ -86,7 +73,7 @@ def hints(hint_truth: Path, tmp_path: Path) -> Callable[..., list[str]]:
 
 
 @pytest.fixture(scope="session")
-def quiz_split(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def quiz_split(tmp_path_factory):
     """Return a folder with 24 test questions of 32x32 pixels, their answers, and 3 to practise."""
     from iqtt.files.make import make_split
     from iqtt.questions.specs import SplitSpec

@@ -97,17 +97,6 @@ def test_what_the_scorer_found_is_read_back(truths, tmp_path):
     assert (other.metrics["iqtt_accuracy"].low, other.metrics["iqtt_accuracy"].high) == ends
 
 
-def test_columns_stand_in_the_order_of_the_table():
-    scores = made_scores.simple_rooms()
-    text = to_json(scores)
-    assert to_json(replace(scores, columns=dict(reversed(scores.columns.items())))) == text
-    content = json.loads(text)
-    assert list(content)[:3] == ["format", "format_version", "task"]
-    names = ["chamfer", "hausdorff", "f_score_0.05", "mse_depth"]
-    assert list(content["summary"]["metrics"]) == names
-    assert list(content["items"]) == ["row", "scene_index", "view_index", *names]
-
-
 def test_numbers_that_are_not_finite_become_null(tmp_path):
     scores = made_scores.rooms_with_objects()
     column = [[0.1, math.nan, math.inf, 0.2]]
@@ -141,13 +130,6 @@ def test_what_the_reader_would_refuse_is_not_written(tmp_path, monkeypatch):
     with refused(JsonError, "other.json", "bytes", hint="--csv"):
         write_scores(scores, tmp_path / "other.json")
     assert os.listdir(tmp_path) == ["s.json"]
-
-
-def test_names_beyond_ascii_are_escaped(tmp_path):
-    """One wide character would make the whole text take four times its memory when it is read."""
-    other = read_again(made_scores.simple_rooms("Größe \U0001f600"), tmp_path)
-    assert other.path.read_bytes().isascii()
-    assert other.method == "Größe \U0001f600"
 
 
 def test_files_are_replaced_only_when_asked(tmp_path):
@@ -355,3 +337,10 @@ def test_what_is_not_comparable_says_why():
 def test_what_a_file_says_is_cut_short_in_errors():
     error = refusal("k" * 10**6, "f" * 10**4, "e" * 10**4)
     assert max(map(len, (error.where, error.found, error.expected))) == LONGEST_SHOWN
+
+
+def test_names_beyond_ascii_are_escaped(tmp_path):
+    """One wide character would make the whole text take four times its memory when it is read."""
+    other = read_again(made_scores.simple_rooms("Größe \U0001f600"), tmp_path)
+    assert other.path.read_bytes().isascii()
+    assert other.method == "Größe \U0001f600"

@@ -89,15 +89,6 @@ def test_predictions_are_recorded_beside_the_truth(predicted, truths, tmp_path):
         assert np.abs(first - second).max() <= 1, "predicted ones are made unit"
 
 
-def test_colours_of_errors_tell_sign_and_size():
-    near, right, far, unknown = error_colors(np.array([-9.0, 0.0, 9.0, NAN])).astype(int)
-    assert near[2] > near[0] + 100
-    assert far[0] > far[2] + 100
-    assert np.ptp(right) < 5
-    assert unknown.tolist() == [0, 0, 0]
-    assert error_colors(np.array([0.05])).tolist() == [far.tolist()]
-
-
 def test_only_rows_and_scores_of_the_submission_are_shown(predicted, truths, tmp_path):
     rooms, path = predicted
     write_scores(score([path], truths.rooms, PARTIAL), tmp_path / "s.json")
@@ -116,12 +107,3 @@ def test_only_rows_and_scores_of_the_submission_are_shown(predicted, truths, tmp
     path = good_answers(tmp_path, truths.iqtt)
     with open_predictions(path) as answers, pytest.raises(ScoringError):
         require_rooms(answers)
-
-
-def test_no_more_scenes_than_fit(predicted, truths, monkeypatch):
-    monkeypatch.setattr("metrics.viewing.MOST_ROWS", 1)
-    rooms, path = predicted
-    with open_runs([path], truths.rooms) as runs:
-        scores = score_runs(runs, PARTIAL, lambda done: None)
-        (scene,) = predicted_scenes(runs.files[0], rooms, scores)
-    assert next(iter(scene.steps.values())) == 0

@@ -7,14 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from scenegen.camera import (
-    Camera,
-    back_project,
-    intrinsics,
-    pixel_directions,
-    transform_points,
-    transform_vectors,
-)
+from scenegen.camera import Camera, back_project, intrinsics, pixel_directions
 from scenegen.common.errors import SpecError
 
 COORDINATE = st.floats(-9.0, 9.0)
@@ -56,14 +49,6 @@ def test_looking_nearly_straight_down_is_rigid() -> None:
     rotation = Camera((0.3, 2.0, 0.3 + 1e-5), (0.3,) * 3, 30.0).world_from_camera[:3, :3]
     np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-12)
     np.testing.assert_allclose(rotation[:, 0], [1, 0, 0], atol=1e-12)
-
-
-def test_a_camera_looks_elsewhere_and_not_all_around() -> None:
-    with pytest.raises(SpecError, match="camera"):
-        Camera((0.3, 0.3, 0.3), (0.3, 0.3, 0.3), 30.0)
-    for fov in (0.0, 180.0, -5.0):
-        with pytest.raises(SpecError, match="fov"):
-            Camera((0.3, 0.3, 2.0), (0.3, 0.3, 0.3), fov)
 
 
 def test_pixel_directions_by_hand() -> None:
@@ -128,14 +113,3 @@ def test_every_image_has_the_diagonal_of_a_square_one(height: int, width: int, f
     diagonal = math.hypot(half, half * width / height)
     square = math.tan(math.radians(fov) / 2) * math.sqrt(2)
     assert diagonal == pytest.approx(square, rel=1e-9)
-
-
-def test_transforms_move_points_and_turn_vectors() -> None:
-    camera = Camera((1.0, 2.0, 3.0), (0.2, 0.1, 0.4), 30.0)
-    matrix = camera.world_from_camera
-    some = np.random.default_rng(0).standard_normal((5, 7, 3))
-    ones = np.ones((5, 7, 1))
-    expected = np.concatenate([some, ones], axis=-1) @ matrix.T
-    np.testing.assert_allclose(transform_points(matrix, some), expected[..., :3], atol=1e-12)
-    moved = transform_points(matrix, some) - transform_points(matrix, np.zeros(3))
-    np.testing.assert_allclose(transform_vectors(matrix, some), moved, atol=1e-12)

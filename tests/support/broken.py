@@ -171,7 +171,7 @@ VALUES = [
     ("a damaged chunk of normals", ["normal", "cannot be read"], damaged_chunk("normal", 3)),
 ]  # fmt: skip
 
-# `submissions/hints` has the tests of each hint; here is one of each kind for the commands.
+# `submissions/test_hints` has the tests of each hint; here is one of each kind for the commands.
 HINTS = [
     ("upside down", ["depth", "upside down"], values("depth", lambda v: v[:, ::-1])),
     ("rows shuffled", ["row", "rows look shuffled"], made.shuffled),

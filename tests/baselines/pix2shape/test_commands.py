@@ -86,6 +86,7 @@ MISTAKES = [
 BASELINE_MISTAKES = [
     (f"oracle {ROOMS} {WITH}", ("--weights", "oracle")),
     (f"pix2shape {ROOMS} {WITH} --train rooms.h5", ("--train",)),
+    (f"pix2shape-compact {ROOMS} {WITH}", ("--weights", "pix2shape-compact")),
     ("pix2shape --data nothing.h5", ("nothing.h5",)),
 ]
 

@@ -9,14 +9,15 @@ import h5py
 import numpy as np
 import pytest
 import torch
-from pix2shape_models import question_source, released, suited, tiny
+from h5_edits import put
+from pix2shape_models import edited, question_source, released, suited, tiny
 from refusals import refused
 from torch.utils.data import default_collate
 
 from baselines.pix2shape.network.surfels import render
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
-from scenegen.common.errors import SpecError
+from scenegen.common.errors import FileFormatError, SpecError
 
 SPEC = SplitSpec(
     seed=5, train=7, labeled=4, val=2, test=1, cubes=(5, 7), lights=(1, 3), height=64, width=64,
@@ -102,3 +103,17 @@ def test_files_without_lights_are_refused(folder, tmp_path):
                 call(path, None, TINY)
     with refused(SpecError, "networks"):
         question_source(folder / "iqtt-val.h5", None, tiny())
+
+
+def test_damaged_lights_are_refused(folder, tmp_path):
+    path = edited(
+        folder / "iqtt-val.h5", tmp_path / "bad.h5", put("truth/light_color", (1, 2), np.nan)
+    )
+    with refused(FileFormatError, f"{path}: row 1", "light_color"):
+        question_source(path, None, TINY)
+
+
+def test_the_polar_encoder_needs_a_white_background(train_path):
+    """By which it tells shape from background; otherwise all pixels would count as shape."""
+    with refused(SpecError, str(train_path)):
+        suited(tiny(camera=False, encoder="polar"), train_path)

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from refusals import refused
 
 from baselines.ptn.rooms import RoomImages
 from baselines.ptn.silhouettes import Silhouettes
+from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
 
 
@@ -19,3 +21,11 @@ def test_what_differs_from_the_empty_room_is_an_object(make_rooms, tmp_path, dty
             assert (ids == (rooms[row].object_id > 0).flatten()).all()
             assert not (found & ~ids).any()
             assert (ids & ~found).sum() <= 0.02 * ids.sum()
+
+
+@pytest.mark.parametrize("settings", [{"shadows": True}, {"spp": 4}], ids=["shadows", "spp"])
+def test_images_in_which_walls_change_are_refused(make_rooms, tmp_path, settings):
+    with RoomsFile(make_rooms(tmp_path / "rooms.h5", 1, **settings)) as rooms:
+        with refused(SpecError, hint="ids"):
+            Silhouettes(rooms)
+        Silhouettes(rooms, "ids")

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import h5py
 import numpy as np
 import pytest
 import torch
@@ -9,13 +10,14 @@ from pix2shape_models import in_memory
 from refusals import refused
 
 from baselines.pix2shape.network.empty_rooms import Cameras, empty_rooms, planes_of
-from baselines.relief import view_pairs
+from baselines.relief import depth_supervised, view_pairs
 from baselines.relief.depth_completed import Completion
 from baselines.relief.network import Card, Settings, predicted_depth, relief_network
 from baselines.relief.training import cameras_of
 from baselines.training.baseline import train
 from baselines.training.data import TrainingFiles
 from baselines.training.rooms import camera_poses
+from baselines.training.submission import write_submission
 from metrics.measures.relief import empty_room
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
@@ -57,6 +59,19 @@ def test_a_room_twice_as_large_looks_the_same_and_is_twice_as_deep(cameras):
         one, two = (predicted_depth(network, image, c, c) for c in (cameras, larger))
     torch.testing.assert_close(two, 2 * one, rtol=1e-3, atol=1e-3)
     assert (one < told(cameras)[0] - 0.02).any()
+
+
+def test_one_network_learns_both_kinds_of_rooms_and_predicts_both(
+    interior_path, turned_path, tmp_path
+):
+    with TrainingFiles(interior_path, turned_path) as data:
+        weights = train(depth_supervised.BASELINE, data, tmp_path, SMALL)
+    for path in (interior_path, turned_path):
+        write_submission(
+            depth_supervised.BASELINE, path, tmp_path / "x.h5", weights, overwrite=True
+        )
+        with h5py.File(tmp_path / "x.h5") as file:
+            assert np.isfinite(file["depth"][()]).all()
 
 
 def test_methods_of_the_papers_room_refuse_closed_ones(cameras, interior_path, tmp_path):

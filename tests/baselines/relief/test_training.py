@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 import torch
 from h5_edits import put, values
-from pix2shape_models import edited
+from pix2shape_models import edited, in_memory
 from refusals import refused
 from safetensors.torch import load_file
 
 from baselines.pix2shape.matching.relief import FOLDER
 from baselines.relief import depth_supervised, view_pairs
+from baselines.relief.depth_completed import views_of_scenes
 from baselines.relief.network import Settings
 from baselines.relief.training import SLOPE, shape_loss
 from baselines.training.baseline import train
@@ -64,6 +65,16 @@ def test_view_pairs_reads_nothing_but_images_and_cameras(near_path, tmp_path):
     assert not same(
         train(view_pairs.BASELINE, TrainingFiles(other), tmp_path / "three", SMALL), expected
     )
+
+
+def test_each_row_is_seen_from_the_cameras_of_its_own_scene(turned_path):
+    rooms = in_memory(turned_path, 32)
+    assert rooms.depth is None
+    assert rooms.rounded
+    found = [rows.tolist() for rows in views_of_scenes(rooms)]
+    assert found == [[row - row % 3 + k for k in range(3)] for row in range(9)]
+    mixed = replace(rooms, scene=torch.tensor([2, 0, 1, 0, 2, 2, 1, 0, 1]))
+    assert views_of_scenes(mixed)[3].tolist() == [1, 3, 7]
 
 
 INSIDE = torch.tensor([[[1, 1, 0, 2], [1, 1, 0, 2]], [[1, 1, 0, 0], [0, 0, 0, 0]]])

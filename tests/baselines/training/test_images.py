@@ -1,7 +1,10 @@
 """Images as networks take them, the order of rows, and files that forked processes read."""
 
+import os
+import pickle
 import time
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 
 import numpy as np
@@ -11,7 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import refused
 
+from baselines.training.data import Opened
 from baselines.training.images import Draws, channels_first, read_ahead, reduced
+from scenegen import open_rooms
 from scenegen.common.errors import FileFormatError
 
 
@@ -30,6 +35,18 @@ def test_radiance_that_networks_cannot_take_is_refused(value):
     image[1, 2, 0] = value
     with refused(FileFormatError, "row 7"):
         channels_first(image, 4, "row 7")
+
+
+def test_every_process_opens_the_file_for_itself(rooms_path):
+    opened = Opened(partial(open_rooms, rooms_path))
+    assert opened.file is opened.file
+    child = os.fork()
+    if not child:
+        os._exit(0 if opened.file.read("image", 7).shape == (32, 32, 3) else 1)
+    assert os.waitpid(child, 0)[1] == 0
+    again = pickle.loads(pickle.dumps(opened))
+    assert again.file is not opened.file
+    assert (again.file.read("image", 3) == opened.file.read("image", 3)).all()
 
 
 @settings(deadline=None, max_examples=40)

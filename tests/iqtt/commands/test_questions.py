@@ -46,8 +46,6 @@ def test_every_option_is_recorded(run, monkeypatch, tmp_path):
     monkeypatch.setattr(sys, "argv", ["/somewhere/iqtt", *line.split()])
     result = run(*line.split())
     assert result.exit_code == 0, result.output
-    assert result.stdout.startswith("x: 6 + 3 + 4 questions (2 of training labelled), ")
-    assert "views hid a cube and were refused" in result.stdout
     assert files_in(tmp_path / "x") == [*FILES]
     with h5py.File("x/iqtt-test-answers.h5") as file:
         spec = json.loads(file.attrs["spec"])
@@ -87,23 +85,17 @@ def test_files_that_are_read_beside_another_are_no_outputs(run, tmp_path, line, 
 
 @pytest.mark.usefixtures("few_explained")
 def test_a_secret_seed(run, tmp_path):
-    """The same content gives the same questions, blanks aside; tools that read cope without a seed;
-    only a split whose seed is known gets a note.
-    """
+    """The same content gives the same questions, blanks aside; tools that read need no seed."""
     for name, content in (("a", "0123456789abcdef"), ("b", " 0123456789abcdef\n"), ("c", "z" * 16)):
         (tmp_path / name).write_text(content)
         made = run("make-split", *TINY.split(), "--out", f"{name}x", "--secret-seed", name)
         assert made.exit_code == 0, made.output
-        assert "note" not in made.stderr
     raw = {name: (tmp_path / f"{name}x/iqtt-test.h5").read_bytes() for name in "abc"}
     assert raw["a"] == raw["b"] != raw["c"]
     told = run("info", "ax/iqtt-test-answers.h5")
     assert told.exit_code == 0
     assert str(secret_seed("a")) not in told.stdout
     assert run("audit", "ax").exit_code == 0
-    known = run("make-split", *TINY.split(), "--out", "known")
-    assert "note: " in known.stderr
-    assert "--secret-seed" in known.stderr
 
 
 @pytest.mark.parametrize(
@@ -132,14 +124,11 @@ def test_a_secret_that_is_none(run, tmp_path, options, words, check_refusal):
     ("options", "words"),
     [
         ("--cubes 3-4", ["cubes", "too few", "--cubes"]),
-        ("--cubes x", ["--cubes", "'x'"]),
         ("--train 0 --labeled 0 --val 0 --test 0", ["train, val and test", "at least 1 question"]),
         ("--train 5 --labeled 6", ["labeled", "6", "5 training"]),
         ("--background red", ["background", "red", "R,G,B"]),
-        ("--preset huge", ["preset", "huge"]),
         ("--out nowhere/x", ["nowhere", "does not exist"]),
         ("--out a-file", ["a-file", "is a file"]),
-        ("--batch 0", ["batch"]),
     ],
 )
 def test_a_mistake_is_one_line_and_leaves_nothing(run, options, words, tmp_path, check_refusal):
@@ -165,32 +154,23 @@ def test_show_draws_questions(run, split, arguments, rows, tmp_path):
     assert (tmp_path / "sheet.png").stat().st_size > 1000
 
 
+@pytest.mark.usefixtures("few_explained")
+def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path, check_refusal):
+    shutil.copytree(split, "x")
+    result = run("audit", "x", "--json", "audit.json")
+    assert result.exit_code == 0, result.output
+    found = json.loads((tmp_path / "audit.json").read_text())
+    assert found["passed"] is True
+    assert {proof["status"] for proof in found["audits"][0]["proofs"]} == {"ok"}
+    again = run("audit", "x", "--json", "audit.json")
+    check_refusal(again.exit_code, again.stdout, again.stderr, ("audit.json", "--overwrite"))
+    with h5py.File("x/iqtt-val.h5", "r+") as file:
+        file["answers"][0] = (file["answers"][0] + 1) % 3
+    result = run("audit", "x")
+    assert (result.exit_code, "FAIL" in result.stdout) == (1, True)
+
+
 def test_show_needs_answers_to_show_them(run, split, tmp_path, check_refusal):
     shutil.copy(split / "iqtt-test.h5", tmp_path)
     result = run("show", "iqtt-test.h5", "--answers")
     check_refusal(result.exit_code, result.stdout, result.stderr, ("no answers",))
-
-
-@pytest.mark.usefixtures("few_explained")
-def test_audit_passes_and_writes_json(run, split, tmp_path, check_refusal):
-    result = run("audit", split, "--json", "audit.json")
-    assert result.exit_code == 0, result.output
-    assert "one right answer" in result.stdout
-    found = json.loads((tmp_path / "audit.json").read_text())
-    assert found["passed"] is True
-    assert {proof["status"] for proof in found["audits"][0]["proofs"]} == {"ok"}
-    again = run("audit", split, "--json", "audit.json")
-    check_refusal(again.exit_code, again.stdout, again.stderr, ("audit.json", "--overwrite"))
-    told = run("audit", split, "--markdown")
-    assert "| --- |" in told.stdout
-
-
-@pytest.mark.usefixtures("few_explained")
-def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path):
-    shutil.copytree(split, "x")
-    with h5py.File("x/iqtt-val.h5", "r+") as file:
-        file["answers"][0] = (file["answers"][0] + 1) % 3
-    result = run("audit", "x")
-    assert result.exit_code == 1
-    assert "FAIL" in result.stdout
-    assert "one right answer" in result.stdout

@@ -27,13 +27,6 @@ def test_card(run, refuses, split_folder, tmp_path):
     assert "iqtt-test-answers.h5" in page
 
 
-def test_refused_cards(refuses, split_folder, tmp_path):
-    refuses("card", split_folder, *WHO, "--license", "my own", words=("--license",))
-    refuses("card", tmp_path, *WHO, words=("no question files",))
-    beside = split_folder / "iqtt-val.h5"
-    refuses("card", split_folder, *WHO, "--out", beside, "--overwrite", words=("iqtt-val.h5",))
-
-
 @pytest.mark.parametrize("form", ["parquet", "webdataset"])
 def test_export(form, run, refuses, split_folder, tmp_path):
     train, ending = (

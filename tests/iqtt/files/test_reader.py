@@ -1,25 +1,25 @@
 """Question files read with the reading API, and beside it with plain h5py."""
 
+import dataclasses
+import itertools
+
 import h5py
 import numpy as np
 import pytest
-from audit_tables import audited
 from refusals import refused
+from sheets import enlarged, find
+from streamed import check_equal, stored
 
+from iqtt import QuestionStream, SplitSpec, make_split
 from iqtt.files.layout import NO_CUBE
-from iqtt.files.reader import (
-    AnswersFile,
-    QuestionsDataset,
-    answers_beside,
-    open_questions,
-    parts,
-)
-from iqtt.files.verify import verify_split
+from iqtt.files.preview import RIGHT, question_sheet
+from iqtt.files.reader import AnswersFile, QuestionsDataset, answers_beside, open_questions, parts
 from iqtt.questions.kinds import DISTRACTOR_KINDS
-from iqtt.shapes.polycube import canonical, set_ids
-from iqtt.sharing.published import open_split
+from iqtt.questions.specs import SUITE
+from iqtt.shapes.polycube import canonical_class
+from iqtt.shapes.splits import split_of
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.files.sets import shards
+from scenegen.rooms.preview import srgb_bytes
 
 TABLES = [  # of the tiny split: file, part, answers told, truth told
     ("iqtt-train.h5", "labeled", True, True),
@@ -65,16 +65,10 @@ def test_truth_has_no_padding_and_agrees_with_the_images(split_folder):
         hit = np.isfinite(truth.depth)
         assert truth.visible_pixels.sum(axis=1).tolist() == hit.sum(axis=(1, 2)).tolist()
         assert (record.images[~hit] == 255).all(), "the background is white"
-        ids = [one.tobytes() for one in set_ids(canonical(truth.cubes))]
-        assert list(truth.shape_id) == ids
         same = [k for k in range(3) if truth.shape_id[k + 1] == truth.shape_id[0]]
         assert same == [record.answer] == [k for k, v in enumerate(truth.distractor_kind) if not v]
         assert set(truth.distractor_kind) <= {None, *DISTRACTOR_KINDS}
-        for k, kind in enumerate(truth.distractor_kind):
-            assert (kind == "mirror") <= (truth.class_id.count(truth.class_id[k + 1]) > 1)
         assert truth.camera == questions.spec.camera(truth.camera.position[2])
-        turned = truth.world_from_shape @ truth.world_from_shape.transpose(0, 2, 1)
-        np.testing.assert_allclose(turned, np.tile(np.eye(3), (4, 1, 1)), atol=1e-12)
         assert questions.spec.min_angle_degrees <= truth.angle_degrees <= 180
 
 
@@ -134,12 +128,6 @@ def test_released_images(released, dtype, options):
             assert questions[-1].radiance.max() <= 1.001
 
 
-def test_shapes_beside_released_questions_are_nobodys(damaged):
-    path = damaged(lambda file: file.attrs.clear())
-    with open_questions(path) as questions:
-        assert questions.fields == ("questions", "answers")
-
-
 def test_parts(split_folder, released):
     assert parts(split_folder / "iqtt-train.h5") == ("labeled", "unlabeled")
     assert parts(split_folder / "iqtt-test.h5") == parts(released()) == ("",)
@@ -181,28 +169,129 @@ def test_what_the_data_set_refuses(split_folder):
             QuestionsDataset(split_folder / name, **arguments)
 
 
-def opened_to_hand_out(folder):
-    with open_split(folder, with_answers=True):
-        pass
+def expected_rows(folder, split="train"):
+    """Return all columns of a split's questions; in training labelled ones come first."""
+    if split == "train":
+        parts = ("labeled", "unlabeled")
+        images = stored(folder / "iqtt-train.h5", *parts)
+        truth = stored(folder / "iqtt-train.h5", *(f"truth/{part}" for part in parts))
+        return {"questions": images["questions"], **truth}
+    columns = stored(folder / f"iqtt-{split}.h5")
+    return {name.removeprefix("truth/"): values for name, values in columns.items()}
 
 
-@pytest.mark.parametrize(
-    "look",
-    [
-        lambda folder: verify_split(folder, items=1),
-        lambda folder: audited([folder], probed=0),
-        opened_to_hand_out,
-    ],
-    ids=["verify", "audit", "card"],
-)
-@pytest.mark.usefixtures("few_explained")
-def test_each_file_is_opened_once(look, split_folder, monkeypatch):
-    opened, really = [], shards.open_unchecked
+def small(folder):
+    spec = SplitSpec(seed=5, train=12, labeled=6, val=6, test=6, cubes=(5, 7), lights=(1, 2),
+                     height=32, width=32, min_cube_pixels=2, with_depth=True)  # fmt: skip
+    return spec, expected_rows(folder), expected_rows(folder, "val")
 
-    def counted(path, kind):
-        opened.append(path.name)
-        return really(path, kind)
 
-    monkeypatch.setattr(shards, "open_unchecked", counted)
-    look(split_folder)
-    assert sorted(opened) == sorted(path.name for path in split_folder.glob("*.h5"))
+def test_rows_are_those_of_the_file(split_folder):
+    spec, train, val = small(split_folder)
+    check_equal(QuestionStream(spec, fields=[*train], batch=5, stop=12), train)
+    check_equal(QuestionStream(spec, fields=[*val], batch=4, stop=6, split="val"), val)
+    two = {"questions": train["questions"][[3, 4, 5, 9, 10, 11]]}
+    ranks = {"rank": 1, "world_size": 2}
+    check_equal(QuestionStream(spec, fields=["questions"], batch=3, stop=12, **ranks), two)
+
+
+def test_beyond_a_file_positions_are_balanced_in_blocks_and_shapes_are_of_training(
+    split_folder, monkeypatch
+):
+    spec, _, _ = small(split_folder)
+    monkeypatch.setattr("iqtt.files.stream.BLOCK", 12)
+    for batch in QuestionStream(spec, fields=["answers", "cubes"], batch=12, start=12, stop=48):
+        assert np.bincount(batch["answers"]).tolist() == [4, 4, 4]
+        for cubes in batch["cubes"][:, 0]:
+            used = cubes[cubes[:, 0] != NO_CUBE]
+            assert split_of(canonical_class(used[None]), chains=True).tolist() == [0]
+
+
+def test_pictures_stay_on_the_device(split_folder):
+    torch = pytest.importorskip("torch")
+    spec, train, _ = small(split_folder)
+    fields = ["questions", "depth", "answers"]
+    for batch in QuestionStream(spec, fields=fields, batch=12, stop=12, on_device=True):
+        for name in ("questions", "depth"):
+            found = torch.from_dlpack(batch[name]).numpy()
+            np.testing.assert_array_equal(found, train[name], err_msg=name)
+
+
+def test_settings_that_no_stream_has():
+    for wrong in ({"fields": ["image"]}, {"split": "training"}, {"batch": 5000}):
+        with pytest.raises(SpecError):
+            QuestionStream("matched", **wrong)
+    with pytest.raises(SpecError, match="at most 4 rows"):
+        QuestionStream(SplitSpec(height=4096, width=4096), batch=5)
+    with pytest.raises(SpecError):
+        QuestionStream("matches")
+    with pytest.raises(SpecError):
+        QuestionStream({SplitSpec(cubes=(6, 6), answers=n, distractors="near"): 1 for n in (2, 3)})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", SUITE)
+def test_all_kinds_have_the_bits_of_files(kind, tmp_path):
+    distractors, answers = SUITE[kind]
+    spec = SplitSpec(distractors=distractors, answers=answers, train=70, labeled=20, val=0, test=0,
+                     height=32, width=32, min_cube_pixels=1, with_depth=True)  # fmt: skip
+    make_split(tmp_path / "split", spec)
+    expected = expected_rows(tmp_path / "split")
+    for batch, workers in itertools.product((1, 7, 64), (0, 1, 2)):
+        stream = QuestionStream(spec, fields=[*expected], batch=batch, stop=70, workers=workers)
+        check_equal(stream, expected)
+
+
+@pytest.fixture(scope="module")
+def records(split_folder):
+    with open_questions(split_folder / "iqtt-val.h5") as questions:
+        return list(questions)
+
+
+def shown(record, factor=1):
+    """The four images as a sheet should show them, `factor` times as large."""
+    return [enlarged(srgb_bytes(image), factor) for image in record.radiance]
+
+
+def has(pixels, color):
+    return int((pixels == color).all(axis=-1).sum())
+
+
+def framed(sheet, places, size=(128, 128)):
+    """Tell of each tile whether the frame of the right answer surrounds it, and nothing half."""
+    found = []
+    for y, x in places:
+        around = np.ones((size[0] + 6, size[1] + 6), bool)
+        around[3:-3, 3:-3] = False
+        ring = sheet[y - 3 : y + size[0] + 3, x - 3 : x + size[1] + 3][around]
+        assert has(ring, RIGHT) in (0, len(ring))
+        found.append(has(ring, RIGHT) > 0)
+    return found
+
+
+@pytest.mark.parametrize("show_answers", [False, True])
+def test_reference_then_answers_in_reading_order(records, show_answers):
+    sheet = np.asarray(question_sheet(records[:3], show_answers))
+    for i, record in enumerate(records[:3]):
+        places = [find(sheet, tile) for tile in shown(record, 4)]
+        assert len({y for y, _ in places}) == 1
+        gaps = np.diff([x for _, x in places]) - 128
+        assert 0 < gaps[1] == gaps[2] < gaps[0] / 2, "the reference stands apart"
+        right = [False] + [show_answers and k == record.answer for k in range(3)]
+        assert framed(sheet, places) == right
+        y = places[0][0]
+        assert i == 0 or y > find(sheet, shown(records[i - 1], 4)[0])[0] + 128 + 20
+
+
+def test_nothing_is_given_away_unless_asked(records):
+    for record in records:
+        sheet = np.asarray(question_sheet([record], False))
+        assert has(sheet, RIGHT) == 0
+        unanswered = dataclasses.replace(record, answer=None, truth=None)
+        assert np.array_equal(sheet, np.asarray(question_sheet([unanswered], False)))
+
+
+def test_shapes_beside_released_questions_are_nobodys(damaged):
+    path = damaged(lambda file: file.attrs.clear())
+    with open_questions(path) as questions:
+        assert questions.fields == ("questions", "answers")

@@ -19,11 +19,13 @@ from iqtt.files.reader import (
     open_tables,
     parts,
 )
+from iqtt.files.verify import verify_split
 from iqtt.questions.kinds import DISTRACTOR_KINDS
 from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.files.content import seal
 
 
-def refused(path, place, read=open_questions) -> FileFormatError:
+def refused(path, place, read=open_questions):
     """Check that a file is refused in one line that says where it is wrong; return the error."""
     with pytest.raises(FileFormatError) as error:
         read(path)
@@ -133,34 +135,30 @@ def test_a_value_out_of_its_range_spoils_its_row_only(damaged, name, value, expe
             assert error.value.expected == expected
 
 
-def test_a_damaged_chunk_spoils_its_row_only(damaged, tmp_path):
+def test_a_damaged_chunk_spoils_its_row_only(damaged):
     path = damaged(damaged_chunk("questions", 2))
     with open_questions(path) as questions:
         assert questions[1].images.shape == questions[3].images.shape
         for rows, where in ((2, "questions, row 2"), (slice(1, None), "questions, rows 1 to 5")):
             refused(path, where, read=lambda _, rows=rows: questions.read("questions", rows))
-    done = CliRunner().invoke(cli.iqtt, ["verify", str(tmp_path), "--items", "0"])
-    assert done.exit_code == 1
-    assert "FAIL  iqtt-val.h5" in done.output
 
 
-@pytest.mark.parametrize(
-    ("where", "key", "value"),
-    [
-        ("truth/cubes", "unit", "metre"),
-        ("truth/angle_degrees", "meaning", "nothing"),
-        ("/", "truth_digest", "0" * 64),
-    ],
-)
-def test_attributes_that_lie_fail_verify_even_when_sealed_again(
-    damaged, tmp_path, where, key, value
-):
-    from scenegen.files.content import seal
+def noted(where, key, value):
+    """An attribute that lies, and a file that is sealed again."""
 
     def edit(file):
         file[where].attrs[key] = value
         seal(file)
 
+    return edit
+
+
+@pytest.mark.parametrize(
+    "edit",
+    [damaged_chunk("questions", 2), noted("truth/cubes", "unit", "metre"),
+     noted("truth/angle_degrees", "meaning", "nothing"), noted("/", "truth_digest", "0" * 64)],
+)  # fmt: skip
+def test_what_verify_finds(edit, damaged, tmp_path):
     damaged(edit)
     done = CliRunner().invoke(cli.iqtt, ["verify", str(tmp_path), "--items", "0"])
     assert done.exit_code == 1
@@ -212,23 +210,13 @@ def test_parts_that_are_not_there(split_folder):
 
 
 FLOATS = np.zeros((5, 4, 8, 8, 3), np.float32)
+IMAGES_OF_OTHERS = (
+    FLOATS[..., 0], FLOATS[:, :3], FLOATS[:, :, :0], np.float32(3), h5py.Empty("f4"),
+    FLOATS.astype(np.int16), FLOATS.astype(np.float64), FLOATS + 255, FLOATS * np.nan, FLOATS - 0.5,
+)  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "questions",
-    [
-        FLOATS[..., 0],
-        FLOATS[:, :3],
-        FLOATS[:, :, :0],
-        np.float32(3),
-        h5py.Empty("f4"),
-        FLOATS.astype(np.int16),
-        FLOATS.astype(np.float64),
-        FLOATS + 255,
-        FLOATS * np.nan,
-        FLOATS - 0.5,
-    ],
-)
+@pytest.mark.parametrize("questions", IMAGES_OF_OTHERS)
 def test_released_files_with_other_images(released, questions):
     path = released()
     with h5py.File(path, "r+") as file:
@@ -263,24 +251,10 @@ def test_answers_of_other_questions(split_folder, damaged, released):
         open_questions(path, answers=fewer.with_name("none.h5"))
 
 
-def test_files_are_closed(split_folder, tmp_path):
-    """HDF5 opens no file for writing that is still open for reading."""
-    path, answers = tmp_path / "iqtt-test.h5", tmp_path / "iqtt-test-answers.h5"
-    errors = []
-    for name in (path.name, answers.name):
-        shutil.copy(split_folder / name, tmp_path / name)
-    with open_questions(path, answers=answers) as questions:
-        assert questions.has_answers
-    for arguments in (
-        {"part": "labeled"},
-        {"answers": split_folder / "iqtt-val.h5"},
-        {"answers": tmp_path / "none.h5"},
-    ):
-        with pytest.raises((FileFormatError, SpecError, OSError)) as error:
-            open_questions(path, **arguments)
-        errors.append(error)  # and with it the frames that it passed through
-    with h5py.File(path, "r+"), h5py.File(answers, "r+") as file:
-        del file["truth/distractor_kind"].attrs["names"]
-    errors.append(refused(answers, "", read=AnswersFile))
-    with h5py.File(answers, "r+"), h5py.File(path, "r+"):
-        assert len(errors) == 4
+def test_questions_are_made_again(split_folder, tmp_path):
+    assert all(check.ok for check in verify_split(split_folder, items=2))
+    shutil.copytree(split_folder, tmp_path / "x")
+    with h5py.File(tmp_path / "x" / "iqtt-val.h5", "r+") as file:
+        file["questions"][0, 1] = file["questions"][0, 2]
+    failed = {check.name for check in verify_split(tmp_path / "x", items=2) if not check.ok}
+    assert "made again from the seed" in failed

@@ -13,10 +13,12 @@ from scipy import stats
 from iqtt.audit.congruence import congruent_rows
 from iqtt.questions import distractors as module
 from iqtt.questions.distractors import (
-    Drawn,
     Pools,
+    answer_positions,
+    arrange,
     draw_shapes,
     make_pools,
+    question_key,
 )
 from iqtt.questions.kinds import DISTRACTORS, QUESTION_KINDS, question_kind
 from iqtt.questions.specs import SPLITS, SplitSpec
@@ -31,26 +33,25 @@ from iqtt.shapes.polycube import (
     symmetries,
 )
 from iqtt.shapes.splits import TooFewShapesError, split_of
-from scenegen.common.errors import PlacementError, SpecError
+from scenegen.common.errors import PlacementError
 
 SPEC = SplitSpec(seed=11, cubes=(6, 8), max_radius=2.7)
 CASES = [
     *((kind, shapes, 3) for shapes in ("chain", "tree") for kind in DISTRACTORS),
     *((kind, "chain", 2) for kind in DISTRACTORS if kind != "mirror"),
 ]
-RNG = np.random.default_rng
 
 
 @cache
-def pools_of(spec: SplitSpec) -> Pools:
+def pools_of(spec):
     return make_pools(spec)
 
 
-def draw(spec: SplitSpec, count: int, split: str = "train") -> list[Drawn]:
+def draw(spec, count, split="train"):
     return draw_shapes(pools_of(spec), split, [(i, 0) for i in range(count)])
 
 
-def by_size(drawn: list[Drawn]) -> list[tuple[np.ndarray, np.ndarray]]:
+def by_size(drawn):
     """Shapes and kinds of the questions of each number of cubes, (Q, 3, n, 3) and (Q, 3)."""
     sizes = sorted({cubes.shape[1] for cubes, _ in drawn})
     some = [[one for one in drawn if one[0].shape[1] == size] for size in sizes]
@@ -61,7 +62,7 @@ def congruent(a, b, turned=(1, 1, 1)):
     return congruent_rows(a, b * np.array(turned, np.int8))
 
 
-def shared_cubes(*shapes) -> int:
+def shared_cubes(*shapes):
     return len(set.intersection(*({tuple(c) for c in shape.tolist()} for shape in shapes)))
 
 
@@ -180,7 +181,7 @@ def test_any_cube_may_be_the_moved_one():
     assert (apart.sum(axis=0) >= 5).all()
 
 
-def check_that_answers_alone_tell_nothing(kind: str, cubes: int, count: int) -> None:
+def check_that_answers_alone_tell_nothing(kind, cubes, count):
     """The odd one out, the most and the least compact, wide or symmetric: each is right as often as
     by chance, ties by lot, within 4 standard errors.
     """
@@ -263,12 +264,6 @@ def test_too_few_shapes_are_told_before_anything_is_rendered(settings, kind, mon
     assert repr(kind) in error.value.expected
 
 
-def test_a_request_that_does_not_tell_its_seed_is_refused():
-    with pytest.raises(SpecError) as error:
-        make_pools(SPEC.public())
-    assert error.value.where == "seed"
-
-
 def test_sizes_that_do_not_allow_a_kind_are_left_out_of_it_alone():
     sizes = make_pools(replace(SPEC, seed=0, cubes=(3, 8), max_radius=3.5)).sizes
     assert sizes == {
@@ -290,3 +285,59 @@ def test_where_few_shapes_of_many_cubes_are_found_those_are_shared_out(monkeypat
     assert all(3 < len(part) < 4000 for part in pools.classes[12])
     for shapes, _ in draw_shapes(pools, "val", [(i, 0) for i in range(6)]):
         assert (bounding_radius(shapes) <= 2.5).all()
+
+
+def test_arranging_puts_the_right_answer_at_its_place():
+    spec = replace(SPEC, distractors="mirror")
+    [drawn] = draw_shapes(make_pools(spec), "train", [(0, 0)])
+    seen = set()
+    for answer in range(3):
+        for seed in range(12):
+            shapes = arrange(drawn, answer, np.random.default_rng(seed))
+            assert shapes.answer == answer
+            assert shapes.kinds[answer] == -1
+            assert (shapes.cubes[0] == drawn[0][0]).all()
+            assert (shapes.cubes[1 + answer] == drawn[0][0]).all()
+            for cubes, kind in zip(shapes.cubes[1:], shapes.kinds, strict=True):
+                assert (cubes == drawn[0][drawn[1].tolist().index(kind)]).all()
+            seen.add(tuple(shapes.kinds.tolist()))
+    assert len(seen) == 6
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3, 4, 200, 1001])
+@pytest.mark.parametrize("answers", [2, 3])
+def test_answer_positions_are_balanced_exactly(count, answers):
+    spec = replace(SPEC, distractors="near", answers=answers)
+    for split in SPLITS:
+        places = answer_positions(spec, split, 7, count)
+        assert (places.dtype, places.shape) == (np.uint8, (count,))
+        assert sorted(places.tolist()) == sorted(i % answers for i in range(count))
+        others = replace(
+            spec, train=7, labeled=3, val=8, test=9, image_dtype="float32", ambient=(0,) * 3
+        )
+        assert (answer_positions(others, split, 7, count) == places).all()
+
+
+def test_answer_positions_of_one_split_tell_nothing_of_another_s():
+    """Whatever they have in common, two keys agree in a third of the questions."""
+    changes = (
+        *({"distractors": kind} for kind in QUESTION_KINDS),
+        {"seed": 12}, {"cubes": (6, 7)}, {"shapes": "tree"}, {"min_angle_degrees": 31},
+        {"max_radius": 2.8}, {"lights": (1, 2)}, {"height": 127},
+    )  # fmt: skip
+    keys = [answer_positions(replace(SPEC, **change), "val", 0, 3000) for change in changes]
+    keys.append(answer_positions(SPEC, "test", 0, 3000))
+    for one, other in itertools.combinations(keys, 2):
+        assert stats.binomtest(int((one == other).sum()), 3000, 1 / 3).pvalue > 1e-4
+
+
+def test_answer_positions_follow_no_pattern():
+    rows = np.array([answer_positions(replace(SPEC, seed=s), "val", 0, 6) for s in range(600)])
+    for column in rows.T:
+        assert stats.chisquare(np.bincount(column, minlength=3)).pvalue > 1e-4
+    assert len({row.tobytes() for row in rows}) > 85, "of 90 orders"
+    tables = [(split, first) for split in SPLITS for first in (0, 30)]
+    orders = {answer_positions(SPEC, split, first, 30).tobytes() for split, first in tables}
+    assert len(orders) == 6
+    keys = {question_key(split, index) for split in SPLITS for index in (0, 1, 10**8)}
+    assert len(keys) == 9

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 from refusals import refused
 
 from iqtt.questions.kinds import DISTRACTOR_KINDS, QUESTION_KINDS, question_kind
-from iqtt.questions.lights import LIGHT_DISTANCE
 from iqtt.questions.specs import SPLITS, SplitSpec, preset_spec
 from scenegen.camera import intrinsics
 from scenegen.common.errors import SpecError
@@ -115,33 +114,23 @@ def test_the_public_request_is_the_same_but_for_its_seed():
 
 def test_settings_that_are_not_given_follow_others():
     assert preset_spec("small") == SplitSpec()
-    assert preset_spec("paper", train=5_000).labeled == 50
-    assert preset_spec("v2", train=5_000).labeled == 500
-    assert preset_spec("v2").min_sight_angle_degrees == 0
-    assert preset_spec("v2", min_sight_angle_degrees=20).min_sight_angle_degrees == 20
-    assert preset_spec("small", train=0).labeled == 0
-    assert preset_spec("small", train=50, labeled=50).labeled == 50
-    pixels = {
-        side: preset_spec("small", height=side).min_cube_pixels for side in (16, 64, 128, 256)
-    }
-    assert pixels == {16: 1, 64: 8, 128: 30, 256: 30}
+    for (preset, told), (name, expected) in {
+        ("paper", ("train", 5_000)): ("labeled", 50),
+        ("v2", ("train", 5_000)): ("labeled", 500),
+        ("small", ("train", 0)): ("labeled", 0),
+        ("v2", ("train", 1)): ("min_sight_angle_degrees", 0),
+        ("v2", ("min_sight_angle_degrees", 20)): ("min_sight_angle_degrees", 20),
+        ("small", ("height", 16)): ("min_cube_pixels", 1),
+        ("small", ("height", 64)): ("min_cube_pixels", 8),
+        ("small", ("height", 256)): ("min_cube_pixels", 30),
+        ("small", ("min_cube_pixels", 0)): ("min_cube_pixels", 0),
+    }.items():
+        assert getattr(preset_spec(preset, **dict([told])), name) == expected
     assert preset_spec("small", height=256, width=512).min_cube_pixels == 120
-    assert preset_spec("small", height=64, min_cube_pixels=0).min_cube_pixels == 0
-    for request, where in (
-        ({"preset": "large"}, "preset"),
-        ({"preset": "v2", "train": -5}, "train"),
-    ):
-        with refused(SpecError, where):
-            preset_spec(**request)
-
-
-def test_kinds_of_questions():
-    mixed = SplitSpec()
-    assert mixed.kinds == tuple(QUESTION_KINDS)
-    assert replace(mixed, answers=2).kinds == ("other", "near", "matched", "mirror-pair")
-    assert replace(mixed, distractors="near").kinds == ("near",)
-    with refused(SpecError, "answers"):
-        SplitSpec(distractors="mirror", answers=2)
+    with refused(SpecError, "preset"):
+        preset_spec("large")
+    with refused(SpecError, "train"):
+        preset_spec("v2", train=-5)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +146,13 @@ def test_the_kind_of_a_question_follows_from_those_of_its_answers(kinds, expecte
     assert question_kind(kinds) == expected
 
 
-def test_kinds_that_no_question_has():
+def test_kinds_of_questions():
+    mixed = SplitSpec()
+    assert mixed.kinds == tuple(QUESTION_KINDS)
+    assert replace(mixed, answers=2).kinds == ("other", "near", "matched", "mirror-pair")
+    assert replace(mixed, distractors="near").kinds == ("near",)
+    with refused(SpecError, "answers"):
+        SplitSpec(distractors="mirror", answers=2)
     for kinds, error in (([-1, -1, -1], ValueError), ([-1, len(DISTRACTOR_KINDS)], IndexError)):
         with pytest.raises(error):
             question_kind(kinds)
@@ -192,13 +187,3 @@ def test_no_pixel_of_the_border_shows_the_bounding_sphere(height, width, fov, ra
     off_centre = abs(pixels - (width / 2, height / 2)) / (min(height, width) / 2)
     side = min(height, width)
     assert 0.93 - 3 / side < off_centre.max() < 1 - 1 / side
-
-
-def test_no_surface_can_be_as_bright_as_the_background_by_default():
-    """Nearest to all lights, facing them all."""
-    spec = SplitSpec()
-    distance = LIGHT_DISTANCE * spec.camera_distance
-    nearer = distance / (distance - spec.max_radius)
-    brightest = 0.8 * (0.2 + spec.light_level * nearer**2)
-    assert (spec.reflectance, spec.ambient) == ((0.8,) * 3, (0.2,) * 3)
-    assert 0.9 < brightest < 0.98 < min(spec.background)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from polycubes import some_shapes
 
 from iqtt.shapes.polycube import (
@@ -21,8 +20,6 @@ from iqtt.shapes.polycube import (
     set_ids,
     symmetries,
 )
-
-Shapes = NDArray[np.int8]
 
 ROD = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
 CORNER = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
@@ -110,16 +107,10 @@ def test_many_shapes_at_once_give_what_each_gives_alone():
 @pytest.mark.parametrize(
     ("cubes", "count", "chiral"),
     [
-        ([[0, 0, 0]], 24, False),
-        (BLOCK, 24, False),
-        (ROD, 8, False),
-        (SQUARE, 8, False),
-        (TRIPOD, 3, False),
-        (CORNER, 2, False),
-        (TWIST, 2, True),
-        (BENT_ARM, 1, True),
+        ([[0, 0, 0]], 24, False), (BLOCK, 24, False), (ROD, 8, False), (SQUARE, 8, False),
+        (TRIPOD, 3, False), (CORNER, 2, False), (TWIST, 2, True), (BENT_ARM, 1, True),
     ],
-)
+)  # fmt: skip
 def test_symmetries_and_chirality_of_known_shapes(cubes, count, chiral):
     shape = one(cubes)
     assert is_chiral(shape) == is_chiral(mirror(shape)) == [chiral]
@@ -159,14 +150,6 @@ def test_the_radius_reaches_the_farthest_corner(cubes):
         assert box_centre(shape[None])[0] == pytest.approx(centre)
         farthest = np.linalg.norm(corners - centre, axis=1).max()
         assert bounding_radius(shape[None])[0] == pytest.approx(farthest)
-
-
-def test_no_shapes_are_no_trouble():
-    nothing = np.zeros((0, 4, 3), dtype=np.int8)
-    assert canonical(nothing).shape == canonical_class(nothing).shape == (0, 4, 3)
-    assert set_ids(nothing).shape == is_chiral(nothing).shape == (0,)
-    assert symmetries(nothing).shape == (0, 24)
-    assert bounding_radius(nothing).shape == (0,)
 
 
 @pytest.mark.parametrize(

@@ -81,21 +81,3 @@ def test_all_classes_there_are_are_in_a_split():
     assert ids_of(np.concatenate(split_classes(RNG(0), 8))) == ids_of(all_classes(8))
     rod = np.array([[[0, 0, 0], [1, 0, 0]]], np.int8)
     assert len(known_classes(2, max_radius=float(bounding_radius(rod)[0]))) == 1, "met exactly"
-
-
-def test_the_search_for_shapes_that_there_are_not_is_bounded():
-    assert [len(part) for part in split_classes(RNG(0), 14, max_radius=1.2, most=100)] == [0] * 3
-
-
-def test_requests_without_sense_are_refused():
-    for cubes, kind in ((0, "chain"), (5, "ring")):
-        with pytest.raises(ValueError, match=r"cubes|kind"):
-            split_classes(RNG(0), cubes, kind)  # type: ignore[arg-type]
-    for listed, most in LISTED_CUBES.items():
-        with pytest.raises(ValueError, match="not listed"):
-            known_classes(most + 1, listed)
-
-
-def test_listed_classes_cannot_be_changed_by_accident():
-    known_classes(5)[:] = 0
-    assert (known_classes(5) == all_classes(5)).all()

@@ -1,16 +1,18 @@
-"""Exported questions, read by the loaders that people use: every pixel, answer and truth."""
+"""Exports, read by the loaders that people use, and cards: what they tell, and what they do not."""
 
+import hashlib
 import json
 import shutil
 
+import h5py
 import numpy as np
 import pytest
-from refusals import refused
 
 from iqtt import open_questions
-from iqtt.sharing.questions import QUESTIONS
-from scenegen.common.errors import FileFormatError, SpecError
+from iqtt.sharing.published import open_split
+from iqtt.sharing.questions import QUESTIONS, write_questions_card
 from scenegen.rooms.export.formats import DATA_FORMATS
+from scenegen.sharing.card import Publication
 from scenegen.sharing.export import ABOUT, write_export
 from tests.support.loaders import VALUES, check_srgb
 
@@ -68,16 +70,6 @@ def test_released_files(released, load, tmp_path):
             check_rows(loaded, questions, VALUES["parquet"])
 
 
-def test_folders_are_known_by_their_split(splits, load, tmp_path):
-    for split, name in (("train", "train"), ("val", "validation"), ("test", "test")):
-        part = "labeled" if split == "train" else None
-        path = splits["shards"] / f"iqtt-{split}.h5"
-        made = export_questions(path, "parquet", tmp_path / f"folder-{split}", part)
-        stem = "iqtt-train-labeled" if split == "train" else f"iqtt-{split}"
-        assert made[0].name == f"{stem}-00000-of-00001.parquet"
-        assert len(load(str(tmp_path / f"folder-{split}"), split=name)) > 0
-
-
 @pytest.mark.parametrize("form", DATA_FORMATS)
 def test_nothing_of_the_answers_beside_a_test_file_is_written(form, splits, tmp_path):
     """An export is the same where the file of the answers is not there."""
@@ -91,12 +83,27 @@ def test_nothing_of_the_answers_beside_a_test_file_is_written(form, splits, tmp_
     assert list(columns) == ["row", "reference", "answer_0", "answer_1", "answer_2"]
 
 
-def test_refused(splits, tmp_path, released):
-    with refused(SpecError, expected="labeled or unlabeled"):
-        export_questions(splits["whole"] / "iqtt-train.h5", "parquet", tmp_path / "out")
-    with pytest.raises(FileFormatError):
-        export_questions(splits["whole"] / "iqtt-test-answers.h5", "parquet", tmp_path / "out")
-    empty = released(tables={"": (0, None)}, dtype="uint8")
-    with refused(SpecError, found="no rows"):
-        export_questions(empty, "parquet", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
+TOLD = Publication("Some questions", ("A. Person",), "CC-BY-4.0")
+
+
+def make_card(folder, path, with_answers=False):
+    with open_split(folder, with_answers) as tables:
+        write_questions_card(path, tables, TOLD)
+    return path.read_text()
+
+
+@pytest.mark.parametrize("kind", ["whole", "shards", "floats"])
+def test_nothing_is_told_of_the_test_answers(kind, splits, tmp_path):
+    """The card is the same where the file of the answers is not there."""
+    private = [*splits[kind].glob("iqtt-test-answers*")]
+    public = tmp_path / "public"
+    shutil.copytree(splits[kind], public, ignore=lambda *_: [path.name for path in private])
+    page = make_card(splits[kind], tmp_path / "README.md")
+    assert page == make_card(public, tmp_path / "same.md")
+    with h5py.File(splits[kind] / "iqtt-test-answers.h5") as file:
+        seed, command = json.loads(file.attrs["spec"])["seed"], file.attrs["creation_command"]
+    digests = [hashlib.sha256(p.read_bytes()).hexdigest() for p in private if p.exists()]
+    assert not [text for text in (command, *digests) if text in page]
+    assert kind != "shards" or str(seed) not in page
+    assert "are not part of this data" in page
+    assert "iqtt-test-answers" not in page

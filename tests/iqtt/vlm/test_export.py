@@ -5,26 +5,38 @@ import csv
 import io
 import math
 from dataclasses import replace
-from pathlib import Path
 
+import numpy as np
 import pytest
 from PIL import Image
+from sheets import find
 
+from iqtt.files.reader import QuestionsFile
 from iqtt.vlm import harness
 from iqtt.vlm.export import CIRCULAR, COLUMNS, FACTS, export_for_models
+from iqtt.vlm.pictures import composed, draw_pictures, stored_question
+from iqtt.vlm.reading import LETTERS
 from iqtt.vlm.rows import Asked, vlm_rows
+from scenegen.common.errors import FileFormatError, SpecError
+from scenegen.rooms.preview import srgb_bytes
 
 datasets = pytest.importorskip("datasets")
 
 
 @pytest.fixture(scope="module")
-def folder(asked: Asked, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def asked(split_folder):
+    """How the six questions of validation are asked in every order, drawn small."""
+    return Asked(split_folder / "iqtt-val.h5", rotations=3, size=64)
+
+
+@pytest.fixture(scope="module")
+def folder(asked, tmp_path_factory):
     folder = tmp_path_factory.mktemp("vlm") / "out"
     export_for_models(asked, folder)
     return folder
 
 
-def test_parquet_tells_every_column(folder: Path, asked: Asked, tmp_path: Path) -> None:
+def test_parquet_tells_every_column(folder, asked, tmp_path):
     rows = list(vlm_rows(asked))
     for name, reference in (("questions", True), ("control", False)):
         file = str(folder / f"{name}.parquet")
@@ -39,7 +51,7 @@ def test_parquet_tells_every_column(folder: Path, asked: Asked, tmp_path: Path) 
     assert first["image"].height < Image.open(io.BytesIO(rows[0].image)).height
 
 
-def test_sheets_follow_the_rules_of_circular_evaluation(folder: Path, asked: Asked) -> None:
+def test_sheets_follow_the_rules_of_circular_evaluation(folder, asked):
     rows = {row.id: row for row in vlm_rows(asked)}
     csv.field_size_limit(1 << 30)
     with (folder / "iqtt-val_circular.tsv").open(newline="") as file:
@@ -55,7 +67,7 @@ def test_sheets_follow_the_rules_of_circular_evaluation(folder: Path, asked: Ask
         assert [line["index"] for line in csv.DictReader(file, delimiter="\t")] == list("012345")
 
 
-def test_a_withheld_test_has_no_column_that_tells(split_folder: Path, tmp_path: Path) -> None:
+def test_a_withheld_test_has_no_column_that_tells(split_folder, tmp_path):
     test = Asked(split_folder / "iqtt-test.h5", size=64)
     export_for_models(test, tmp_path / "out")
     import pyarrow.parquet as pq
@@ -70,7 +82,7 @@ def test_a_withheld_test_has_no_column_that_tells(split_folder: Path, tmp_path: 
     assert "answer" in pq.read_schema(tmp_path / "out" / "questions.parquet").names
 
 
-def test_lmms_eval_tasks_score_texts(folder: Path, tmp_path: Path) -> None:
+def test_lmms_eval_tasks_score_texts(folder, tmp_path):
     yaml = pytest.importorskip("yaml")
 
     class Loader(yaml.SafeLoader):
@@ -102,3 +114,58 @@ def test_lmms_eval_tasks_score_texts(folder: Path, tmp_path: Path) -> None:
     skill = next(m["aggregation"] for m in task["metric_list"] if m["metric"] == "skill")
     assert skill([row["skill"] for row in results]) == pytest.approx((17 / 18 - 0.4) / 0.6)
     assert results[0]["accuracy"][task["cluster_key"]] == table[0]["shape"]
+
+
+def test_the_letter_of_every_rotation_shows_the_right_answer(asked):
+    rows = list(vlm_rows(asked))
+    assert [row.id for row in rows[:4]] == ["0-0", "0-1", "0-2", "1-0"]
+    with QuestionsFile(asked.path) as questions:
+        for row in rows:
+            letter = LETTERS.index(row.answer or "")
+            assert row.original(letter) == questions[row.question_index].answer
+            first = rows[3 * row.question_index]
+            for k in range(3):
+                assert row.images[1 + k] == first.images[1 + row.original(k)]
+            assert row.images[0] == first.images[0]
+
+
+def test_pictures_are_the_stored_ones_drawn_finer(asked):
+    with QuestionsFile(asked.path) as questions:
+        assert questions.spec is not None
+        truths = [truth for i in range(6) if (truth := questions.truth(i)) is not None]
+        shown = [stored_question(questions.spec, truth) for truth in truths]
+        drawn = list(draw_pictures(questions.spec, shown, 64))
+        for record, pictures in zip(questions, drawn, strict=True):
+            stored = srgb_bytes(record.radiance).repeat(2, axis=1).repeat(2, axis=2)
+            differs = np.abs(stored.astype(int) - pictures).max(axis=-1) > 3
+            # A ray through a pixel's centre and the mean of its four corners differ at edges only.
+            assert differs.mean() < 0.12
+            inside = ~differs
+            assert np.abs(stored.astype(int) - pictures)[inside].mean() < 1
+
+
+def test_a_composed_picture_holds_the_pictures_themselves():
+    pictures = np.random.default_rng(0).integers(0, 256, (4, 64, 80, 3), np.uint8)
+    at = [find(np.asarray(composed(pictures)), picture) for picture in pictures]
+    assert at[0][0] < at[1][0] == at[2][0] == at[3][0]
+    assert at[1][1] < at[2][1] < at[3][1]
+
+
+def test_a_withheld_test_tells_nothing_beside_its_pictures(split_folder):
+    test = Asked(split_folder / "iqtt-test.h5", size=64)
+    for row in vlm_rows(test):
+        assert row.answer is None
+        assert set(row.facts.values()) == {None}
+    told = list(vlm_rows(replace(test, with_answers=True)))
+    with QuestionsFile(test.path, answers=split_folder / "iqtt-test-answers.h5") as questions:
+        assert [LETTERS.index(row.answer or "") for row in told] == [q.answer for q in questions]
+
+
+def test_a_file_that_cannot_be_drawn_is_refused(split_folder, tmp_path):
+    alone = tmp_path / "iqtt-test.h5"
+    alone.write_bytes((split_folder / "iqtt-test.h5").read_bytes())
+    with pytest.raises(FileFormatError):
+        next(vlm_rows(Asked(alone, size=64)))
+    for change in ({"rotations": 2}, {"size": 8}, {"answers": split_folder / "iqtt-val.h5"}):
+        with pytest.raises((SpecError, FileFormatError)):
+            next(vlm_rows(replace(Asked(alone), **change)))

@@ -18,16 +18,12 @@ A_PLAIN_TEXT = "Picture A shows a chain of cubes, and its arm turns left, but B 
 
 
 @pytest.mark.parametrize("kind", sorted({kind for kind, _, _ in REPLIES}))
-def test_a_reply_is_read_as_a_careful_person_reads_it(kind: str) -> None:
+def test_a_reply_is_read_as_a_careful_person_reads_it(kind):
     expected = {text: read_as for its, read_as, text in REPLIES if its == kind}
     assert {text: shown(read_answer(text)) for text in expected} == expected
 
 
-def test_the_table_of_replies_is_large_and_holds_each_once() -> None:
-    assert len({text for _, _, text in REPLIES}) == len(REPLIES) >= 200
-
-
-def shown(reading: Reading) -> str:
+def shown(reading):
     """Return a reading as the table of replies has it."""
     if reading.answer is None:
         return {"unparsed": "none", "refused": "refusal"}[reading.outcome]
@@ -43,14 +39,14 @@ def shown(reading: Reading) -> str:
         ("A is the same shape.", ""), ("B because", ""), ("A: same\nB: ", ""), ("Perhaps A", ""),
     ],
 )  # fmt: skip
-def test_a_reply_that_was_cut_off_answers_only_by_a_declaration(text: str, letter: str) -> None:
+def test_a_reply_that_was_cut_off_answers_only_by_a_declaration(text, letter):
     answer = LETTERS.index(letter) if letter else None
     assert read_answer(text, cut_off=True) == Reading(answer, "cut off")
 
 
 @given(st.text(max_size=200) | st.text("ABC<think>/answer:is not\\boxed{}\n", max_size=200),
        st.integers(1, 10))  # fmt: skip
-def test_any_text_has_a_reading_within_the_letters_offered(text: str, answers: int) -> None:
+def test_any_text_has_a_reading_within_the_letters_offered(text, answers):
     reading = read_answer(text, answers)
     assert (reading.answer is not None) == (reading.outcome == "answered")
     assert reading.answer is None or 0 <= reading.answer < answers
@@ -64,7 +60,7 @@ def test_any_text_has_a_reading_within_the_letters_offered(text: str, answers: i
         "( ",
     ],
 )  # fmt: skip
-def test_long_texts_are_read_in_time_that_grows_with_their_length(part: str) -> None:
+def test_long_texts_are_read_in_time_that_grows_with_their_length(part):
     started = time.process_time()
     read_answer(part * (20_000 // len(part)))
     assert time.process_time() - started < 2

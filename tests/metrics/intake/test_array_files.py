@@ -55,18 +55,28 @@ SCALARS = {
     "exr": (lambda p: exr(p, {"R": VECTORS[..., 0], "G": VECTORS[..., 1], "Z": FLOATS}), FLOATS),
     "parts.exr": (lambda p: parts(p, rgb={"RGB": GREY}, d={"Z": FLOATS}), FLOATS),
     "three.exr": (
-        lambda p: parts(p, rgb={"RGB": GREY}, n={"N_X": GREY[..., 0]}, Depth={"V": FLOATS}),
-        FLOATS,
+        lambda p: parts(p, rgb={"RGB": GREY}, n={"N_X": GREY[..., 0]}, Depth={"V": FLOATS}), FLOATS
     ),
     "layers.exr": (
-        lambda p: exr(p, {"View.Combined.R": FLOATS + 1, "View.Depth.Z": FLOATS}),
-        FLOATS,
+        lambda p: exr(p, {"View.Combined.R": FLOATS + 1, "View.Depth.Z": FLOATS}), FLOATS
     ),
     "one.exr": (lambda p: exr(p, {"any": FLOATS}), FLOATS),
     "half.exr": (lambda p: exr(p, {"Z": FLOATS.astype("f2")}), FLOATS.astype("f2")),
     "pfm": (lambda p: pfm(p, FLOATS), FLOATS),
     "big.pfm": (lambda p: pfm(p, FLOATS, ">"), FLOATS),
-}
+}  # fmt: skip
+AXES = np.moveaxis(VECTORS, -1, 0)
+IMAGES = {
+    "x.npy": (lambda p: np.save(p, VECTORS), VECTORS),
+    "x.png": (lambda p: Image.fromarray(BYTES).save(p), BYTES),
+    "w.png": (lambda p: words_png(p, WORDS), WORDS),
+    "x.exr": (lambda p: exr(p, dict(zip("XYZ", AXES))), VECTORS),
+    "x.pfm": (lambda p: pfm(p, VECTORS), VECTORS),
+    "n.exr": (lambda p: exr(p, {"RGB": VECTORS}), VECTORS),
+    "p.exr": (
+        lambda p: parts(p, rgb={"RGB": GREY}, n=dict(zip(("N_X", "N_Y", "N_Z"), AXES))), VECTORS
+    ),
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("name", SCALARS)
@@ -79,27 +89,9 @@ def test_an_image_of_numbers(name, tmp_path):
     assert np.array_equal(got, expected)
 
 
-@pytest.mark.parametrize(
-    ("name", "write", "expected"),
-    [
-        ("x.npy", lambda p: np.save(p, VECTORS), VECTORS),
-        ("x.png", lambda p: Image.fromarray(BYTES).save(p), BYTES),
-        ("w.png", lambda p: words_png(p, WORDS), WORDS),
-        ("x.exr", lambda p: exr(p, dict(zip("XYZ", np.moveaxis(VECTORS, -1, 0)))), VECTORS),
-        ("x.pfm", lambda p: pfm(p, VECTORS), VECTORS),
-        ("n.exr", lambda p: exr(p, {"RGB": VECTORS}), VECTORS),
-        (
-            "parts.exr",
-            lambda p: parts(
-                p,
-                rgb={"RGB": GREY},
-                n=dict(zip(("N_X", "N_Y", "N_Z"), np.moveaxis(VECTORS, -1, 0))),
-            ),
-            VECTORS,
-        ),
-    ],
-)
-def test_an_image_of_vectors(name, write, expected, tmp_path):
+@pytest.mark.parametrize("name", IMAGES)
+def test_an_image_of_vectors(name, tmp_path):
+    write, expected = IMAGES[name]
     write(tmp_path / name)
     assert np.array_equal(read_array(tmp_path / name, vectors=True), expected)
 
@@ -110,15 +102,6 @@ def bomb(path):
     head = head.ljust(117) + b"\n"
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("depth.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(head)) + head)
-
-
-def palette(path):
-    Image.fromarray(BYTES).quantize(16).save(path)
-
-
-def frames(path):
-    pages = [Image.fromarray(DEPTH) for _ in range(3)]
-    pages[0].save(path, save_all=True, append_images=pages[1:])
 
 
 BROKEN = {
@@ -133,8 +116,10 @@ BROKEN = {
     "cut.png": lambda p: (Image.fromarray(DEPTH).save(p), p.write_bytes(p.read_bytes()[:60])),
     "pickled.npy": lambda p: np.save(p, np.array([{}], object), allow_pickle=True),
     "colours.png": lambda p: Image.fromarray(BYTES).save(p),
-    "palette.png": palette,
-    "pages.tiff": frames,
+    "palette.png": lambda p: Image.fromarray(BYTES).quantize(16).save(p),
+    "pages.tiff": lambda p: Image.fromarray(DEPTH).save(
+        p, save_all=True, append_images=[Image.fromarray(DEPTH)]
+    ),
     "bomb.npz": bomb,
     "two.npz": lambda p: np.savez(p, a=FLOATS, b=FLOATS),
     "picture.jpg": lambda p: Image.fromarray(BYTES).save(p),

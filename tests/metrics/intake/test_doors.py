@@ -12,7 +12,6 @@ from metrics.intake.model_file import ModelError, opened_model
 from metrics.intake.running import Call, run_model
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
-from scenegen.common.errors import SpecError
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import RoomsFile
 
@@ -66,7 +65,7 @@ def test_what_a_class_predicts_and_where(name, folders):
         return found
 
     rng = np.random.default_rng(0)
-    for height, width in (64, 64), (48, 64), (128, 96):
+    for height, width in (48, 64), (128, 96):
         images = rng.integers(0, 256, (2, height, width, 3), dtype=np.uint8)
         model.network.forward = forward
         random = model.infer_batch(images)
@@ -111,44 +110,15 @@ def test_a_run_is_the_import_of_the_same_arrays_and_says_what_it_was(folders, tr
 @pytest.mark.parametrize(
     ("told", "version"),
     [
-        (
-            "NVRM version: NVIDIA UNIX x86_64 Kernel Module  535.104.05  Sat Aug 19 2023",
-            "535.104.05",
-        ),
-        (
-            "NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.82.07  Release",
-            "580.82.07",
-        ),
+        ("NVRM version: NVIDIA UNIX x86_64 Kernel Module  535.104.05  Sat Aug", "535.104.05"),
+        ("NVRM version: NVIDIA UNIX Open Kernel Module for x86_64  580.82.07", "580.82.07"),
         ("no numbers", ""),
-        (None, ""),
     ],
 )
 def test_the_driver_is_named_where_it_tells(told, version, tmp_path):
-    if told is not None:
-        (tmp_path / "version").write_text(told)
+    assert driver_version(str(tmp_path / "version")) == ""
+    (tmp_path / "version").write_text(told)
     assert driver_version(str(tmp_path / "version")) == version
-
-
-@pytest.mark.slow
-def test_rows_of_other_weights_under_one_name_are_not_taken(tmp_path, truths):
-    folder, out = save("dpt", tmp_path / "network"), tmp_path / "p.h5"
-
-    def stop(done):
-        raise KeyboardInterrupt
-
-    def run(**more):
-        with opened_model(f"hf:{folder}") as model:
-            return run_model(model, truths.rooms, out, call=Call(batch=3), method="m", **more)
-
-    with pytest.raises(KeyboardInterrupt):
-        run(progress=stop)
-    here = load(f"hf:{folder}").network
-    with torch.no_grad():
-        next(here.parameters()).add_(1.0)
-    here.save_pretrained(folder)
-    with pytest.raises(SpecError):
-        run()
-    assert run(keep="resume").startswith("disparity_affine_invariant of 8 rows")
 
 
 def refused(name, **more):
@@ -172,7 +142,7 @@ def test_one_line_says_what_is_wrong(tmp_path, folders, truths, monkeypatch):
     from safetensors.torch import load_file, save_file
 
     weights = load_file(broken / "model.safetensors")
-    weights.pop("head.conv3.bias")
+    del weights["head.conv3.bias"]
     save_file(weights, broken / "model.safetensors", metadata={"format": "pt"})
     monkeypatch.setenv("HF_HUB_OFFLINE", "1")
     for name, settings in (
@@ -188,8 +158,6 @@ def test_one_line_says_what_is_wrong(tmp_path, folders, truths, monkeypatch):
     assert refused(f"hf:{broken}", python=tmp_path).where == "--python"
     with opened_model(f"hf:{folders('dpt')}") as model, pytest.raises(ModelError):
         run_model(model, truths.iqtt, tmp_path / "q.h5", call=Call(), method="m")
-    hint = refused("moge:a/b").hint if importlib.util.find_spec("moge") is None else "dlr-moge"
-    assert "dlr-moge" in hint
 
 
 BASELINE = """
@@ -266,29 +234,6 @@ def test_what_runs_elsewhere_is_python_3_9(path):
     ours = {"scenegen", "metrics", "iqtt", "baselines"}
     assert not {name.split(".")[0] for name in names | froms} & ours
     assert "__future__" in froms, "annotations are not evaluated"
-
-
-@pytest.mark.slow
-def test_another_environment_with_an_old_numpy(truths, tmp_path):
-    import subprocess
-    import sys
-
-    home = tmp_path / "env"
-    subprocess.run([sys.executable, "-m", "venv", str(home)], check=True)
-    python = home / "bin/python"
-    pip = [python, "-m", "pip", "install", "-q", "--only-binary=:all:", "numpy==1.24.4"]
-    subprocess.run(pip, check=True, timeout=300)
-    path, out = tmp_path / "m.py", tmp_path / "p.h5"
-    path.write_text(
-        "import numpy as np\nassert np.__version__ == '1.24.4'\n"
-        "def infer(image):\n    return {'depth_metric': 1.0 + image.mean(axis=-1)}\n"
-    )
-    with opened_model(path, python=python) as model:
-        run_model(model, truths.rooms, out, call=Call(), method="m")
-    with open_predictions(out) as found, RoomsFile(truths.rooms) as rooms:
-        expected = 1.0 + srgb_bytes(rooms[2].radiance).mean(axis=-1)
-        np.testing.assert_allclose(found.depth(2), expected, rtol=1e-6)
-        assert found.alignment == "none"  # a file's own numbers are in scene units
 
 
 MOGE = """

@@ -1,10 +1,13 @@
 """Folders of files become the submission that their numbers mean."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from PIL import Image
 from refusals import refused
 
+from metrics.intake.folders import MatchError, counted, files_of, match_files
 from metrics.intake.importing import import_rooms
 from metrics.intake.reading import Reading
 from metrics.submissions.reader import open_predictions
@@ -39,13 +42,14 @@ def stretch(room):
     return np.linalg.norm(pixel_directions(*room.depth.shape, room.fov_y_degrees), axis=-1)
 
 
-def millimetres(path, room):
-    Image.fromarray(np.rint(room.depth * 1000).astype("u2")).save(path)
+def pixels(path, values):
+    Image.fromarray(np.rint(values).astype("u2")).save(path)
 
 
 OPENCV = np.array([1.0, -1.0, -1.0])
 CASES = {
-    "millimetres": (millimetres, ".png", {"scale": 1e-3}, lambda r: r.depth, 5.1e-4),
+    "millimetres": (lambda p, r: pixels(p, 1000 * r.depth), ".png", {"scale": 1e-3},
+                    lambda r: r.depth, 5.1e-4),
     "distance": (lambda p, r: np.save(p, 2 * r.depth * stretch(r)), ".npy",
                  {"kind": "distance", "scale": 0.5}, lambda r: r.depth, 1e-6),
     "disparity": (lambda p, r: np.save(p, 3 / r.depth + 1), ".npy", {"kind": "disparity"},
@@ -74,25 +78,16 @@ def test_the_numbers_of_files_mean_the_truth(name, rooms, tmp_path):
             assert np.abs(found.geometry(room.index) - expected(room)).max() < within
 
 
-def test_normals_of_floats_and_of_pictures(rooms, tmp_path):
-    folder = tmp_path / "normals"
-    folder.mkdir()
-    for encode, reading, within in (
-        (lambda n: np.rint((n * OPENCV / 2 + 0.5) * 255).astype("u1"), {}, 0.005),
-        (lambda n: np.rint((n / 2 + 0.5) * 255).astype("u1"), {"frame": "opengl"}, 0.005),
-    ):
-        for room in rooms:
-            Image.fromarray(encode(room.normal)).save(folder / f"{room.index + 1}.png")
-        (tmp_path / "p.h5").unlink(missing_ok=True)
-        with imported(
-            tmp_path,
-            rooms,
-            lambda p, r: np.save(p, r.depth),
-            ".npy",
-            normals=str(folder),
-            **reading,
-        ) as found:
-            assert all(np.abs(found.normal(r.index) - r.normal).max() < within for r in rooms)
+@pytest.mark.parametrize("frame", ["opencv", "opengl"])
+def test_normals_of_pictures(frame, rooms, tmp_path):
+    (tmp_path / "normals").mkdir()
+    for room in rooms:
+        coded = room.normal * (OPENCV if frame == "opencv" else 1) / 2 + 0.5
+        image = Image.fromarray(np.rint(coded * 255).astype("u1"))
+        image.save(tmp_path / "normals" / f"{room.index + 1}.png")
+    how = {"normals": str(tmp_path / "normals"), "frame": frame}
+    with imported(tmp_path, rooms, lambda p, r: np.save(p, r.depth), ".npy", **how) as found:
+        assert all(np.abs(found.normal(r.index) - r.normal).max() < 0.005 for r in rooms)
 
 
 def test_one_file_of_all_rows(rooms, tmp_path):
@@ -109,16 +104,14 @@ def test_one_file_of_all_rows(rooms, tmp_path):
 
 
 def holes(path, room):
-    values = np.rint(room.depth * 1000).astype("u2")
+    values = 1000 * room.depth
     values[4:7, 10:12] = 0
-    Image.fromarray(values).save(path)
+    pixels(path, values)
 
 
 def test_pixels_without_a_value_are_refused_or_filled(rooms, tmp_path):
     reading = {"scale": 1e-3, "invalid": (0.0,)}
-    with refused(
-        SceneGenError, "d00.png (row 0): depth", found="6 pixels", hint="--missing nearest"
-    ):
+    with refused(SceneGenError, "d00.png (row 0): depth", "6 pixels", hint="--missing nearest"):
         imported(tmp_path, rooms, holes, ".png", **reading)
     assert not (tmp_path / "p.h5").exists()
     with imported(tmp_path, rooms, holes, ".png", missing="nearest", **reading) as found:
@@ -144,13 +137,89 @@ def test_what_is_no_prediction_is_named(save, reading, words, rooms, tmp_path):
 
 @pytest.mark.parametrize(
     "settings",
-    [
-        {"kind": "distance", "alignment": "scale_shift"},
-        {"kind": "points", "alignment": "median_scale"},
-        {"scale": 0.0},
-        {"scale": float("nan")},
-    ],
-)
+    [{"kind": "distance", "alignment": "scale_shift"}, {"scale": 0.0}, {"scale": float("nan")},
+     {"kind": "points", "alignment": "median_scale"}],
+)  # fmt: skip
 def test_settings_that_contradict_each_other(settings):
     with pytest.raises(SceneGenError):
         Reading(**settings)
+
+
+VIEWS = [(scene, view) for scene in range(2) for view in range(2)]
+
+
+def matched(names, count=4, by="number", rows=None):
+    """The names of the files of the rows."""
+    paths = [Path("out", name) for name in sorted(names)]
+    rows = rows or [f"row {row}" for row in range(count)]
+    keys = [*counted(count), VIEWS[:count]]
+    return [path.name for path in match_files(paths, rows, lambda: keys, by)[0]]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["0.png", "1.png", "2.png", "3.png"],
+        ["1.png", "2.png", "3.png", "4.png"],
+        ["a0b.npy", "a01b.npy", "a02b.npy", "a3b.npy"],
+        [f"rooms2-00000{row}-image.png" for row in range(4)],
+        [f"{row}_v2.exr" for row in range(4)],
+        ["first0.png", "b 1.png", "c2.png", "3.png"],
+        [f"frame_{row}.png" for row in range(12)],  # 10 comes after 9
+        ["s0_v0.png", "s0_v1.png", "s1_v0.png", "s1_v1.png"],
+    ],
+)
+def test_by_number(names):
+    assert matched(names, len(names)) == names
+
+
+def test_by_name_and_by_order():
+    names = ["b.png", "a.png", "d.png", "c.png"]
+    assert matched(names, by="name") == sorted(names)
+    assert matched(names, rows=[f"{letter}.jpg" for letter in "cadb"]) == [
+        "c.png", "a.png", "d.png", "b.png",
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("names", "words"),
+    [
+        (["0.png", "1.png", "3.png"], "row 2"),
+        (["1.png", "2.png", "4.png"], "row 2"),
+        (["0.png", "1.png", "2.png", "3.png", "4.png"], "4.png"),
+        (["0.png", "1.png", "2.png", "9.png"], "9.png"),
+        (["a_0.png", "a_1.png", "b_1.png", "a_2.png", "a_3.png"], "a_1.png and b_1.png"),
+        (["0.png", "0.npy", "1.png", "2.png", "3.png"], "0.npy and 0.png"),
+        (["0.png", "1.png", "2.png", "best.png"], "best.png"),
+        (["0_9.png", "1_8.png", "2_7.png", "3_6.png"], "0_9.png"),
+    ],
+)
+def test_what_does_not_fit_is_named(names, words):
+    with pytest.raises(MatchError) as caught:
+        matched(names)
+    assert words in f"{caught.value.where} {caught.value.found}"
+    assert ("--match" in caught.value.hint) == ("png" in words and words[0] not in "49")
+    if len(names) != 4:
+        with pytest.raises(MatchError):
+            matched(names, by="name")
+
+
+def test_files_of_a_folder_or_a_pattern(tmp_path):
+    for name in ("1.png", "0.png", ".hidden", "0.npy"):
+        (tmp_path / name).touch()
+    (tmp_path / "deeper.png").mkdir()
+    assert [path.name for path in files_of(str(tmp_path))] == ["0.npy", "0.png", "1.png"]
+    assert [path.name for path in files_of(str(tmp_path / "*.png"))] == ["0.png", "1.png"]
+    for nothing in (str(tmp_path / "deeper.png"), str(tmp_path / "*.exr"), ""):
+        with pytest.raises(MatchError):
+            files_of(nothing)
+    for name in ("[ab]", "run[1]", "a*b"):  # what exists means itself
+        (tmp_path / name / "in").mkdir(parents=True)
+        for file in ("0.png", "[1].png"):
+            (tmp_path / name / "in" / file).touch()
+        for pattern, count in (("in", 2), ("in/*.png", 2), ("i?/*", 2), ("in/[1].png", 1)):
+            assert len(files_of(str(tmp_path / name / pattern))) == count, pattern
+    (tmp_path / "notes.txt").touch()
+    with pytest.raises(MatchError) as caught:
+        files_of(str(tmp_path))
+    assert caught.value.found == "notes.txt"

@@ -1,9 +1,11 @@
-"""What models return becomes geometry in our conventions, or is refused with its name."""
+"""What models return becomes geometry in our conventions and size, or is refused by name."""
 
 import numpy as np
 import pytest
 
 from metrics.intake.outputs import KEYS, OutputError, read_output
+from metrics.intake.resampling import filled, nearest, resampled
+from scenegen.camera import pixel_directions
 
 D = np.full((4, 6), 2.0)
 POINTS = np.dstack([0 * D, 0 * D + 0.5, D])  # x right, y down, z forward
@@ -56,10 +58,8 @@ def test_normals_cameras_and_frames():
 
 def test_a_mask_takes_values_out():
     depth, mask = D + np.arange(6), np.arange(6) * (D > 0) > 2
-    assert (
-        np.isnan(read(depth_metric=depth, mask=mask).geometry[0]).tolist()
-        == [True] * 3 + [False] * 3
-    )
+    absent = np.isnan(read(depth_metric=depth, mask=mask).geometry[0])
+    assert absent.tolist() == [True] * 3 + [False] * 3
     filled = read(depth_metric=depth, mask=mask, missing="nearest").geometry
     assert filled[3].tolist() == [5.0] * 3 + [5.0, 6.0, 7.0]
 
@@ -68,6 +68,7 @@ BAD = {
     "an array": (D, "returned"),
     "None": (None, "returned"),
     "other keys": ({"depth": D}, "returned"),
+    "a key that is not there": ({"depth_metric": D}, "returned", "depth_scale_invariant"),
     "text": ({"depth_metric": "far"}, "depth_metric"),
     "shape": ({"depth_metric": D[0]}, "depth_metric"),
     "transposed": ({"depth_metric": D.T}, "depth_metric"),
@@ -84,13 +85,51 @@ BAD = {
 
 @pytest.mark.parametrize("name", BAD)
 def test_what_is_no_prediction_is_named(name):
-    output, where = BAD[name]
+    output, where, *key = BAD[name]
     with pytest.raises(OutputError) as caught:
-        read_output(output, 4, 6)
+        read_output(output, 4, 6, key=key[0] if key else None)
     assert caught.value.where == where
     assert len(str(caught.value).splitlines()) == 1
 
 
-def test_a_key_that_is_not_there():
-    with pytest.raises(OutputError):
-        read("depth_scale_invariant", depth_metric=D)
+def plane(height, width):
+    """Planar depth (h, w) of a slanted plane: n.p = -1 with p = depth * ray."""
+    rays = pixel_directions(height, width, 50.0)
+    return -1.0 / (rays @ np.array([0.2, -0.3, 0.5]))
+
+
+def of_kind(kind, height, width):
+    depth = plane(height, width)
+    rays = pixel_directions(height, width, 50.0)
+    return {"depth": depth, "disparity": 3.0 / depth + 1.0, "points": rays * depth[..., None]}[kind]
+
+
+@pytest.mark.parametrize("kind", ["depth", "disparity", "points"])
+@pytest.mark.parametrize("size", [(96, 128), (60, 80), (300, 400)])
+def test_a_plane_is_exact(kind, size):
+    """But for a border that a coarser image does not reach."""
+    inside = np.s_[2:-2, 2:-2]
+    got = resampled(kind, of_kind(kind, *size), 72, 96)
+    assert np.allclose(got[inside], of_kind(kind, 72, 96)[inside], rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("kind", ["depth", "disparity"])
+def test_no_value_lies_between_the_sides_of_an_edge(kind):
+    step = np.where(np.arange(40) < 17, 1.0, 2.0) * np.ones((30, 1))
+    for size in ((64, 64), (11, 13)):
+        assert set(np.unique(resampled(kind, step, *size).round(12))) == {1.0, 2.0}
+
+
+def test_pixels_without_a_value_spread_to_no_other():
+    values = np.full((20, 20), 2.0)
+    values[4:9, 4:9] = np.nan
+    got = resampled("depth", values, 40, 40)
+    assert np.array_equal(np.isnan(got), np.kron(np.isnan(values), np.ones((2, 2), bool)))
+    assert np.array_equal(got, nearest(values, 40, 40), equal_nan=True)
+
+
+def test_filled_from_the_nearest():
+    values = np.array([[1.0, np.nan, np.nan, np.nan, 2.0]])
+    assert filled(values, np.isfinite(values)).tolist() == [[1.0, 1.0, 1.0, 2.0, 2.0]] or (
+        filled(values, np.isfinite(values)).tolist() == [[1.0, 1.0, 2.0, 2.0, 2.0]]
+    )

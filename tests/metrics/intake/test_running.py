@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from metrics.intake import model_file
+from metrics.intake.kept_rows import kept_rows
 from metrics.intake.model_file import ModelError, opened_model
 from metrics.intake.model_runner import _answer, _loaded, loads, plain
 from metrics.intake.outputs import OutputError
@@ -19,7 +20,7 @@ from metrics.intake.running import _answer as _answer_of
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from scenegen.camera import intrinsics
-from scenegen.common.errors import SceneGenError
+from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import RoomsFile
 
@@ -69,11 +70,6 @@ def test_a_model_in_its_process(name, run, truths):
     assert [p for p in validate(run.out, truths.rooms) if not p.is_hint] == []
     with open_predictions(run.out) as found:
         assert (found.rows.tolist(), (found.depth(7) == 1.5).all()) == (list(range(8)), True)
-    assert {path.name for path in run.out.parent.iterdir()} <= {
-        "my_model.py",
-        "p.h5",
-        "__pycache__",
-    }
 
 
 def test_images_are_srgb_bytes_and_cameras_are_told_only_on_request(run, truths, tmp_path):
@@ -126,16 +122,12 @@ def test_a_python_that_cannot_run_models_is_told(program, found, tmp_path):
     assert (found in error.value.found) == (found != "hello")
 
 
-@pytest.mark.parametrize(
-    "lines", ["import sys; sys.modules['numpy'] = None", "import sys; sys.version_info = (3, 6)"]
-)
-def test_what_begins_the_process_of_a_model_looks_for_what_it_needs(lines, capfd):
-    done = subprocess.run([sys.executable, "-c", f"{lines}\n{model_file.BOOT}"], check=False)
+@pytest.mark.parametrize("change", ["modules['numpy'] = None", "version_info = (3, 6)"])
+def test_what_begins_the_process_of_a_model_looks_for_what_it_needs(change, capfd):
+    text = f"import sys\nsys.{change}\n{model_file.BOOT}"
+    done = subprocess.run([sys.executable, "-c", text], check=False)
     assert done.returncode == 0
     assert capfd.readouterr().out.split()[0] in ("no", "Python")
-
-
-# ---- resuming ----
 
 
 def failing(folder, error="ValueError"):
@@ -185,9 +177,6 @@ def test_rows_depend_on_the_model_and_on_weights_beside_it(tmp_path):
     assert digest(INFER) != first
 
 
-# ---- a process of its own ----
-
-
 def test_the_model_may_change_its_folder(run, tmp_path, monkeypatch, truths):
     """As many do to find their weights; the paths of the run stay what they are."""
     monkeypatch.chdir(tmp_path)
@@ -235,8 +224,6 @@ def gone(group):
 ENDS = {
     "crash": ("import ctypes; ctypes.string_at(0)", "SIGSEGV"),
     "exit": ("import os; os._exit(0)", "exit code 0"),
-    "killed": ("import os; os.kill(os.getpid(), 9)", "SIGKILL"),
-    "hang": ("import time; time.sleep(1000)", "no answer after 2 s"),
     "hang in C": ("import ctypes; ctypes.PyDLL(None).sleep(1000)", "no answer after 2 s"),
     "child": ("import os; os.fork() and os._exit(3); import time; time.sleep(1000)", "code 3"),
 }
@@ -309,8 +296,6 @@ def test_values_arrive_as_they_are(value):
     assert np.array_equal(found, VALUES[value])
 
 
-# ---- refusals ----
-
 BAD_FILES = {
     "syntax": ("def infer(image:\n", 1, ""),
     "import": ("import no_such_package\n", 1, "no_such_package"),
@@ -356,9 +341,7 @@ def test_one_line_that_says_where(name, run):
 
 
 def test_another_key_in_a_later_row(run):
-    text = INFER.replace(
-        "depth_metric'", "depth_metric' if next(N) < 5 else 'depth_scale_invariant'"
-    )
+    text = INFER.replace("metric'", "metric' if next(N) < 5 else 'depth_scale_invariant'")
     with pytest.raises(SceneGenError, match="row 5"):
         run("import itertools\nN = itertools.count()\n" + text)
 
@@ -368,14 +351,7 @@ def test_settings_that_the_model_does_not_take(load, run):
     with pytest.raises(ModelError) as caught:
         run(INFER, load=load)
     assert caught.value.where == f"--{next(iter(load))}"
-
-
-def test_settings_that_it_takes(run):
-    text = INFER + "def load(device, **more):\n    assert (device, more) == ('cpu', {'batch': 2})\n"
-    run(text, load={"device": "cpu", "batch": 2})
-
-
-# ---- questions ----
+    run(INFER + f"def load(**more):\n    assert more == {load}\n", load=load)
 
 
 @pytest.mark.parametrize("value", ["2", "[0.5, 1.0, 2.0]"])
@@ -397,3 +373,62 @@ def test_answers_of_many_kinds():
     for value in (None, 3, -2, "B", [1.0, 2.0], [1.0, 2.0, np.nan]):
         with pytest.raises(OutputError):
             _answer_of(value, 3, "row 0")
+
+
+ONE, OTHER = {"model": "a"}, {"model": "b"}
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Rows 0 and 1 of a run that failed."""
+    error = SceneGenError("row 2", "an error")
+
+    def fail():
+        with kept_rows(tmp_path / "p.h5", ONE, None) as rows:
+            for row in range(2):
+                rows.write(row, {"depth": np.full(3, row)})
+            raise error
+
+    with pytest.raises(SceneGenError):
+        fail()
+    assert "2 rows" in error.hint
+    return tmp_path / "p.h5.rows"
+
+
+def read(out, settings, keep=None):
+    """The number of kept rows, and the first number of rows 0 to 2; None where one is lacking."""
+    with kept_rows(out, settings, keep) as rows:
+        stored = [rows.read(row) for row in range(3)]
+        return rows.count, [None if row is None else int(row["depth"][0]) for row in stored]
+
+
+@pytest.mark.parametrize(
+    ("settings", "keep", "expected"),
+    [
+        (ONE, None, (2, [0, 1, None])),
+        (OTHER, "resume", (2, [0, 1, None])),
+        (ONE, "restart", (0, [None] * 3)),
+        (OTHER, "restart", (0, [None] * 3)),
+    ],
+)
+def test_the_next_run(settings, keep, expected, folder):
+    assert read(folder.with_suffix(""), settings, keep) == expected
+    assert not folder.exists()
+
+
+def test_rows_of_other_settings_are_refused(folder):
+    with pytest.raises(SpecError) as caught:
+        read(folder.with_suffix(""), OTHER)
+    assert caught.value.where == str(folder)
+    assert read(folder.with_suffix(""), ONE)[0] == 2
+
+
+def test_a_row_that_was_cut_off_is_lacking(folder):
+    (folder / "00000001.npz").write_bytes(b"PK")
+    assert read(folder.with_suffix(""), ONE)[1] == [0, None, None]
+
+
+def test_nothing_is_left_where_no_row_was_done(tmp_path):
+    with pytest.raises(KeyboardInterrupt), kept_rows(tmp_path / "p.h5", ONE, None):
+        raise KeyboardInterrupt
+    assert not list(tmp_path.glob("*.rows"))

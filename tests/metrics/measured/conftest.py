@@ -1,8 +1,5 @@
 """A file of measured truth of three sizes, and predictions of it."""
 
-from collections.abc import Callable
-from pathlib import Path
-
 import numpy as np
 import pytest
 from measured_scenes import scene
@@ -15,20 +12,14 @@ COUNT = 12
 
 
 @pytest.fixture(scope="session")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+def measured(tmp_path_factory):
     """Write truth of 12 images in groups of two, of which a share of the pixels was measured."""
 
-    def made(
-        share: float = 0.9,
-        count: int = COUNT,
-        normals: bool = False,
-        noise: float = 0.0,
-        groups: bool = True,
-    ) -> Path:
+    def made(share=0.9, count=COUNT, normals=False, noise=0.0, groups=True):
         path = tmp_path_factory.mktemp("measured") / "truth.h5"
         rng = np.random.default_rng(1)
 
-        def one(i: int, height: int, width: int) -> Measured:
+        def one(i, height, width):
             depth = scene(i, height, width)
             depth = depth * (1.0 + noise * rng.standard_normal(depth.shape))
             depth[rng.random(depth.shape) > share] = np.nan
@@ -37,11 +28,10 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
             return Measured(image, depth, K, normal)
 
         sizes = [(48 - 2 * (i % 3), 64 - i % 2) for i in range(count)]
+        group = 2 if groups else 1
         rows = [
-            Source(
-                f"{i}.png", f"scene {i // 2 if groups else i}", size, lambda i=i, s=size: one(i, *s)
-            )
-            for i, size in enumerate(sizes)
+            Source(f"{i}.png", f"scene {i // group}", s, lambda i=i, s=s: one(i, *s))
+            for i, s in enumerate(sizes)
         ]
         write_measured(path, rows, source="tests", licence="CC0")
         return path
@@ -50,10 +40,10 @@ def measured(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
 
 
 @pytest.fixture
-def predicted(tmp_path: Path) -> Callable[..., Path]:
+def predicted(tmp_path):
     """Write predictions of such a file: what a function makes of the whole true depth."""
 
-    def made(truth: Path, change: Callable[..., object], name: str = "p", **texts: object) -> Path:
+    def made(truth, change, name="p", **texts):
         from metrics.measured.reader import MeasuredFile
 
         path = tmp_path / f"{name}.h5"

@@ -19,7 +19,7 @@ SIZES = {"nyu": (480, 640), "kitti": (375, 1242)}
 SMALL = 1e-9
 
 
-def data(name: str, kind: str) -> tuple[np.ndarray, np.ndarray]:
+def data(name, kind):
     """True depth with holes and outliers in range, and a prediction (depth or disparity)."""
     rng = np.random.default_rng(len(name))
     height, width = SIZES["nyu" if "nyu" in name else "kitti"]
@@ -30,48 +30,37 @@ def data(name: str, kind: str) -> tuple[np.ndarray, np.ndarray]:
     return true, said if kind == "depth" else 3.0 / said + 0.2
 
 
-def kept(name: str, true: np.ndarray) -> np.ndarray:
+def kept(name, true):
     """The scored pixels, as the code of the sources selects them."""
     height, width = true.shape
-    mask = np.nan_to_num(true) > 0
-    crop = np.zeros_like(mask)
+    crop = np.zeros(true.shape, bool)
+    benchmark = np.s_[height - 352 : height, (width - 1216) // 2 : (width - 1216) // 2 + 1216]
+
+    def shares(top, bottom, left, right, h=height, w=width):
+        return np.s_[int(top * h) : int(bottom * h), int(left * w) : int(right * w)]
+
+    eigen = 0.3324324, 0.91351351, 0.0359477, 0.96405229
     if "nyu" in name:
         crop[45:471, 41:601] = True
-    elif name in ("kitti-eigen-garg", "kitti-eigen-garg-median"):
-        crop[
-            int(0.40810811 * height) : int(0.99189189 * height),
-            int(0.03594771 * width) : int(0.96405229 * width),
-        ] = True
+    elif name.startswith("kitti-eigen-garg"):
+        crop[shares(0.40810811, 0.99189189, 0.03594771, 0.96405229)] = True
     elif name == "kitti-eigen":
-        crop[
-            int(0.3324324 * height) : int(0.91351351 * height),
-            int(0.0359477 * width) : int(0.96405229 * width),
-        ] = True
-    elif name in ("kitti-kb", "affine-depth-kitti"):
-        top, left = int(height - 352), int((width - 1216) / 2)
-        if name == "kitti-kb":
-            crop[top : top + 352, left : left + 1216] = True
-        else:
-            inner = np.zeros((352, 1216), bool)
-            inner[
-                int(0.3324324 * 352) : int(0.91351351 * 352),
-                int(0.0359477 * 1216) : int(0.96405229 * 1216),
-            ] = True
-            crop[top : top + 352, left : left + 1216] = inner
+        crop[shares(*eigen)] = True
+    elif name == "kitti-kb":
+        crop[benchmark] = True
+    elif name == "affine-depth-kitti":
+        crop[benchmark][shares(*eigen, 352, 1216)] = True
     else:
         crop[:] = True
-    low, high = {"nyu": (1e-3, 10.0), "kitti": (1e-3, 80.0)}.get(
-        name.split("-", maxsplit=1)[0], (0.0, np.inf)
-    )
-    low, high = (1e-3, 10.0) if name == "affine-depth-nyu" else (low, high)
-    low, high = (1e-5, 80.0) if name == "affine-depth-kitti" else (low, high)
-    low = 1e-5 if name == "affine-depth" else low
-    high = {"affine-disparity-10m": 10.0}.get(name, high)
+    ends = {"nyu": (1e-3, 10.0), "kitti": (1e-3, 80.0), "affine-depth": (1e-5, np.inf)}
+    ends |= {"affine-depth-nyu": (1e-3, 10.0), "affine-depth-kitti": (1e-5, 80.0)}
+    ends |= {"affine-disparity-10m": (0.0, 10.0)}
+    low, high = ends.get(name, ends.get(name.split("-", maxsplit=1)[0], (0.0, np.inf)))
     filled = np.nan_to_num(true)
-    return mask & crop & (filled > low) & (filled < high)
+    return crop & (filled > 0) & (filled > low) & (filled < high)
 
 
-def aligned(name: str, p: np.ndarray, t: np.ndarray) -> np.ndarray:
+def aligned(name, p, t):
     """The prediction after the alignment and the clipping of the source."""
     if name == "kitti-eigen-garg-median":
         return np.clip(p * np.median(t) / np.median(p), 1e-3, 80.0)
@@ -88,7 +77,7 @@ def aligned(name: str, p: np.ndarray, t: np.ndarray) -> np.ndarray:
     return p
 
 
-def numbers(p: np.ndarray, t: np.ndarray) -> dict[str, float]:
+def numbers(p, t):
     """The measures of Eigen et al. 2014, as their formulas read."""
     ratio, logs = np.maximum(p / t, t / p), np.log(p) - np.log(t)
     return {
@@ -103,7 +92,7 @@ def numbers(p: np.ndarray, t: np.ndarray) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("name", [p.name for p in PROTOCOLS if not p.name.startswith("moge")])
-def test_a_protocol_is_that_of_its_source(name: str) -> None:
+def test_a_protocol_is_that_of_its_source(name):
     """To 1e-9, with holes, values out of range and predictions beyond the clip."""
     kind = "disparity" if "disparity" in name else "depth"
     true, said = data(name, kind)
@@ -117,7 +106,7 @@ def test_a_protocol_is_that_of_its_source(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "shift"), [("moge", True), ("moge-scale", False)])
-def test_moge_is_an_optimum_in_l1(name: str, shift: bool) -> None:
+def test_moge_is_an_optimum_in_l1(name, shift):
     """No line near the fitted one has a smaller mean of |s p + b - t| / t."""
     rng = np.random.default_rng(0)
     t = rng.uniform(1.0, 9.0, 400)
@@ -130,7 +119,7 @@ def test_moge_is_an_optimum_in_l1(name: str, shift: bool) -> None:
             assert np.mean(np.abs((scale + ds) * p + offset + db - t) / t) >= least - 1e-12
 
 
-def test_a_crop_of_another_size_is_refused() -> None:
+def test_a_crop_of_another_size_is_refused():
     """NYU's crop is of 480x640; the benchmark's crop of KITTI needs 352x1216; none may be empty."""
     for name, size in (("nyu-eigen", (479, 640)), ("kitti-kb", (352, 1215))):
         with pytest.raises(ProtocolError):
@@ -139,6 +128,6 @@ def test_a_crop_of_another_size_is_refused() -> None:
         scored_pixels(BY_NAME["nyu-eigen"], np.full((480, 640), 11.0))
 
 
-def test_the_page_has_the_table() -> None:
+def test_the_page_has_the_table():
     """docs/real-data.md shows every protocol as it is."""
     assert markdown_table() in (ROOT / "docs" / "real-data.md").read_text()

@@ -8,12 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from metrics.measures import alignment
-from metrics.measures.alignment import (
-    align_points,
-    depth_of_disparity,
-    l1_scale,
-    l1_scale_shift,
-)
+from metrics.measures.alignment import align_points, depth_of_disparity, l1_scale, l1_scale_shift
 from metrics.measures.checks import MeasureError
 
 DEPTHS = st.lists(

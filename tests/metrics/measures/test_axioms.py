@@ -36,28 +36,28 @@ WHOLE = np.ones((SIZE, SIZE), bool)
 RAYS = pixel_directions(SIZE, SIZE, FOV)
 
 
-def points(depth: Array) -> Array:
+def points(depth):
     return back_project(depth, FOV).reshape(-1, 3)
 
 
-def depth(p: Array, t: Array, alignment: Alignment = "none") -> dict[str, float]:
+def depth(p, t, alignment="none"):
     return depth_scores(compare_depth(p, t), alignment)
 
 
-def clouds(p: Array, t: Array) -> dict[str, float]:
+def clouds(p, t):
     return point_scores(nearest_distances(points(p), points(t)))
 
 
-def near(p: Array, t: Array) -> dict[str, float]:
+def near(p, t):
     return {"f_score_0.06": f_score(nearest_distances(points(p), points(t)), 0.06)}
 
 
-def normals(p: Array, t: Array) -> dict[str, float]:
+def normals(p, t):
     both = (normals_from_depth(d, FOV)[0] for d in (p, t))
     return normal_scores(angular_errors_degrees(*both))
 
 
-def surfaces(p: Array, t: Array) -> dict[str, float]:
+def surfaces(p, t):
     both = [
         surface_of(points(d), normals_from_depth(d, FOV)[0].reshape(-1, 3), pixel_size(SIZE, FOV),
                    WHOLE)
@@ -67,17 +67,17 @@ def surfaces(p: Array, t: Array) -> dict[str, float]:
     return point_scores(surface_distances(both[0], both[1], nearest, True))
 
 
-def maps(p: Array, t: Array, alignment: Alignment = "none") -> dict[str, float]:
+def maps(p, t, alignment="none"):
     return point_map_scores(points(p), points(t), alignment)
 
 
-def objects(p: Array, t: Array) -> dict[str, float]:
+def objects(p, t):
     nearest = nearest_distances(points(p), points(t)).reverse
     scores = object_means(single_objects(BALL.ravel(), np.abs(p - t).ravel(), nearest))
     return {name: scores[name] for name in ("object_depth_error", "object_completeness")}
 
 
-def shape(p: Array, t: Array) -> dict[str, float]:
+def shape(p, t):
     at = inside_objects(BALL.astype(int)) > 0
     said, true = back_project(p, FOV)[at], back_project(t, FOV)[at]
     apart = departures(said, t[at], RAYS[at], True)
@@ -85,7 +85,7 @@ def shape(p: Array, t: Array) -> dict[str, float]:
     return {name: value for name, value in scores.items() if "recall" not in name}
 
 
-def relief(p: Array, t: Array) -> dict[str, float]:
+def relief(p, t):
     room = 1.1 * t.max()
     return relief_scores((room - p).ravel(), (room - t).ravel())
 
@@ -107,13 +107,13 @@ SIDES = {
 }
 
 
-def over(*names: str) -> Callable[..., Any]:
+def over(*names):
     """Run an axiom over measures, all without names, with a random truth and prediction."""
 
-    def each(axiom: Callable[..., None]) -> Callable[..., None]:
+    def each(axiom):
         @pytest.mark.parametrize("seed", [0, 1])
         @pytest.mark.parametrize("name", names or MEASURES)
-        def run(name: str, seed: int) -> None:
+        def run(name, seed):
             rng = np.random.default_rng(seed)
             y, x = np.mgrid[:SIZE, :SIZE] / SIZE
             bend = np.sqrt(np.maximum(22.0 - np.hypot(12 * y - 5.5, 12 * x - 5.5) ** 2, 0.0)) / 9
@@ -126,11 +126,11 @@ def over(*names: str) -> Callable[..., Any]:
     return each
 
 
-def same(found: dict[str, float], expected: dict[str, float], tolerance: float = 1e-7) -> None:
+def same(found, expected, tolerance=1e-07):
     assert found == {k: pytest.approx(v, rel=tolerance, abs=tolerance) for k, v in expected.items()}
 
 
-def worse(name: str, a: float, b: float) -> bool:
+def worse(name, a, b):
     return a < b if metric(name).higher_is_better else a > b
 
 

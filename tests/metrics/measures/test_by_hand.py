@@ -1,17 +1,26 @@
-"""Edges of the measures, by hand; `scoring/test_definitions` has the formulas on whole files."""
+"""Edges of the measures, by hand, and guesses that must win nothing.
+
+`scoring/test_definitions` has the formulas on whole files.
+"""
+
+from typing import get_args
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
+from metrics.measures.alignment import Alignment
 from metrics.measures.answers import ABSTAINED, answers_from_scores
-from metrics.measures.behind import MARGIN, hidden_from
+from metrics.measures.behind import MARGIN, behind_scores, hidden_from
 from metrics.measures.boundaries import RATIOS, boundary_scores
-from metrics.measures.checks import MeasureError
+from metrics.measures.checks import EmptyError, MeasureError, NonFiniteError
+from metrics.measures.depth import align, compare_depth, delta, depth_scores, silog
 from metrics.measures.guesses import balls_and_blocks
 from metrics.measures.objects import LEAST_PIXELS, object_means, single_objects, size_range
 from metrics.measures.relief import depth_along, empty_room, relief_scores
-from metrics.measures.shape import inside_objects
-from metrics.measures.skill import skill_intervals
+from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores
+from metrics.measures.skill import skill, skill_intervals
 from metrics.measures.statistics import pooled_means
 from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, f_score
 from metrics.views.compare.paired_tests import (
@@ -20,7 +29,7 @@ from metrics.views.compare.paired_tests import (
     sign_flip_test,
     smallest_detectable_difference,
 )
-from scenegen.camera import Camera, pixel_size
+from scenegen.camera import Camera, back_project, pixel_directions, pixel_size
 from scenegen.rooms.reader import RoomsFile
 
 RNG = np.random.default_rng(5)
@@ -196,3 +205,208 @@ def test_paired_differences():
     assert holm([0.5, 0.4]) == pytest.approx([0.8, 0.8])
     # (z_.975 + z_.8) s / sqrt(2), where s is sqrt(2)
     assert smallest_detectable_difference([0.0, 2.0]) == pytest.approx(1.9599640 + 0.8416212)
+
+
+ALIGNMENTS = get_args(Alignment)
+
+
+def random_pair(seed):
+    rng = np.random.default_rng(seed)
+    true = rng.uniform(1.0, 3.0, (5, 6))
+    return compare_depth(true * rng.uniform(0.5, 2.0) + 0.3 * rng.random((5, 6)), true)
+
+
+def test_delta_limits_are_strict_and_symmetric():
+    pair = compare_depth([1.25, 1.0, 1.24, 1.0, 1.5625, 1.9], [1.0, 1.25, 1.0, 1.24, 1.0, 1.0])
+    assert [delta(pair, power) for power in (1, 2, 3)] == [2 / 6, 4 / 6, 6 / 6]
+
+
+@pytest.mark.parametrize("alignment", ALIGNMENTS)
+@pytest.mark.parametrize("value", [0.0, -1.0, 0.1, 2.5, 1e-300, 1e-30, 1e30, 1e100])
+def test_constants_have_finite_scores(alignment, value):
+    true = np.linspace(1.0, 3.0, 50)
+    pair = compare_depth(np.full(50, value), true)
+    assert np.isfinite(list(depth_scores(pair, alignment).values())).all()
+    if alignment == "scale_shift":
+        assert align(pair, alignment).predicted == pytest.approx(np.full(50, 2.0))
+
+
+@pytest.mark.parametrize("alignment", ["none", "median_scale", "scale"])
+def test_a_lost_sign_scores_worse_than_its_positive_twin(alignment):
+    true = np.linspace(1.0, 3.0, 50)
+    name = "silog" if alignment == "none" else f"silog_after_{alignment}"
+    for depth in (np.full(50, 1.5), true):
+        good, bad = (depth_scores(compare_depth(s * depth, true), alignment)[name] for s in (1, -1))
+        assert bad > 500.0 > 100.0 > good
+
+
+def test_pixels_behind_the_camera_find_no_scale():
+    """The others are aligned without them: half of the pixels at ln 1000 each from a truth of 1."""
+    true = np.ones(4)
+    expected = 100.0 * np.sqrt(np.log(1000.0) ** 2 / 2.0)
+    for scale in (1.0, 7.0):
+        pair = compare_depth([scale, scale, -scale, 1e-3], true)
+        assert silog(pair) == pytest.approx(expected)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_silog_of_positive_depth_is_a_standard_deviation(seed):
+    """To the bit, so that no score of depth in front of the camera has changed."""
+    pair = random_pair(seed)
+    assert silog(pair) == 100.0 * np.sqrt(np.var(np.log(pair.predicted) - np.log(pair.true)))
+
+
+NOISE = np.random.default_rng(3)
+RELIEF = np.maximum(NOISE.normal(0.0, 0.15, 4000), 0.0)
+SPOT = np.where(np.arange(4000) == 9, 0.06, 0.0)  # an object of one pixel
+
+
+@pytest.mark.parametrize("true", [SPOT, np.full(9, 0.3)], ids=["one", "all alike"])
+def test_the_truth_is_perfect_and_the_empty_room_has_nothing(true):
+    varied = float(np.ptp(true) > 0.0)
+    assert relief_scores(true, true) == {
+        "relief_correlation": pytest.approx(varied, abs=1e-12),
+        "relief_iou": 1.0,
+    }
+    assert set(relief_scores(np.zeros_like(true), true).values()) == {0.0}
+
+
+@given(st.floats(-2.0, 2.0), st.floats(1e-12, 1e-6), st.booleans())
+def test_noise_and_a_constant_win_and_lose_nothing(lift, size, along):
+    """Even noise that is the true relief itself, made too small to see."""
+    noise = RELIEF if along else NOISE.normal(0.0, 1.0, 4000)
+    found = relief_scores(lift + size * noise, RELIEF)["relief_correlation"]
+    assert abs(found) <= 2e-3 if not along else 0.0 <= found <= 1e-3
+
+
+def test_correlation_turns_with_the_sign_of_relief_and_never_overflows():
+    turned = {"relief_correlation": pytest.approx(-1.0), "relief_iou": 0.0}
+    assert relief_scores(-RELIEF, RELIEF) == turned
+    largest = np.where(RELIEF > 0.1, 3e38, -3e38)
+    assert 0.0 < relief_scores(largest, RELIEF)["relief_correlation"] <= 1.0
+
+
+def test_where_nothing_stands_out_there_is_no_score():
+    assert all(np.isnan(list(relief_scores(RELIEF, np.full(4000, 0.05)).values())))
+    for error, arrays in (
+        (EmptyError, ([], [])),
+        (MeasureError, ([0.1], [0.1, 0.2])),
+        (NonFiniteError, ([np.nan], [0.1])),
+        (NonFiniteError, ([0.1], [np.inf])),
+    ):
+        with pytest.raises(error):
+            relief_scores(*map(np.asarray, arrays))
+
+
+SIZE, FOV = 48, 40.0
+
+
+def ball(centre, radius):
+    """Planar depth of a ball before a wall at depth 4, and which pixels show it."""
+    rays = pixel_directions(SIZE, SIZE, FOV)
+    a, b = (rays**2).sum(axis=-1), rays @ np.asarray(centre)
+    root = b**2 - a * (np.dot(centre, centre) - radius**2)
+    hit = root > 0.0
+    return np.where(hit, (b - np.sqrt(np.maximum(root, 0.0))) / a, 4.0), hit
+
+
+BALL, HIT = ball([0.1, 0.1, -2.5], 0.5)
+IDS = np.where(HIT, 3, 0)
+INSIDE = inside_objects(IDS)
+
+
+def scores(depth):
+    at = INSIDE > 0
+    points, true = (back_project(d, FOV)[at] for d in (depth, BALL))
+    return shape_scores((BALL - depth)[at][:, None], points, true, INSIDE[at])
+
+
+def test_inside_is_the_mask_without_its_rim_of_objects_that_are_large_enough():
+    by_hand = np.zeros_like(IDS)
+    for i in range(1, SIZE - 1):
+        for j in range(1, SIZE - 1):
+            by_hand[i, j] = 3 * (IDS[i - 1 : i + 2, j - 1 : j + 2] == 3).all()
+    assert np.array_equal(INSIDE, by_hand)
+
+
+def test_a_slanted_plane_and_noise_have_no_correlation():
+    rays = pixel_directions(SIZE, SIZE, FOV)
+    plane = 2.0 / (1.0 + 0.4 * rays[..., 0] - 0.3 * rays[..., 1])
+    assert scores(plane)["shape_correlation"] == pytest.approx(0.0, abs=1e-6)
+    noise = 2.0 + 1e-7 * np.random.default_rng(0).normal(size=BALL.shape)
+    assert abs(scores(noise)["shape_correlation"]) < 1e-3
+    assert scores(5.0 - BALL)["shape_correlation"] < -0.9  # hollow
+
+
+def test_flat_truth_has_no_correlation_and_no_object_has_no_score():
+    at = INSIDE > 0
+    true = back_project(np.full_like(BALL, 2.0), FOV)[at]
+    none = np.zeros((len(true), 1))
+    found = shape_scores(none, true, true, INSIDE[at])
+    assert found["shape_error"] == 0.0
+    assert np.isnan(found["shape_correlation"])
+    assert np.isnan(list(shape_scores(none[:0], true[:0], true[:0], INSIDE[at][:0]).values())).all()
+    assert np.isnan([flat_error(BALL[:0], IDS[:0]), one_normal_degrees(true[:0], IDS[:0])]).all()
+
+
+DRAWS = np.random.default_rng(8)
+FLOORS = DRAWS.gamma(2.0, 0.1, 60)
+
+
+def skill_interval(scores, floors, seed):
+    """That of one skill."""
+    low, high = skill_intervals(np.array(scores)[:, None], np.array(floors)[:, None], seed)
+    return low.item(), high.item()
+
+
+def test_perfect_is_1_and_the_floor_is_0():
+    for floor in (1e-9, 0.3, 5.0):
+        assert (skill(0.0, floor, False), skill(floor, floor, False)) == (1.0, 0.0)
+        assert skill(2 * floor, floor, False) == -1.0
+    for floor in (-0.2, 0.0, 0.7):
+        assert (skill(1.0, floor, True), skill(floor, floor, True)) == (1.0, 0.0)
+    assert skill(0.4, 0.6, True) == pytest.approx(-0.5)
+    assert skill(0.0, 0.0, False) is skill(1.0, 1.0, True) is None
+
+
+@pytest.mark.parametrize("factor", [0.0, 0.1, 1.0, 3.7])
+def test_a_multiple_of_the_floor_has_an_interval_of_no_width(factor):
+    low, high = skill_interval(factor * FLOORS, FLOORS, 0)
+    assert (low, high) == (pytest.approx(1.0 - factor, abs=1e-12),) * 2
+    if factor in (0.0, 1.0):
+        assert low == high == 1.0 - factor
+
+
+def test_the_interval_is_that_of_a_plain_loop():
+    scores = FLOORS * DRAWS.uniform(0.0, 1.9, 60)
+    ratio = scores.sum() / FLOORS.sum()
+
+    def spread(score, floor, about):
+        return np.std(score - about * floor) / floor.mean()
+
+    scaled = []
+    for d in np.random.default_rng(2).integers(0, 60, (500, 60)):
+        mine = scores[d].sum() / FLOORS[d].sum()
+        scaled.append((mine - ratio) / spread(scores[d], FLOORS[d], mine))
+    error = spread(scores, FLOORS, ratio)
+    low, high = 1.0 - ratio + error * np.quantile(scaled, [0.025, 0.975])
+    found = skill_intervals(scores[:, None], FLOORS[:, None], 2, 500)
+    assert (found[0].item(), found[1].item()) == pytest.approx((low, high))
+
+
+def test_where_there_is_no_interval():
+    assert np.isnan(skill_interval([0.1], [0.2], 0)).all()
+    # Among three scenes of which one has objects, some resamples have none.
+    assert np.isnan(skill_interval([0.1, 0.0, 0.0], [0.2, 0.0, 0.0], 0)).all()
+    for scores, floors in (([0.1, 0.2], [0.0, 0.0]), ([0.1], [0.1, 0.2]), ([], [])):
+        with pytest.raises(MeasureError):
+            skill_interval(scores, floors, 0)
+
+
+def test_scores_of_what_is_hidden():
+    errors, nearest = np.linspace(0.0, 0.3, 16), np.repeat([0.01, 0.06], 8)
+    assert behind_scores(errors, nearest) == {
+        "behind_depth_error": pytest.approx(0.15),
+        "behind_recall_0.05": 0.5,
+    }
+    assert np.isnan(list(behind_scores(errors[1:], nearest[1:]).values())).all()

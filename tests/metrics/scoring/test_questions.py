@@ -13,15 +13,7 @@ from refusals import refused
 from baselines.trivial import write_chance
 from iqtt.files.make import make_split
 from iqtt.files.reader import open_questions
-from iqtt.floors import (
-    CHANCE,
-    Floor,
-    Measured,
-    floor_of_questions,
-    floors_of,
-    settings_of,
-    to_json,
-)
+from iqtt.floors import CHANCE, Floor, Measured, floor_of_questions, floors_of, settings_of, to_json
 from iqtt.questions.kinds import question_kind
 from iqtt.questions.specs import PRESETS, SUITE, SplitSpec, preset_spec
 from metrics.measures.statistics import design_effect, wilson_interval
@@ -62,40 +54,6 @@ def test_true_answers_are_all_right_and_abstentions_wrong(questions, tmp_path):
     found = score([tmp_path / "some.h5"])
     assert found.metrics["iqtt_accuracy"].value == np.mean(true != 0)
     assert found.meta.counts["abstained"] == np.count_nonzero(true == 0)
-    scores = np.eye(3)[true]
-    scores[:4] = 1.0
-    write_answers(tmp_path / "tied.h5", test, method="tied", scores=scores)
-    assert score([tmp_path / "tied.h5"]).metrics["iqtt_accuracy"].value == 26 / 30
-
-
-def test_answers_may_come_as_json_and_several_runs_are_averaged(questions, tmp_path):
-    answers = questions / "split/iqtt-test-answers.h5"
-    (tmp_path / "list.json").write_text(str([0] * 30))
-    found = score([tmp_path / "list.json"], answers)
-    assert found.metrics["iqtt_accuracy"].value == pytest.approx(1 / 3)
-    runs = score([questions / f"chance-{seed}.h5" for seed in range(2)])
-    each = [
-        score([questions / f"chance-{seed}.h5"]).metrics["iqtt_accuracy"].value for seed in range(2)
-    ]
-    assert runs.metrics["iqtt_accuracy"].value == pytest.approx(np.mean(each))
-    assert runs.metrics["iqtt_accuracy"].std == pytest.approx(np.std(each, ddof=1))
-
-
-def test_every_score_has_its_column_and_lies_in_its_interval(questions, tmp_path):
-    """As the reader of score files asks; runs that nearly agree are where rounding would show."""
-    rng = np.random.default_rng(4)
-    answers = questions / "split/iqtt-test-answers.h5"
-    for runs in (2, 3, 7):
-        paths = [tmp_path / f"{runs}-{run}.h5" for run in range(runs)]
-        given = np.full((runs, 30), rng.integers(3, size=30))
-        given[np.arange(runs), np.arange(runs)] = -1
-        for path, answer in zip(paths, given, strict=True):
-            write_answers(path, answers, method="m", answer=answer)
-        found = score(paths, answers)
-        groups = [found.metrics, *found.by_position.values(), *found.by_distractor.values()]
-        for one in (group["iqtt_accuracy"] for group in groups):
-            assert one.low is None or one.low <= one.value <= one.high
-        assert set(found.metrics) <= set(found.items)
 
 
 def test_intervals_take_shapes_as_independent(questions, tmp_path):

@@ -2,28 +2,22 @@
 
 import hashlib
 import json
-import subprocess
-import sys
-from pathlib import Path
+import tracemalloc
 
 import h5py
 import numpy as np
 import pytest
 from h5_edits import damaged_chunk, put
 from refusals import refused
-from submissions import as_json, edited, good_answers, good_rooms
+from submissions import as_json, edited, good_answers
 
-from metrics.submissions.inspection import inspect
-from metrics.submissions.reader import (
-    QuestionPredictions,
-    RoomPredictions,
-    open_predictions,
-)
+from metrics.submissions.problems import JsonError
+from metrics.submissions.reader import QuestionPredictions, RoomPredictions, open_predictions
+from metrics.submissions.strict_json import memory_needed, parse_json
 from metrics.submissions.truths import match_problems
 from scenegen.common.errors import FileFormatError
 from scenegen.rooms.reader import RoomsFile
 
-ROOT = Path(__file__).parents[3]
 HEAD = {"format": "pix2shape-bench/predictions", "format_version": "1.0", "method": "mine"}
 
 
@@ -104,19 +98,6 @@ def test_opening_reads_no_pixels(truths, tmp_path):
         assert caught.value.where.startswith(f"{path}: depth, row 3")
 
 
-def test_chunks_of_many_rows_are_unpacked_once(by_hand):
-    """h5py's own choice of chunks spans rows; row by row each would be unpacked many times."""
-    path = by_hand()
-    values = np.ones((8, 600, 600), "f4")
-    with h5py.File(path, "r+") as file:
-        del file["depth"]
-        file.create_dataset("depth", data=values, chunks=(8, 400, 600), compression="gzip")
-    with h5py.File(path) as file:
-        stored = inspect(file).arrays["depth"]
-        assert stored.dataset.id.get_access_plist().get_chunk_cache()[1] == 8 * 800 * 600 * 4
-        assert np.array_equal(stored[7], values[7])
-
-
 def test_a_refused_file_is_closed(truths, tmp_path):
     path = edited(put("row", 0, 1))(tmp_path, truths.rooms)
     with pytest.raises(FileFormatError):
@@ -130,41 +111,7 @@ def test_a_refused_file_is_closed(truths, tmp_path):
         pass
 
 
-def test_reading_loads_little(truths, tmp_path):
-    """Neither renderers nor networks, nor what only scoring needs."""
-    rooms = good_rooms(tmp_path, truths.rooms)
-    answers = good_answers(tmp_path, truths.iqtt)
-    code = f"""
-import sys
-from metrics.submissions.reader import open_predictions
-from metrics.submissions.truths import find_truth
-from metrics.submissions.validation import validate
-for path in {[str(rooms), str(answers)]!r}:
-    find_truth(open_predictions(path))
-    assert all(problem.is_hint for problem in validate(path))
-import metrics.score_file
-heavy = "mitsuba drjit torch scipy pykdtree trimesh click PIL tqdm jinja2".split()
-print(*[name for name in heavy if name in sys.modules])
-"""
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
-    )
-    assert done.stdout.split() == []
-
-
 # ---- answers ----
-
-
-def test_answers_and_scores_whatever_the_name(truths, tmp_path):
-    path = good_answers(tmp_path, truths.iqtt).rename(tmp_path / "answers.json")
-    with open_predictions(path) as found:
-        assert isinstance(found, QuestionPredictions)
-        assert found.task == "iqtt"
-        assert found.rows.tolist() == list(range(6))
-        assert found.answers.dtype == np.int64
-        assert found.answers.tolist() == [0, 1, 2, 2, 1, 0]
-        assert found.scores.dtype == np.float64
-        assert found.scores.argmax(axis=1).tolist() == found.answers.tolist()
 
 
 def test_answers_from_scores_abstain_where_tied(truths, tmp_path):
@@ -175,18 +122,6 @@ def test_answers_from_scores_abstain_where_tied(truths, tmp_path):
 
     with open_predictions(edited(edit, good_answers)(tmp_path, truths.iqtt)) as found:
         assert found.answers.tolist() == [0, -1, -1, 2, 1, 0]
-
-
-def test_answers_alone(truths, tmp_path):
-    def edit(file):
-        del file["scores"]
-        file["answer"][0] = -1
-        file["question"][...] = [5, 4, 3, 2, 1, 0]
-
-    with open_predictions(edited(edit, good_answers)(tmp_path, truths.iqtt)) as found:
-        assert found.answers.tolist() == [-1, 1, 2, 2, 1, 0]
-        assert found.rows.tolist() == [5, 4, 3, 2, 1, 0]
-        assert found.scores is None
 
 
 @pytest.mark.parametrize("count", [3, 65_536, 70_001])
@@ -234,3 +169,67 @@ def test_json_under_any_name(tmp_path, name, start):
     path.write_text(start + json.dumps([0, 1]), encoding="utf-8")
     with open_predictions(path) as found:
         assert found.answers.tolist() == [0, 1]
+
+
+SIZE = 2**17
+WIDE = '"\U0001f600"]'.encode()
+
+
+def filled(piece, end=b"0]", start=b"["):
+    return start + piece * (SIZE // len(piece)) + end
+
+
+def many_keys():
+    keys = b"{" + b",".join(b'"%d":0' % i for i in range(SIZE // 12)) + b"}"
+    return b"[" + keys + b"]"
+
+
+TEXTS = {
+    "lists": filled(b"[],"),
+    "lists in lists": b"[" + filled(b"[[[]]],") + b"]",
+    "objects": filled(b"{},"),
+    "objects with a key": filled(b'{"a":0},'),
+    "keys": many_keys(),
+    "short texts": filled(b'"ab",'),
+    "short texts beyond ASCII": filled('"\U0001f600",'.encode()),
+    "short texts and a wide one": filled(b'"ab",', WIDE),
+    "a long text": filled(b"a", b'"]', b'["'),
+    "a long text, widened at its end": filled(b"a", '\U0001f600"]'.encode(), b'["'),
+    "a long text, widened by an escape": filled(b"a", b'\\ud83d\\ude00"]', b'["'),
+    "spaces and a wide character": filled(b" ", WIDE),
+    "escapes": filled(b"\\u0041", b'"]', b'["'),
+    "small numbers": filled(b"0,"),
+    "whole numbers": filled(b"999,"),
+    "numbers": filled(b"1.5,"),
+    "long numbers": filled(b"9" * 4000 + b","),
+}
+
+
+@pytest.mark.parametrize("text", TEXTS.values(), ids=TEXTS)
+def test_no_text_takes_more_than_the_bound(text):
+    memory_needed(text)
+    tracemalloc.start()
+    try:
+        parse_json(text, 10**6)
+        taken = tracemalloc.get_traced_memory()[1] + len(text)
+    finally:
+        tracemalloc.stop()
+    assert taken < memory_needed(text)
+
+
+def test_what_would_take_too_much_is_not_parsed():
+    text = TEXTS["lists"]
+    tracemalloc.start()
+    try:
+        with refused(JsonError, "", "JSON that may take", "at most 1,000"):
+            parse_json(text, 10, 1000)
+        assert tracemalloc.get_traced_memory()[1] < 2**16
+    finally:
+        tracemalloc.stop()
+    with refused(JsonError, "", "JSON that may take"):
+        parse_json(text * 240, 10)
+
+
+def test_whole_numbers_without_end_are_refused():
+    with refused(JsonError, "", "no JSON"):
+        parse_json(b"9" * 10**6, 10)

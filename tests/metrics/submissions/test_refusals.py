@@ -63,6 +63,8 @@ def test_a_broken_submission(case, truths, tmp_path, monkeypatch, check_refusal)
     result = CliRunner().invoke(cli.bench, ["score", str(path), *options, "--json", "x.json"])
     if case.stage == "hint":
         assert result.exit_code == 0, result.output
+        told = CliRunner().invoke(cli.bench, ["validate", str(path), *options]).stdout
+        assert all(word in text for word in case.words for text in (result.stderr, told))
     else:
         check_refusal(result.exit_code, result.stdout, result.stderr, case.words)
     assert (tmp_path / "x.json").exists() == (case.stage == "hint")

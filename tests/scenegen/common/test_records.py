@@ -12,7 +12,6 @@ from scenegen.common.records import (
     LONGEST_JSON,
     changed_settings,
     check,
-    check_range,
     from_json,
     to_json,
 )
@@ -121,17 +120,3 @@ def test_a_byte_order_mark_is_ignored_and_the_length_is_bounded() -> None:
     with pytest.raises(SpecError) as caught:
         from_json(Tree, text.ljust(LONGEST_JSON + 1), "tree")
     assert caught.value.where == "tree"
-
-
-def test_checks_say_what_was_found_and_expected() -> None:
-    check(True, "size", 3, "less than 4")
-    with pytest.raises(SpecError) as caught:
-        check(False, "size", 5, "less than 4")
-    error = caught.value
-    assert (error.where, error.found, error.expected) == ("size", "5", "less than 4")
-    check_range("lights", (0, 16), 0, 16)
-    for pair, shown in (((2, 1), "2-1"), ((-1, 3), "-1-3"), ((17, 17), "17"), ((1, 17), "1-17")):
-        with pytest.raises(SpecError) as caught:
-            check_range("lights", pair, 0, 16)
-        assert (caught.value.where, caught.value.found) == ("lights", shown)
-        assert "0-16" in caught.value.expected

@@ -72,7 +72,7 @@ def test_the_wheel_comes_with_the_package_and_works():
 
 
 def test_the_order_is_own_choice_then_wheel_then_system(monkeypatch):
-    versions = {"own": 18, "wheel": 23, "system": 17, "old": 14}
+    versions = {"own": 18, "wheel": 23, "system": 16, "old": 15}
     monkeypatch.setattr(backend, "llvm_version", lambda library: (versions[library],))
     monkeypatch.setattr(backend, "system_libraries", lambda: ["system"])
     for own, wheel, chosen in (

@@ -4,51 +4,18 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from model_rooms import folder_objects, folder_spec, some_scenes
 from other_engines import cast_whole_scene, near_silhouettes
-from scipy.ndimage import maximum_filter, minimum_filter
 
 from scenegen.camera import Camera, pixel_directions
 from scenegen.description.names import SHAPE_NAMES
-from scenegen.description.presets import preset_spec
 from scenegen.description.scenes import PlacedObject, SceneSpec
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.catalogue import objects_of
 from scenegen.rendering.numpy_renderer import render_in_numpy
 from scenegen.rendering.packing import pack
 from scenegen.rendering.renderer import render
 
 FLOAT = DatasetSpec(image_dtype="float32", seed=11)
 SMALL = replace(FLOAT, height=47, width=61, objects=(2, 3), min_visible_pixels=0)
-
-
-def check_against_whole_scenes(spec, scenes, objects=None):
-    """Check that depth and ids are those of another ray caster, but for silhouettes."""
-    objects = objects or objects_of(spec)
-    truth = render(pack(spec, scenes, objects=objects))
-    cast = [cast_whole_scene(scene, spec, objects.shape) for scene in scenes]
-    depth, object_id, normal = (np.stack(part) for part in zip(*cast, strict=True))
-    off = ~(abs(truth.depth - depth) <= 1e-4)
-    steps = np.stack([maximum_filter(d, 3) - minimum_filter(d, 3) for d in depth])
-    edges = near_silhouettes(truth.object_id) | (steps > 0.02)  # of an object's own parts, too
-    assert off.mean() <= 2e-3
-    assert not (off & ~edges).any(), "depth disagrees away from silhouettes"
-    assert not ((truth.object_id != object_id) & ~edges).any()
-    facing = abs((truth.normal * normal).sum(axis=-1))  # faces of curved shapes and of open ones
-    assert np.quantile(facing, 0.01) > 0.9, "smooth normals are near the faces'"
-    assert (truth.object_id > 0).mean() > 0.02
-
-
-@pytest.mark.parametrize(
-    "name", ["shapes", "shapenet", "folder", pytest.param("furniture-256", marks=pytest.mark.slow)]
-)
-def test_whole_scenes_agree_with_another_engine(name, model_folder):
-    if name == "folder":
-        spec, objects = folder_spec(model_folder), folder_objects(model_folder)
-    else:
-        spec = replace(preset_spec(name), image_dtype="float32", seed=11)
-        objects = objects_of(spec)
-    check_against_whole_scenes(spec, some_scenes(spec, objects, 4), objects)
 
 
 def compare(ours, theirs):

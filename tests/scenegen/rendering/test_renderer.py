@@ -18,11 +18,6 @@ TINY = DatasetSpec(
 GLOSSY_MODELS = replace(FAMILIES, height=24, width=24, specular=(0.2, 0.5), shininess=(3.0, 9.0))
 
 
-@pytest.fixture(scope="module")
-def scenes(scenes_of):
-    return scenes_of(TINY, 4)
-
-
 @pytest.mark.parametrize(
     "spec",
     [

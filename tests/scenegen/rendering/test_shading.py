@@ -1,25 +1,14 @@
 """The shading equation against numbers worked out by hand, with and without Phong's lobe."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from scenegen.camera import Camera
-from scenegen.description.scenes import Light, PlacedObject, SceneSpec
-from scenegen.description.specs import DatasetSpec
-from scenegen.rendering.packing import pack
-from scenegen.rendering.renderer import render
 from scenegen.rendering.shading import shade
 
 ORIGIN = np.zeros((1, 3))
 UP = np.array([[0.0, 1.0, 0.0]])
 DARK, WHITE = np.zeros(3), np.ones(3)
 K = np.array([0.5, 0.25])
-GLOSSY = DatasetSpec(
-    height=40, width=56, objects=(2, 3), lights=(0, 4), specular=(0.2, 1.0), shininess=(2.0, 60.0),
-    image_dtype="float32", min_visible_pixels=0, seed=8, random_reflectance=True,
-)  # fmt: skip
 
 
 def test_light_overhead():
@@ -77,24 +66,3 @@ def test_a_light_below_the_surface_has_no_highlight_though_the_lobe_reaches_it()
     assert shine((10.0, -0.1, 0.0), viewpoint, 5.0) == 0
     assert shine((10.0, 0.0, 0.0), viewpoint, 5.0) == 0
     assert shine((-10.0, 0.1, 0.0), viewpoint, 5.0) == 0, "nor one behind the mirrored ray"
-
-
-@pytest.mark.parametrize("blocked", [False, True])
-def test_a_highlight_by_hand_and_in_the_shadow(blocked):
-    """A box's top, seen and lit at 3-4-5 triangles from either side; a ball before the light."""
-    box = PlacedObject(
-        "box", (0.5, 0.2, 0.5), (1.0, 0, 0, 0), 0.2 * 3**0.5, (0.5, 0.25, 1.0), 0.4, 12.0
-    )
-    ball = PlacedObject("sphere", (-0.1, 1.2, 0.5), (1.0, 0, 0, 0), 0.05, (1.0,) * 3)
-    camera = Camera((1.7, 2.0, 0.5), (0.5, 0.4, 0.5), 20.0)
-    lamp = Light((-0.7, 2.0, 0.5), (2.0, 4.0, 1.0))
-    objects = (box, ball) if blocked else (box,)
-    scene = SceneSpec(0, (camera,), objects, (lamp,), (0.1,) * 3, (0.5, 0.25), (0.8,) * 3)
-    spec = replace(GLOSSY, height=33, width=33, objects=(1, 2), lights=(1, 1), shadows=True)
-    truth = render(pack(spec, [scene]))
-    assert truth.object_id[0, 16, 16] == 1
-    rho, color = np.array(box.reflectance), np.array(lamp.color)
-    expected = rho * (0.1 + 0.8 * color / 2) + 0.4 * color / 2  # d = 2: k_l d + k_q d^2 = 2
-    np.testing.assert_allclose(
-        truth.image[0, 16, 16], 0.1 * rho if blocked else expected, rtol=1e-4
-    )

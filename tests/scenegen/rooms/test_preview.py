@@ -1,13 +1,11 @@
 """Contact sheets: measured, since nobody looks at them in a test."""
 
-import dataclasses
-
 import numpy as np
 import pytest
 from PIL import Image
 
 from scenegen import open_rooms
-from scenegen.rooms.preview import contact_sheet, depth_bytes, srgb_bytes, tiles
+from scenegen.rooms.preview import contact_sheet, depth_bytes, srgb_bytes
 
 
 @pytest.fixture(scope="module")
@@ -24,22 +22,6 @@ def test_near_is_dark():
     assert (shown[..., :1] == shown).all()
     assert depth_bytes(np.full((2, 2), np.nan)).shape == (2, 2, 3)
     assert np.ptp(depth_bytes(np.full((2, 2), 1.5))) == 0
-
-
-def test_where_nothing_is_hit_no_picture_pretends(rooms):
-    room = rooms[0]
-    gone = np.zeros((32, 32), bool)
-    gone[:9, :9] = True
-    room = dataclasses.replace(
-        room,
-        depth=np.where(gone, np.nan, room.depth),
-        normal=np.where(gone[..., None], 0, room.normal),
-        object_id=np.where(gone, -1, room.object_id).astype(np.int8),
-    )
-    for picture in tiles(room):
-        nothing = {tuple(c) for c in picture[gone].reshape(-1, 3)}
-        assert len(nothing) == 1
-        assert nothing.isdisjoint({tuple(c) for c in picture[~gone].reshape(-1, 3)})
 
 
 def test_srgb_is_the_standard_curve():

@@ -54,7 +54,7 @@ def test_texts_from_files_and_people_stay_texts(damaged, tmp_path):
     assert f"    {WICKED}".replace("\n", "\\n") in page.splitlines(), "a block, to be copied"
 
 
-@pytest.mark.parametrize("several", [False, True])
+@pytest.mark.parametrize("several", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_parquet_beside_a_card_and_its_files_is_read(
     several, rooms_path, float_path, load, tmp_path
 ):

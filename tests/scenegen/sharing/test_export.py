@@ -92,19 +92,19 @@ def test_developed_pictures_are_encoded_once(interior_path, tmp_path, encoding):
 
 
 @pytest.mark.parametrize("form", DATA_FORMATS)
-def test_the_same_bytes_again_and_an_older_folder_is_replaced(form, path, tmp_path):
+def test_the_same_bytes_again_and_an_older_folder_is_replaced(form, holey_set, tmp_path):
     def contents():
         return {p.name: p.read_bytes() for p in (tmp_path / "out").iterdir()}
 
-    export_rows(path, form, tmp_path / "out", rows_per_file=2)
+    export_rows(holey_set, form, tmp_path / "out", rows_per_file=2)
     many = contents()
-    made = export_rows(path, form, tmp_path / "out", rows_per_file=4, overwrite=True)
+    made = export_rows(holey_set, form, tmp_path / "out", rows_per_file=4, overwrite=True)
     assert set(contents()) == {p.name for p in made}, "files of the older run are gone"
-    export_rows(path, form, tmp_path / "out", rows_per_file=2, overwrite=True)
+    export_rows(holey_set, form, tmp_path / "out", rows_per_file=2, overwrite=True)
     assert contents() == many
     (tmp_path / "out" / "mine.txt").write_text("mine")
     with pytest.raises(FileExistsError):
-        export_rows(path, form, tmp_path / "out", overwrite=True)
+        export_rows(holey_set, form, tmp_path / "out", overwrite=True)
 
 
 def shortened(file):

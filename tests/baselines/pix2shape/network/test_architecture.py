@@ -2,6 +2,7 @@
 
 import itertools
 
+import pytest
 import torch
 
 from baselines.pix2shape.network import architecture
@@ -32,3 +33,17 @@ def test_the_papers_networks_have_the_tables_sizes() -> None:
     joined = convolutions([6, 85, 170, 340, 680]) + 16 * (680 + 128) * 1360 + 1360
     assert count(Critic(spec)) == joined + 16 * 1360 + 1
     assert count(architecture.Statistics(spec)) == 128 * 256 + 256 + 256 * 512 + 512 + 512 + 1
+
+
+@pytest.mark.parametrize(
+    ("size", "camera", "classes"),
+    [(32, False, 0), (32, False, 3), (64, True, 7), (128, True, 0), (256, True, 0)],
+)
+def test_all_sizes_and_conditions(size: int, camera: bool, classes: int) -> None:
+    spec = NetworkSpec(size=size, width=0.02, camera=camera, classes=classes, z_scene=20, z_view=4)
+    image, condition = torch.rand(2, 3, size, size), torch.rand(2, spec.condition)
+    code = Encoder(spec)(image, condition)
+    assert code.shape == (2, 24)
+    assert Decoder(spec)(code, condition).shape == (2, 1, size, size)
+    assert Critic(spec)(image, code, condition).shape == (2,)
+    assert architecture.Statistics(spec)(code[:, :20], code[:, 20:]).shape == (2,)

@@ -23,6 +23,8 @@ def test_the_paper_and_rays() -> None:
         ({"networks.size": 48}, "size: found 48"),
         ({"networks.width": 0.0}, "width: found 0.0"),
         ({"networks.classes": -1}, "classes: found -1"),
+        ({"networks.encoder": "polar"}, "encoder: "),  # which is not told the camera
+        ({"networks.encoder": "resnet"}, "encoder: .*one of paper, polar"),
         ({"depth_reach": 1.0}, "depth reach: found 1.0"),
         ({"batch": 1}, "batch: found 1"),
         ({"critic_steps": 0}, "critic steps: found 0"),

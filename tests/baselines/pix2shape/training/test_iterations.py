@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 import torch
 from pix2shape_models import question_source, room_source, state_of, suited, tiny
+from refusals import refused
 
 from baselines.pix2shape.training import iterations
 from baselines.pix2shape.training.batches import Sources
@@ -16,8 +17,10 @@ from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, moments_of
 from baselines.training.fit import fit
 from baselines.training.machine import Machine
+from scenegen.common.errors import SpecError
 
 TINY = tiny(mutual_information=0.0, questions=0.0)
+PLAIN = replace(TINY, adversarial=0.0, code_reconstruction=0.0)
 Losses = list[dict[str, float]]
 
 
@@ -92,6 +95,22 @@ def test_a_stop_in_the_middle_changes_nothing(case, rooms_path, train_questions,
     losses += run(again, sources, tmp_path, workers=workers)
     assert losses == expected
     assert_same(bits(again), bits(unbroken))
+
+
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [
+        ({"material": True, "reconstruction": 0.0, "depth": 1.0}, "material"),
+        ({"lights": 3, "reconstruction": 0.0, "depth": 1.0}, "lights"),
+        ({"reconstruction": 0.0}, "losses"),
+        ({"batch": 5}, "devices"),
+    ],
+)
+def test_requests_that_teach_nothing_are_refused(change, where, rooms_path):
+    config = replace(PLAIN, **change)
+    source = room_source(rooms_path, config)
+    with refused(SpecError, where):
+        check_request(state_of(config).network, Sources(source), 2)
 
 
 def test_the_generators_step_leaves_the_critic_alone(rooms_path, tmp_path, monkeypatch):

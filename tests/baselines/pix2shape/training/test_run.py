@@ -18,6 +18,7 @@ from safetensors.torch import load_file
 from torch.utils.data import default_collate
 
 from baselines.pix2shape.network.config import LOSSES
+from baselines.pix2shape.network.model import Prior
 from baselines.pix2shape.training import run as module
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, load_weights
@@ -145,6 +146,17 @@ def test_a_finished_run_is_neither_trained_on_nor_replaced(rooms_path, folder, u
         train_run(folder, path, None, HERE)
 
 
+def test_classes_are_told(single_path, folder):
+    weights = train_run(folder, single_path, CONFIG, HERE, conditional=True)
+    model, card = load_weights(weights, METHOD)
+    assert card.classes == ("box", "sphere")
+    assert (model.config.networks.classes, model.config.networks.condition) == (2, 5)
+    again, how = folder.with_name("again"), {"conditional": True, "progress": killed_at(3)}
+    with pytest.raises(Killed):
+        train_run(again, single_path, CONFIG, HERE, **how)
+    assert same(train_run(again, single_path, None, HERE), weights)
+
+
 @pytest.mark.parametrize("adversarial", [0.0, 1.0])
 def test_the_prior_is_that_of_codes_where_no_critic_ties_them(rooms_path, folder, adversarial):
     config = replace(CONFIG, adversarial=adversarial)
@@ -160,6 +172,20 @@ def test_the_prior_is_that_of_codes_where_no_critic_ties_them(rooms_path, folder
     spread, covariance = float(codes.std()), prior.factor @ prior.factor.T
     torch.testing.assert_close(prior.mean, codes.mean(dim=0), atol=0.02 * spread, rtol=0)
     torch.testing.assert_close(covariance, codes.T.cov(), atol=0.05 * spread**2, rtol=0)
+
+
+def test_each_class_has_the_mean_of_its_codes():
+    """Classes with other means, one covariance; a class that is not seen has the mean of all."""
+    number = torch.Generator().manual_seed(0)
+    codes, told = torch.randn(3000, 4, generator=number), torch.eye(3)[torch.arange(3000) % 2]
+    codes[::2] += 5
+    prior, condition = Prior(4, 3), torch.cat([torch.rand(3000, 3), told], dim=1)
+    prior.fit(codes, condition)
+    found = prior(torch.randn(3000, 4, generator=number), condition)
+    for one in (codes, found):
+        torch.testing.assert_close(one[::2].mean(dim=0), torch.full((4,), 5.0), atol=0.1, rtol=0)
+        torch.testing.assert_close(one[1::2].T.cov(), torch.eye(4), atol=0.15, rtol=0)
+    torch.testing.assert_close(prior.mean[2], codes.mean(dim=0))
 
 
 @pytest.mark.parametrize("config", [CONFIG, None], ids=["new", "resumed"])
@@ -202,3 +228,13 @@ def test_a_run_of_rays_learns_from_matching_alone(near_path, folder, tmp_path):
     other = tmp_path / "other"
     train_run(other, blind, RAYS, HERE)
     assert same(folder / "weights.safetensors", other / "weights.safetensors")
+
+
+def test_rays_refuse_uneven_views_before_the_search(near_path, folder, tmp_path):
+    uneven = tmp_path / "uneven.h5"
+    shutil.copy(near_path, uneven)
+    with h5py.File(uneven, "r+") as file:
+        file["view_angle_degrees"][5] = 60
+    with refused(SpecError, str(uneven)):
+        train_run(folder, uneven, RAYS, HERE)
+    assert not folder.exists()

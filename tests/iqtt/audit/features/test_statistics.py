@@ -1,17 +1,16 @@
-"""Tests of what the audit measures: by hand, and angles against the generator's."""
+"""What the audit measures of pictures and reads of stored frames, by hand."""
 
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from polycubes import some_shapes
 
+from iqtt.audit.features.frames import stored_frames
 from iqtt.audit.features.statistics import measure, shape_statistics, silhouettes
 from iqtt.audit.proofs.shapes import compare_shapes
-from iqtt.audit.proofs.views import angles
 from iqtt.files.layout import NO_CUBE
-from iqtt.questions.views import draw_rotations, rotation_angle_degrees
-from iqtt.shapes.polycube import ROTATIONS, mirror, symmetries
+from iqtt.shapes.polycube import ROTATIONS, mirror
+from scenegen.common.rotations import rotation_matrix
 
 WHITE = np.array([255, 255, 255], np.uint8)
 
@@ -49,14 +48,6 @@ def test_spreads_of_a_rectangle_and_the_skew_of_a_step():
     assert moments[0, :2] == pytest.approx(np.sqrt((np.array([30, 10]) ** 2 - 1) / 12) / 40)
     assert moments[0, 2:] == pytest.approx([0, 0], abs=1e-4)
     assert (moments[2, 2:] > 0.01).all()
-
-
-def test_thumbnails_and_distances():
-    images = rectangles()
-    found = measured(images)
-    assert found["thumbnails"].mean(axis=2) == pytest.approx(found["image_brightness"])
-    apart = images[0, 0].astype(float) - images[0, 2]
-    assert found["pixel_distance"][0, 0, 2] == pytest.approx(np.sqrt((apart**2).mean()) / 255)
 
 
 def test_turning_and_mirroring_an_image_change_no_outline():
@@ -115,25 +106,32 @@ def test_numbers_of_shapes():
     assert second[0, :, 2].tolist() == [2, 1, 2]
 
 
-def test_angles_are_those_of_the_generator():
-    rng = np.random.default_rng(3)
-    rod = np.array([[[x, 0, 0] for x in range(5)]], np.int8)
-    shapes = np.concatenate([some_shapes(rng, 40, 5), rod.repeat(5, axis=0)])
-    others = np.roll(shapes, 5, axis=0)[:, None].repeat(2, axis=1)
-    views = draw_rotations(rng, (len(shapes), 4))
-    # The right answer's cubes are stored in another orientation than the reference's.
-    turn = ROTATIONS[rng.integers(24, size=len(shapes))].astype(int)
-    right = np.einsum("sij,snj->sni", turn, shapes)[:, None]
-    asked = np.concatenate([shapes[:, None], right, others], axis=1)
-    expected = [
-        rotation_angle_degrees(view[0], view[1] @ t, own)
-        for view, t, own in zip(views, turn, symmetries(shapes), strict=True)
-    ]
-    truth = {"world_from_shape": views, "angle_degrees": np.array(expected)}
-    spec = SimpleNamespace(min_angle_degrees=0.0)
-    one = Table(name="table", cubes=asked, truth=truth, spec=spec)
-    found = compare_shapes([one])
-    assert (found[0].place == 0).sum() >= 35
-    assert angles([one], found).status == "ok"
-    spec.min_angle_degrees = max(expected)
-    assert angles([one], found).status == "FAIL"
+CUBES = np.array([[2, 1, 0], [0, 0, 0], [1, 0, 0], [2, 0, 0], [NO_CUBE] * 3], np.int8)
+
+
+def about_x(degrees):
+    half = np.radians(degrees) / 2
+    return rotation_matrix(np.array([np.cos(half), np.sin(half), 0, 0]))
+
+
+def test_turns_and_orders():
+    ordered = CUBES[[1, 2, 3, 0, 4]]  # in the order of their coordinates but for the last
+    cubes = np.stack([CUBES, CUBES, ordered])[None]
+    views = np.stack([about_x(20), about_x(65), about_x(-10)])[None]
+    angle, same, own, place = stored_frames(cubes, views, np.array([True]))[0, :, :4].T
+    np.testing.assert_allclose(angle, [45, 30], atol=1e-5)
+    np.testing.assert_allclose(own, [65, 10], atol=1e-5)
+    assert same.tolist() == [4, 0]
+    assert place.tolist() == [0, 4]
+    between = stored_frames(cubes, views, np.array([True]))[0, 0, 4:13].reshape(3, 3)
+    np.testing.assert_allclose(between @ views[0, 0], views[0, 1], atol=1e-12)
+
+
+def test_a_common_frame_changes_what_is_told_in_a_known_way():
+    """The symmetric part is that of the turn between the frames, which pictures do not show."""
+    views = np.stack([np.eye(3), ROTATIONS[1], ROTATIONS[2]])[None]
+    cubes = np.stack([CUBES] * 3)[None]
+    found = stored_frames(cubes, views, np.array([True]))[0, :, 13:]
+    for k in (1, 2):
+        expected = (ROTATIONS[k] + ROTATIONS[k].T)[np.triu_indices(3)]
+        assert found[k - 1].tolist() == expected.tolist()

@@ -80,13 +80,6 @@ def test_fair_questions_are_seldom_accused():
     assert sum(accused) <= 2
 
 
-def test_forests_learn_nothing_from_noise():
-    found = [p for p in run_probes(fair(0)) if p.rule == "learned"]
-    assert len(found) == 7
-    correct, n = sum(p.correct for p in found), sum(p.n for p in found)
-    assert abs(correct / n - 1 / 3) < 4 * np.sqrt(2 / 9 / n)
-
-
 @pytest.mark.parametrize(
     ("name", "title", "factor"),
     [("brightness", "shape's brightness", 1.02), ("extent", "silhouette's extent", 0.95)],
@@ -163,17 +156,6 @@ def test_what_only_a_forest_sees():
     }
     (outlines,) = (p for p in probes if p.statistic == "outlines, by trees")
     assert (outlines.accuracy > 0.8, outlines.sees) == (True, OUTLINE)
-
-
-def test_marks_anywhere_are_seen_by_small_patterns():
-    evidence = fair(12, 600)
-    pictures = 0.5 + 0.1 * evidence.statistics["thumbnails"].reshape(600, 4, 32, 32)
-    for row, (y, x) in enumerate(np.random.default_rng(0).integers(4, 28, (600, 2))):
-        pictures[row, 1 + evidence.right[row], y, x - 2 : x + 2] = 1
-    flat = pictures.reshape(600, 4, -1)
-    assert ("small patterns of pixels", "learned", WITHOUT) in shortcuts(
-        changed(evidence, "thumbnails", flat)
-    )
 
 
 @pytest.mark.usefixtures("quick")

@@ -5,7 +5,6 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,8 +15,7 @@ from iqtt.files.make import make_split
 from iqtt.questions.specs import SplitSpec
 from iqtt.vlm.export import CIRCULAR, export_for_models, row_values
 from iqtt.vlm.harness import process_results
-from iqtt.vlm.reading import LETTERS
-from iqtt.vlm.rows import Asked, Row, vlm_rows
+from iqtt.vlm.rows import Asked, vlm_rows
 from metrics.intake.answers.harness_logs import is_log, read_returned, write_returned
 from metrics.scoring.evaluate import score
 from metrics.scoring.runs import Settings
@@ -27,7 +25,7 @@ TEXTS = ["The answer is {}.", "\\boxed{{{}}}", "I cannot see it.", "A or B"]
 
 
 @pytest.fixture(scope="module")
-def split(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def split(tmp_path_factory):
     spec = SplitSpec(
         seed=3, train=1, labeled=1, val=8, test=8, cubes=(5, 6), height=32, width=32,
         min_cube_pixels=2,
@@ -38,7 +36,7 @@ def split(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def rows(split: Path) -> list[Row]:
+def rows(split):
     return list(vlm_rows(Asked(split / "iqtt-val.h5", rotations=3, size=64)))
 
 
@@ -50,17 +48,14 @@ NO_REPLY = [
 ]  # fmt: skip
 
 
-def text_for(row: Row) -> str:
+def text_for(row):
     """Right where the question is even; else a refusal or two letters, in some order."""
     if row.question_index % 2 == 0:
         return TEXTS[row.rotation % 2].format(row.answer)
     return TEXTS[2 + row.question_index % 4 // 2]
 
 
-Text = Callable[[Row], str | None]
-
-
-def lmms_log(path: Path, rows: list[Row], text: Text = text_for) -> Path:
+def lmms_log(path, rows, text=text_for):
     lines = []
     for number, row in enumerate(rows):
         kept = process_results(row_values(row), [text(row) or ""])
@@ -69,7 +64,7 @@ def lmms_log(path: Path, rows: list[Row], text: Text = text_for) -> Path:
     return path
 
 
-def sheet(path: Path, rows: list[Row], text: Text = text_for) -> Path:
+def sheet(path, rows, text=text_for):
     heading = ["index", "question", "A", "B", "C", "prediction"]
     table = [
         [row.question_index + row.rotation * CIRCULAR, row.question, "picture A", "picture B",
@@ -91,59 +86,8 @@ def sheet(path: Path, rows: list[Row], text: Text = text_for) -> Path:
     return path
 
 
-INSPECT = """
-import json, sys
-import inspect_ai
-from inspect_ai.model import ModelOutput, ModelUsage, get_model
-folder, logs, texts = sys.argv[1], sys.argv[2], json.loads(sys.argv[3])
-
-def output(messages, *_):
-    text = texts[messages[-1].text]
-    if text == "error":
-        raise RuntimeError("the server is gone")
-    ended = text if text in ("content_filter", "max_tokens") else "stop"
-    out = ModelOutput.from_content("mockllm", text, stop_reason=ended)
-    return out.model_copy(update={"usage": ModelUsage(input_tokens=1, output_tokens=1)})
-
-from inspect_ai._util.registry import registry_lookup
-task = registry_lookup("task", "pix2shape_bench/iqtt")(folder)
-for sample in task.dataset:  # so that the model knows which row it sees
-    sample.input[0].content[-1].text = sample.id
-model = get_model("mockllm/model", custom_outputs=output)
-(log,) = inspect_ai.eval(task, model=model, log_dir=logs, display="none", fail_on_error=False)
-assert log.status == "success", log.error
-scores = log.results.scores if log.results else []
-print(json.dumps({n: m.value for s in scores for n, m in s.metrics.items()}))
-"""
-
-
-def inspect_run(path: Path, rows: list[Row], split: Path, text: Text) -> tuple[Path, dict]:
-    """Run Inspect as its users do, in a process of its own; return its log and its scores."""
-    pytest.importorskip("inspect_ai")
-    export_for_models(Asked(split / "iqtt-val.h5", rotations=3, size=64), path / "in")
-    texts = json.dumps({row.id: text(row) for row in rows})
-    done = subprocess.run(
-        [sys.executable, "-c", INSPECT, str(path / "in"), str(path), texts],
-        capture_output=True, text=True, check=False, cwd=path,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr[:3000]
-    return next(path.glob("*.eval")), json.loads(done.stdout.splitlines()[-1])
-
-
-def inspect_log(path: Path, rows: list[Row], split: Path) -> Path:
-    log, scores = inspect_run(path, rows, split, text_for)
-    assert (scores["accuracy"], scores["circular_accuracy"], scores["unparsed"]) == (0.5, 0.5, 0.5)
-    assert np.isnan(scores["skill"])  # no floor is known of these settings
-    assert 0 < scores["stderr"] < 0.5
-    kinds = {row.facts["kind"] for row in rows}
-    assert kinds < set(scores)
-    return log
-
-
 @pytest.mark.slow
-def test_lmms_eval_runs_the_task_and_its_samples_come_back(
-    split: Path, rows: list[Row], tmp_path: Path
-) -> None:
+def test_lmms_eval_runs_the_task_and_its_samples_come_back(split, rows, tmp_path):
     python = python_with("lmms_eval")
     export_for_models(Asked(split / "iqtt-val.h5", rotations=3, size=64), tmp_path / "in")
     done = subprocess.run(
@@ -165,39 +109,6 @@ def test_lmms_eval_runs_the_task_and_its_samples_come_back(
     assert scores.unread == 0.0
 
 
-@pytest.mark.slow
-def test_samples_that_failed_in_inspect_are_no_answers(
-    split: Path, rows: list[Row], tmp_path: Path
-) -> None:
-    ended = {0: "error", 1: "content_filter", 2: "max_tokens"}
-    path, scores = inspect_run(
-        tmp_path, rows, split, lambda row: ended.get(row.question_index, row.answer)
-    )
-    assert scores["unparsed"] == pytest.approx(6 / 21)  # of the samples that were scored
-    log = read_returned(path)
-    assert set(log.failures) == {(0, 0), (0, 1), (0, 2)}
-    outcomes = {answer.question: answer.outcome for answer in log.answers}
-    assert outcomes == {1: "refused", 2: "cut off"} | dict.fromkeys(range(3, 8), "answered")
-
-    from inspect_ai.log import EvalSampleLimit, ProvenanceData, read_eval_log, write_eval_log
-
-    whole = read_eval_log(str(path))
-    by_id = {sample.id: sample for sample in whole.samples or ()}
-    by_id["3-0"].limit = EvalSampleLimit(type="time", limit=1)
-    by_id["4-0"].invalidation = ProvenanceData(author="a", reason="wrong picture")
-    by_id["5-0"].output.choices = []
-    write_eval_log(whole, str(tmp_path / "limits.json"))
-    places = {(0, 0), (0, 1), (0, 2), (3, 0), (4, 0), (5, 0)}
-    assert set(read_returned(tmp_path / "limits.json").failures) == places
-
-    for sample in by_id.values():
-        sample.error = by_id["0-0"].error
-    write_eval_log(whole, str(tmp_path / "failed.json"))
-    with pytest.raises(FileFormatError) as info:
-        read_returned(tmp_path / "failed.json")
-    assert "24 of 24" in info.value.found
-
-
 VLMEVALKIT = """
 import os, sys
 folder, out, texts = sys.argv[1], sys.argv[2], __import__("json").loads(sys.argv[3])
@@ -215,7 +126,7 @@ for name in ("iqtt-val", "iqtt-val_circular"):
 """
 
 
-def python_with(package: str) -> str:
+def python_with(package):
     """Return the Python of the environment that has a harness, which `make harnesses` makes."""
     own = Path(__file__).parents[4] / f".venv-{package}" / "bin" / "python"
     python = str(own) if own.exists() else os.environ.get("HARNESS_PYTHON", sys.executable)
@@ -225,7 +136,7 @@ def python_with(package: str) -> str:
     return python
 
 
-def vlmevalkit_log(path: Path, rows: list[Row], split: Path) -> Path:
+def vlmevalkit_log(path, rows, split):
     """Run VLMEvalKit with a model that is told what to say; return its sheet of all rows."""
     python = python_with("vlmeval")
     export_for_models(Asked(split / "iqtt-val.h5", rotations=3, size=64), path / "in")
@@ -243,23 +154,14 @@ def vlmevalkit_log(path: Path, rows: list[Row], split: Path) -> Path:
     return path / "told_iqtt-val_circular.xlsx"
 
 
-SLOW_LOGS = {"inspect": inspect_log, "vlmevalkit": vlmevalkit_log}
+LOGS = {"samples.jsonl": lmms_log, "out.tsv": sheet, "out.xlsx": sheet}
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [
-        "samples.jsonl", "out.tsv", "out.xlsx",
-        *(pytest.param(kind, marks=pytest.mark.slow) for kind in SLOW_LOGS),
-    ],
-)  # fmt: skip
-def test_answers_come_back_from_every_harness(
-    split: Path, rows: list[Row], tmp_path: Path, kind: str
-) -> None:
-    if kind in SLOW_LOGS:
-        log = SLOW_LOGS[kind](tmp_path, rows, split)
-    else:
-        log = (lmms_log if kind.endswith("jsonl") else sheet)(tmp_path / kind, rows)
+@pytest.mark.parametrize("kind", [*LOGS, pytest.param("vlmevalkit", marks=pytest.mark.slow)])
+def test_answers_come_back_from_every_harness(split, rows, tmp_path, kind):
+    log = (
+        LOGS[kind](tmp_path / kind, rows) if kind in LOGS else vlmevalkit_log(tmp_path, rows, split)
+    )
     assert is_log(log)
     out = tmp_path / "p.h5"
     write_returned(out, split / "iqtt-val.h5", read_returned(log), method="m")
@@ -274,9 +176,7 @@ def test_answers_come_back_from_every_harness(
 
 
 @pytest.mark.parametrize("name", ["log.jsonl", "out.tsv", "out.xlsx"])
-def test_a_row_that_failed_has_no_answer(
-    split: Path, rows: list[Row], tmp_path: Path, name: str
-) -> None:
+def test_a_row_that_failed_has_no_answer(split, rows, tmp_path, name):
     failed = ["1-0", "2-1", "3-0", "3-1", "3-2", "4-1", "4-2", "5-2"]
     nothing = dict(zip(failed, NO_REPLY, strict=True))
     write = lmms_log if name.endswith("jsonl") else sheet
@@ -292,22 +192,13 @@ def test_a_row_that_failed_has_no_answer(
     assert (len(scores.ids), scores.unread, scores.comparable) == (6, 0.0, False)
     circle = scores.by_circle["every order"]["iqtt_accuracy"]
     assert (circle.n, circle.value) == (3, 1.0)  # the other three were not answered in all orders
-
-
-@pytest.mark.parametrize("name", ["log.jsonl", "out.tsv", "out.xlsx"])
-def test_a_log_in_which_all_rows_failed_is_refused(
-    rows: list[Row], tmp_path: Path, name: str
-) -> None:
-    write = lmms_log if name.endswith("jsonl") else sheet
-    path = write(tmp_path / name, rows, lambda _: "Failed to obtain answer via API.")
+    path = write(tmp_path / f"all-{name}", rows, lambda _: "Failed to obtain answer via API.")
     with pytest.raises(FileFormatError) as info:
         read_returned(path)
     assert f"{len(rows)} of {len(rows)}" in info.value.found
 
 
-def test_a_row_that_was_answered_at_another_try_is_an_answer(
-    rows: list[Row], tmp_path: Path
-) -> None:
+def test_a_row_that_was_answered_at_another_try_is_an_answer(rows, tmp_path):
     path, again = tmp_path / "log.jsonl", tmp_path / "again.jsonl"
     lmms_log(path, rows, lambda row: "" if row.rotation else row.answer)
     path.write_bytes(path.read_bytes() + lmms_log(again, rows[1:2]).read_bytes())
@@ -317,9 +208,7 @@ def test_a_row_that_was_answered_at_another_try_is_an_answer(
     assert len(log.answers) + len(log.failures) == len(rows)
 
 
-def test_lmms_eval_keeps_refusals_and_texts_before_its_filters(
-    rows: list[Row], tmp_path: Path
-) -> None:
+def test_lmms_eval_keeps_refusals_and_texts_before_its_filters(rows, tmp_path):
     path = lmms_log(tmp_path / "log.jsonl", rows[:3], lambda row: "B")
     lines = [json.loads(line) for line in path.read_text().splitlines()]
     lines[0]["filtered_resps"] = "[SAFETY_BLOCKED:finish_reason is 2]"
@@ -330,26 +219,24 @@ def test_lmms_eval_keeps_refusals_and_texts_before_its_filters(
     assert not log.failures
 
 
-def returned_score(log: Path, questions: Path) -> None:
-    out = log.with_suffix(".h5")
-    write_returned(out, questions, read_returned(log))
-    score([out], questions)
-
-
-def test_a_log_of_other_questions_or_with_two_answers_is_refused(
-    split: Path, rows: list[Row], tmp_path: Path
-) -> None:
+def test_a_log_of_other_questions_or_with_two_answers_is_refused(split, rows, tmp_path):
     val = split / "iqtt-val.h5"
     refused = {
         "other digest": [replace(row, digest="0" * 64) for row in rows],
         "no such question": [replace(row, question_index=8) for row in rows],
         "twice": [rows[0], rows[0]],
         "not all": rows[3:],
+        **{f"order {n}": [replace(rows[0], rotation=n), *rows[1:]] for n in (-1, 3, 7)},
     }
     for name, changed in refused.items():
-        path = lmms_log(tmp_path / f"{name}.jsonl", changed)
+        path, out = lmms_log(tmp_path / f"{name}.jsonl", changed), tmp_path / f"{name}.h5"
+
+        def score_returned(path=path, out=out):
+            write_returned(out, val, read_returned(path), method="m")
+            score([out], val)
+
         with pytest.raises(SceneGenError):
-            returned_score(path, val)
+            score_returned()
 
 
 @pytest.mark.parametrize(
@@ -361,16 +248,16 @@ def test_a_log_of_other_questions_or_with_two_answers_is_refused(
         ("a.jsonl", b"[1]\n"),
     ],
 )  # fmt: skip
-def test_a_damaged_log_is_one_clear_error(tmp_path: Path, name: str, content: bytes) -> None:
+def test_a_damaged_log_is_one_clear_error(tmp_path, name, content):
+    (tmp_path / "answers.csv").write_text("index,prediction\n0,B\n1,C\n")
+    assert not is_log(tmp_path / "answers.csv")
     path = tmp_path / name
     path.write_bytes(content)
     with pytest.raises(FileFormatError):
         read_returned(path)
 
 
-def test_a_question_is_circularly_right_only_in_every_order(
-    split: Path, rows: list[Row], tmp_path: Path
-) -> None:
+def test_a_question_is_circularly_right_only_in_every_order(split, rows, tmp_path):
     log = lmms_log(tmp_path / "log.jsonl", rows)
     right = [text_for(row) for row in rows]
     lines = [json.loads(line) for line in log.read_text().splitlines()]
@@ -388,42 +275,7 @@ def test_a_question_is_circularly_right_only_in_every_order(
     }  # fmt: skip
 
 
-def test_letters_lean(split: Path, rows: list[Row], tmp_path: Path) -> None:
-    constant = [row for row in rows if row.rotation == 0]
-    lines = [
-        {"doc_id": 0, "doc": {"question_index": row.question_index, "rotation": 0,
-                              "choices": list(LETTERS[:3]), "digest": row.digest},
-         "filtered_resps": "C"}
-        for row in constant
-    ]  # fmt: skip
-    log = tmp_path / "c.jsonl"
-    log.write_text("".join(json.dumps(line) + "\n" for line in lines))
-    write_returned(tmp_path / "p.h5", split / "iqtt-val.h5", read_returned(log), method="m")
-    scores = score([tmp_path / "p.h5"], split / "iqtt-val.h5")
-    assert {name: group.n for name, group in scores.answer_groups["by_answer"].items()} == {"2": 8}
-    assert np.isclose(
-        scores.metrics["iqtt_accuracy"].value, np.mean([row.answer == "C" for row in constant])
-    )
-
-
-def test_a_list_of_answers_is_no_log(tmp_path: Path) -> None:
-    path = tmp_path / "answers.csv"
-    path.write_text("index,prediction\n0,B\n1,C\n")
-    assert not is_log(path)
-
-
-@pytest.mark.parametrize("rotation", [-1, 3, 7])
-def test_an_order_that_was_never_asked_is_refused(
-    split: Path, rows: list[Row], tmp_path: Path, rotation: int
-) -> None:
-    log = lmms_log(tmp_path / "log.jsonl", [replace(rows[0], rotation=rotation), *rows[1:]])
-    with pytest.raises(FileFormatError):
-        returned_score(log, split / "iqtt-val.h5")
-
-
-def test_what_bench_ask_kept_before_it_ran_inspect_is_read(
-    split: Path, rows: list[Row], tmp_path: Path
-) -> None:
+def test_what_bench_ask_kept_before_it_ran_inspect_is_read(split, rows, tmp_path):
     heading = {
         "format": "pix2shape-bench/asked", "model": "tiny", "temperature": 0.0, "max_tokens": 9,
         "layout": "composed", "size": 64, "control": False, "digest": rows[0].digest,

@@ -1,12 +1,8 @@
-"""Answers of people become submissions; a participant answers in a real browser."""
+"""Answers of people become submissions."""
 
 import copy
 import json
-import threading
 from collections.abc import Callable
-from functools import partial
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -25,7 +21,7 @@ ROWS = [9, 2, 17, 4]
 
 
 @pytest.fixture
-def saved(quiz_split: Path) -> dict[str, Any]:
+def saved(quiz_split):
     """Return what the page saves of a participant who answered four questions with 0, 1, 2, 0."""
     with h5py.File(quiz_split / "iqtt-test.h5") as file:
         digest = file.attrs["fingerprint"]
@@ -40,22 +36,24 @@ def saved(quiz_split: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def written(path: Path, content: Any) -> Path:
+def written(path, content):
     path.write_text(content if isinstance(content, str) else json.dumps(content))
     return path
 
 
-def test_each_person_is_a_run(quiz_split: Path, saved: dict[str, Any], tmp_path: Path) -> None:
+def test_each_person_is_a_run(quiz_split, saved, tmp_path):
     test, key = (quiz_split / f"iqtt-test{end}.h5" for end in ("", "-answers"))
     with h5py.File(key) as file:
         right = file["answers"][:].reshape(-1)
-    files = []
     for person, wrong in enumerate((0, 0, 2)):  # two who answer alike are two people
         content = copy.deepcopy(saved) | {"participant": f"{person:016x}"}
         for i, answer in enumerate(content["answers"]):
             answer["answer"] = int(right[answer["question"]] + (i < wrong)) % 3
-        files.append(written(tmp_path / f"{person}.json", content))
-    made = import_quiz(files, test, tmp_path / "people")
+        written(tmp_path / f"{person}.json", content)
+    words = ["import", "--quiz", str(tmp_path / "*.json"), "--data", str(test)]
+    done = CliRunner().invoke(cli.bench, [*words, "--out", str(tmp_path / "people")])
+    assert done.exit_code == 0, done.output
+    made = sorted((tmp_path / "people").iterdir())
     assert [path.name for path in made] == [f"{person:016x}.h5" for person in range(3)]
     with open_predictions(made[2]) as opened:
         assert (opened.method, opened.run) == ("people", f"{2:016x}")
@@ -67,7 +65,7 @@ def test_each_person_is_a_run(quiz_split: Path, saved: dict[str, Any], tmp_path:
     assert scores.ids.tolist() == sorted(ROWS)
 
 
-def drop(content: dict[str, Any], *names: str) -> None:
+def drop(content, *names):
     for name in names:
         del content[name]
 
@@ -94,9 +92,7 @@ EDITS: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
 
 
 @pytest.mark.parametrize("name", EDITS)
-def test_a_file_that_is_not_as_saved_is_refused(
-    quiz_split: Path, saved: dict[str, Any], tmp_path: Path, name: str
-) -> None:
+def test_a_file_that_is_not_as_saved_is_refused(quiz_split, saved, tmp_path, name):
     edit, place = EDITS[name]
     edit(saved)
     path = written(tmp_path / "a.json", saved)
@@ -107,14 +103,12 @@ def test_a_file_that_is_not_as_saved_is_refused(
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", '{"format": NaN}', "\xff", "[" * 9000])
-def test_broken_json_is_refused(tmp_path: Path, text: str) -> None:
+def test_broken_json_is_refused(tmp_path, text):
     with pytest.raises(QuizError):
         read_answers(written(tmp_path / "a.json", text))
 
 
-def test_a_person_comes_once_and_quizzes_do_not_mix(
-    quiz_split: Path, saved: dict[str, Any], tmp_path: Path
-) -> None:
+def test_a_person_comes_once_and_quizzes_do_not_mix(quiz_split, saved, tmp_path):
     first = written(tmp_path / "a.json", saved)
     other = copy.deepcopy(saved) | {"participant": "1" * 16}
     other["answers"][0]["question"] = 0
@@ -123,103 +117,3 @@ def test_a_person_comes_once_and_quizzes_do_not_mix(
         files = [first, written(tmp_path / "b.json", second)]
         with pytest.raises(QuizError):
             import_quiz(files, quiz_split / "iqtt-test.h5", tmp_path / "people")
-
-
-@pytest.fixture
-def site(tmp_path: Path) -> Any:
-    """Serve a folder, and take what is posted to it: status 500 at first, then 200."""
-    posted: list[bytes] = []
-
-    class Handler(SimpleHTTPRequestHandler):
-        def do_POST(self) -> None:
-            posted.append(self.rfile.read(int(self.headers["Content-Length"])))
-            self.send_response(500 if len(posted) == 1 else 200)
-            self.send_header("Content-Length", "0")
-            self.end_headers()
-
-        def log_message(self, *_: Any) -> None:
-            pass
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=tmp_path))
-    thread = threading.Thread(target=server.serve_forever, args=(0.05,))
-    thread.start()
-    yield f"http://127.0.0.1:{server.server_address[1]}", posted
-    server.shutdown()
-    thread.join()
-    server.server_close()
-
-
-def test_a_participant_in_a_browser(
-    visit: Any, site: Any, quiz_split: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With the keyboard alone, on a phone's width: 1 for practice, 5 that count, all of them 2.
-
-    Every screen is checked by axe-core once; a reload in the middle goes on.
-    """
-    monkeypatch.chdir(tmp_path)
-    address, posted = site
-
-    def run(group: Any, *words: object) -> str:
-        result = CliRunner().invoke(group, list(map(str, words)), catch_exceptions=False)
-        assert result.exit_code == 0, result.output
-        return result.output
-
-    few = ("--questions", 5, "--practice", 1, "--post", "/answers", "--contact", "<b>lab</b>")
-    run(cli.iqtt, "quiz", quiz_split / "iqtt-test.h5", *few)
-    seen = visit(f"{address}/quiz.html", width=360, height=740)
-    page = seen.page
-
-    def ready(title: str) -> None:
-        seen = "(buttons.length === 0 || shown !== null)"  # of quiz.js
-        page.wait_for_function(f"t => document.title.startsWith(t) && {seen}", arg=title)
-
-    def check() -> None:
-        assert seen.violations() == []
-        assert page.evaluate("document.documentElement.scrollWidth") == 360
-
-    check()
-    assert "<b>lab</b>" in page.inner_text("main")
-    for key in ("Tab", "Space", "Tab", "Enter"):
-        page.keyboard.press(key)
-    ready("Practice question 1 of 1")
-    page.keyboard.press("2")
-    page.wait_for_function("() => document.title.includes('ight: it is answer')")
-    check()
-    page.keyboard.press("Enter")
-    for i in range(5):
-        ready(f"Question {i + 1} of 5")
-        if i == 0:
-            check()
-        if i == 2:
-            page.reload()
-            ready("Question 3 of 5")
-        if i == 3:
-            for _ in range(2):
-                page.keyboard.press("Tab")
-            page.keyboard.press("Enter")
-        else:
-            page.keyboard.press("2" if i % 2 else "b")
-    page.wait_for_selector("text=could not be sent")
-    seen.errors.clear()  # of status 500
-    check()
-    page.click("button:text('Try again')")
-    page.wait_for_selector("text=You can close this page")
-    with page.expect_download() as download:
-        page.click("text=Save my answers")
-    (tmp_path / "answers").mkdir()
-    path = tmp_path / "answers" / download.value.suggested_filename
-    download.value.save_as(path)
-    assert posted == [path.read_bytes()] * 2
-    page.click("text=Hand over")
-    ready("Which one is it")
-
-    answers = read_answers(path)
-    assert [answer.answer for answer in answers.answers] == [1] * 5
-    assert [answer.times_shown for answer in answers.answers] == [1, 1, 2, 1, 1]
-    assert all(0 <= answer.seconds < 60 for answer in answers.answers)
-    rows = [answer.question for answer in answers.answers]
-    assert rows != sorted(rows) or len(answers.practice) == 1
-    run(cli.bench, "import", "--quiz", "answers/*.json", "--data", quiz_split / "iqtt-test.h5",
-        "--out", "people")  # fmt: skip
-    with open_predictions(tmp_path / "people" / f"{answers.participant}.h5") as opened:
-        assert opened.answers.tolist() == [1] * 5

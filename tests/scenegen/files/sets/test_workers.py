@@ -122,14 +122,6 @@ def test_what_is_done_again_is_done_alone(tmp_path):
     assert running[1] == 1
 
 
-def test_memory_is_blamed_where_the_kernel_says_so(monkeypatch):
-    counts = iter(range(10))
-    monkeypatch.setattr(pool, "oom_kills", lambda: next(counts))
-    with pytest.raises(LostWorkerError) as lost:
-        list(in_processes(os._exit, [1], 1))
-    assert "memory" in lost.value.hint
-
-
 def test_where_no_processes_are_to_be_had_workers_are_named(monkeypatch):
     """As where no memory is left; the output is not blamed."""
     monkeypatch.setattr(pool.subprocess, "Popen", Mock(side_effect=OSError(errno.ENOMEM, "No")))

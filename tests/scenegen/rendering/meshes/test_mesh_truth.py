@@ -108,14 +108,16 @@ def hard_meshes(root: Path) -> None:
         mesh.export(root / name / "0.ply")
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("preset", FAMILY_PRESETS)
-def test_rooms_of_families_agree(preset: str) -> None:
+@pytest.mark.parametrize(
+    ("preset", "rooms"),
+    [("shapenet", 4), *(pytest.param(name, 40, marks=pytest.mark.slow) for name in FAMILY_PRESETS)],
+)
+def test_rooms_of_families_agree(preset: str, rooms: int) -> None:
     spec = replace(preset_spec(preset), min_visible_pixels=0)
     objects = objects_of(spec)
-    wrong = list(wrong_pixels(spec, objects, some_scenes(spec, objects, ROOMS)))
-    assert len(wrong) == ROOMS
-    assert sum(wrong) <= 1e-5 * ROOMS * spec.height * spec.width
+    wrong = list(wrong_pixels(spec, objects, some_scenes(spec, objects, rooms)))
+    assert len(wrong) == rooms
+    assert sum(wrong) <= 1e-5 * rooms * spec.height * spec.width
 
 
 @pytest.mark.slow

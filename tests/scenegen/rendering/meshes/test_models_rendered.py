@@ -19,7 +19,7 @@ def all_bits(spec, scenes, objects):
     return [bits(truth, row) for row in range(len(scenes))]
 
 
-@pytest.mark.parametrize("source", ["families", "folder"])
+@pytest.mark.parametrize("source", ["families", pytest.param("folder", marks=pytest.mark.slow)])
 def test_an_image_is_the_same_alone_and_in_any_company(source, model_folder):
     """A model's place in the Mitsuba scene depends on the batch, but no pixel may."""
     spec = FAMILIES if source == "families" else folder_spec(model_folder)

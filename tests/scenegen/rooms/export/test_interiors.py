@@ -10,7 +10,6 @@ from PIL import Image
 
 from scenegen import open_rooms
 from scenegen.objects.catalogue import objects_of
-from scenegen.rooms.export.folder import export_folder
 from scenegen.rooms.export.single import export_paths, export_room
 
 DIAGONAL = 8.37  # metres, of the largest room
@@ -36,22 +35,6 @@ def test_the_deepest_room_fits_into_png_files(tmp_path, deep):
     assert steps[0, 1] == about["depth"]["nothing"] == 0
     known = np.isfinite(deep.depth)
     np.testing.assert_allclose(steps[known] * 1e-3, deep.depth[known], rtol=0, atol=0.501e-3)
-
-
-@pytest.mark.parametrize(
-    ("form", "depth", "files"),
-    [("nerfstudio", "scene-000000/depth", "scene-000000/transforms.json"),
-     ("bop", "test/000000/depth", "camera.json")],
-)  # fmt: skip
-def test_folders_tell_the_step_of_depth(tmp_path, interior_path, form, depth, files):
-    with open_rooms(interior_path) as rooms:
-        folder = export_folder(rooms, form, tmp_path / form)
-        room = rooms[0]
-    about = json.loads((folder / files).read_text())
-    metres = about.get("depth_unit_scale_factor") or about["depth_scale"] / 1000
-    steps = np.asarray(Image.open(folder / depth / "000000.png"))
-    known = np.isfinite(room.depth)
-    np.testing.assert_allclose(steps[known] * metres, room.depth[known], rtol=0, atol=0.501e-3)
 
 
 def test_meshes_are_those_of_furniture(tmp_path, interior_path):

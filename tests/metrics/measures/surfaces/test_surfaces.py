@@ -1,16 +1,16 @@
-"""Angles between normals, and normals from depth on surfaces whose normals are known."""
+"""Normals from depth on known surfaces, their angles, and distances of point clouds."""
+
+import sys
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
-from metrics.measures.surfaces.normals import (
-    angular_errors_degrees,
-    normal_scores,
-    normals_from_depth,
-)
+from metrics.measures.surfaces.chamfer_hausdorff import nearest_distances, point_scores
+from metrics.measures.surfaces.normals import angular_errors_degrees, normals_from_depth
 from scenegen.camera import back_project, pixel_directions
 
 FOV = 20.0
@@ -19,10 +19,6 @@ FOV = 20.0
 def plane_depth(normal, distance, shape=(24, 32), fov=FOV):
     """Planar depth of the plane normal . point = -distance."""
     return -distance / (pixel_directions(*shape, fov) @ np.asarray(normal))
-
-
-def unit(vector):
-    return np.asarray(vector, dtype=float) / np.linalg.norm(vector)
 
 
 @pytest.mark.parametrize("degrees", [0.0, 1e-9, 1e-5, 10.0, 90.0, 179.999999, 180.0])
@@ -54,18 +50,6 @@ def test_only_pixels_with_a_finite_true_direction_are_scored():
     assert len(angular_errors_degrees(good, true)) == 1
 
 
-def test_scores_by_hand():
-    scores = normal_scores(np.array([0.0, 11.25, 20.0, 30.0]))
-    assert scores == {
-        "normal_mean_degrees": 15.3125,
-        "normal_median_degrees": 15.625,
-        "normal_rmse_degrees": pytest.approx(np.sqrt((11.25**2 + 400.0 + 900.0) / 4.0)),
-        **dict.fromkeys(("normal_within_5", "normal_within_7.5", "normal_within_11.25"), 0.25),
-        "normal_within_22.5": 0.75,
-        "normal_within_30": 0.75,
-    }
-
-
 @given(st.floats(0.0, 70.0), st.floats(0.0, 360.0), st.floats(0.1, 100.0))
 def test_a_plane_has_its_normal_everywhere(tilt, turn, distance):
     normal = Rotation.from_euler("xz", [tilt, turn], degrees=True).apply([0.0, 0.0, 1.0])
@@ -74,14 +58,6 @@ def test_a_plane_has_its_normal_everywhere(tilt, turn, distance):
     angles = angular_errors_degrees(normals, np.broadcast_to(normal, normals.shape))
     assert angles.max() < 1e-8
     assert on_surface.all() or tilt > 60.0
-
-
-def test_rooms_face_the_viewer_and_edges_do_not_smear(room_depth):
-    depth = room_depth(1, 64)
-    normals, on_surface = normals_from_depth(depth, FOV)
-    assert ((normals * back_project(depth, FOV)).sum(axis=-1) < 0.0).all()
-    assert np.linalg.norm(normals, axis=-1) == pytest.approx(np.ones(depth.shape))
-    assert on_surface.mean() > 0.99
 
 
 def test_a_step_in_depth_leaves_both_sides_flat():
@@ -120,3 +96,51 @@ def test_equal_eigenvalues_leave_no_empty_normal():
     for _ in range(20):
         normals, _ = normals_from_depth(rng.uniform(0.1, 3.0, (16, 16)), FOV)
         assert np.linalg.norm(normals, axis=-1) == pytest.approx(np.ones((16, 16)))
+
+
+def test_by_hand():
+    # Predicted points at 0 and 3 on a line, true points at 1 and 10.
+    line = np.array([[1.0, 0.0, 0.0]])
+    nearest = nearest_distances(np.array([[0.0], [3.0]]) * line, np.array([[1.0], [10.0]]) * line)
+    assert nearest.forward.tolist() == [1.0, 2.0]
+    assert nearest.reverse.tolist() == [1.0, 7.0]
+    assert point_scores(nearest, [1.5, 2.5]) == {
+        "accuracy_distance": 1.5,
+        "completeness_distance": 4.0,
+        "chamfer": 5.5,
+        "chamfer_squared": 27.5,
+        "hausdorff": 7.0,
+        "hausdorff_forward": 2.0,
+        "hausdorff_reverse": 7.0,
+        "hausdorff_95": pytest.approx(6.7),
+        "f_score_1.5": 0.5,
+        "f_score_2.5": pytest.approx(2 * 1.0 * 0.5 / 1.5),
+    }
+
+
+@pytest.mark.parametrize("backend", ["auto", "scipy"])
+def test_degenerate_clouds(backend):
+    same = np.ones((500, 3))
+    line = np.linspace(0, 1, 500)[:, None] * [1.0, 0.0, 0.0]
+    large = np.array([[1e99, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    for a, b in ((same, same[:1]), (line, same), (large, same[:2]), (line, line + 1e-300)):
+        found = nearest_distances(a, b, backend)
+        for one_way, matrix in ((found.forward, cdist(a, b)), (found.reverse, cdist(b, a))):
+            assert one_way == pytest.approx(matrix.min(axis=1), rel=1e-12)
+
+
+def test_without_pykdtree_scipy_takes_over(monkeypatch):
+    a, b = np.random.default_rng(3).standard_normal((2, 40, 3))
+    expected = nearest_distances(a, b)
+    monkeypatch.setitem(sys.modules, "pykdtree.kdtree", None)
+    assert nearest_distances(a, b).forward == pytest.approx(expected.forward, rel=1e-12)
+    with pytest.raises(ImportError):
+        nearest_distances(a, b, "pykdtree")
+
+
+def test_rooms_face_the_viewer_and_edges_do_not_smear(room_depth):
+    depth = room_depth(1, 64)
+    normals, on_surface = normals_from_depth(depth, FOV)
+    assert ((normals * back_project(depth, FOV)).sum(axis=-1) < 0.0).all()
+    assert np.linalg.norm(normals, axis=-1) == pytest.approx(np.ones(depth.shape))
+    assert on_surface.mean() > 0.99
