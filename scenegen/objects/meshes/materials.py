@@ -21,8 +21,10 @@ OPTION = re.compile(r"-([a-z]+)((?: +(?:[-+.\de]+|on|off|[rgbmlz]))+) +")  # of 
 JSON = 0x4E4F534A  # "JSON", the type of a GLB file's first part
 WRAPS = {33071: CLAMP, 33648: MIRROR}  # of samplers; others repeat
 TRANSFORM, GLOSSY = "KHR_texture_transform", "KHR_materials_pbrSpecularGlossiness"
-ROUGH = {"diffuseTexture": "baseColorTexture", "diffuseFactor": "baseColorFactor",
-         "specularGlossinessTexture": "metallicRoughnessTexture"}  # in place of glossy names  # fmt: skip
+ROUGH = {  # in place of names of glossy materials
+    "diffuseTexture": "baseColorTexture", "diffuseFactor": "baseColorFactor",
+    "specularGlossinessTexture": "metallicRoughnessTexture",
+}  # fmt: skip
 DARK, SHINY = 0.04, 0.3  # linear: diffuse below, specular above, where a glossy material is metal
 # Extensions of materials that are read, or leave the colour as it is; others are told.
 SAME = "unlit", "ior", "anisotropy", "clearcoat", "dispersion", "emissive_strength"
@@ -45,7 +47,7 @@ class MeshMaterial(NamedTuple):
     roughness: float = ROUGHNESS
     metallic: float = 0.0
     transform: dict[str, Any] | None = None
-    wrap: tuple[int, int] = (REPEAT, REPEAT)
+    wrap: tuple[int, ...] = (REPEAT, REPEAT)
 
     def moved(self, uv: Array) -> Array:
         """Return texture coordinates, (V, 2), rows counted from below, as the transform tells."""
@@ -83,9 +85,8 @@ def mtl_material(told: Any, is_linear: bool) -> MeshMaterial:
         color = np.asarray(told.kwargs["kd"], np.float64)[:3].clip(0, 1)
         return MeshMaterial(factor=color if is_linear else decoded(told.diffuse[:3] / 255))
     said = dict(OPTION.findall(image.info.get("file_path", "")))
-    scale, offset = (
-        np.array(said.get(*x).split()[:2], float) * [1, 1] for x in (("s", "1"), ("o", "0"))
-    )
+    scale, offset = (np.array((said.get(k) or d).split()[:2], float) for k, d in ("s1", "o0"))
+    scale, offset = np.broadcast_to(scale, 2), np.broadcast_to(offset, 2)
     # With rows from above, v becomes 1 - s (1 - v) - o.
     moved = {"scale": scale, "offset": [offset[0], 1 - scale[1] - offset[1]]}
     wrap = CLAMP if said.get("clamp", "").strip() == "on" else REPEAT
@@ -104,21 +105,24 @@ def glb_material(told: Any, unread: Unread) -> MeshMaterial:
     means = [
         np.ones(3) if x is None else np.asarray(x).mean((0, 1)) / 255 for x in (picture, other)
     ]
-    numbers = [ROUGHNESS, 0.0]
-    for i, value in enumerate((told.roughnessFactor, told.metallicFactor)):
-        if value is not None or other is not None:
-            value = 1.0 if value is None else value
-            numbers[i] = min(max(float(value * means[1][1 + i]), 0.0), 1.0)
+    roughness, metallic = (
+        otherwise if value is None and other is None
+        else float(np.clip((1.0 if value is None else value) * mean, 0.0, 1.0))
+        for value, mean, otherwise in (
+            (told.roughnessFactor, means[1][1], ROUGHNESS), (told.metallicFactor, means[1][2], 0.0)
+        )
+    )  # fmt: skip
     if (gloss := about["gloss"]) is not None:
         # By default nothing is diffuse, which no writer means who tells a diffuse colour alone.
         specular = np.array(gloss.get("specularFactor", [float(other is not None)] * 3))
         has_gloss = other is not None and "A" in images[1].getbands()
         share = np.asarray(images[1].getchannel("A")).mean() / 255 if has_gloss else 1.0
+        roughness = 1.0 - gloss.get("glossinessFactor", 1.0) * float(share)
         diffuse = decoded(means[0]) * (1.0 if factor is None else factor)
-        metal = diffuse.max() < DARK and (decoded(means[1]) * specular).max() > SHINY
-        numbers = [1.0 - gloss.get("glossinessFactor", 1.0) * float(share), float(metal)]
-        picture, factor = (other, specular) if metal else (picture, factor)
-    return MeshMaterial(picture, factor, *numbers, about["transform"], tuple(about["wrap"]))
+        metallic = float(diffuse.max() < DARK and (decoded(means[1]) * specular).max() > SHINY)
+        picture, factor = (other, specular) if metallic else (picture, factor)
+    wrap, transform = tuple(about["wrap"]), about["transform"]
+    return MeshMaterial(picture, factor, roughness, metallic, transform, wrap)
 
 
 def plain_glb(data: bytes, unread: Unread) -> bytes:
@@ -148,7 +152,7 @@ def plain_glb(data: bytes, unread: Unread) -> bytes:
         transform = own.get(TRANSFORM, {})
         sets.append(transform.get("texCoord", base.get("texCoord", 0)))
         told = {"picture": name if base else "", "transform": transform, "gloss": gloss}
-        told["wrap"] = [WRAPS.get(sampler.get(key), REPEAT) for key in ("wrapS", "wrapT")]
+        told["wrap"] = [WRAPS.get(sampler.get(key, 0), REPEAT) for key in ("wrapS", "wrapT")]
         material["name"] = json.dumps(told)
         for kind in {*extensions, *own} - QUIET:
             unread.setdefault(kind, f"has {kind}, which is not read")
