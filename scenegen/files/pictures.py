@@ -23,6 +23,7 @@ LARGEST_SIDE = {".webp": 16_383, ".jpg": 65_500, ".jpeg": 65_500, ".gif": 65_535
 READ = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp", ".ppm", ".pgm")  # endings
 ORIENTATION = 0x0112  # of EXIF
 SWAPPED = (5, 6, 7, 8)  # its values that swap the sides
+PHOTOMETRIC = 262  # tag of TIFF files, 0 where 0 is white
 
 
 @contextmanager
@@ -106,9 +107,11 @@ def shares_of(picture: "Image", side: int) -> NDArray[np.float32]:
 
 def _turned(picture: "Image") -> "Image":
     """Return a picture turned as its EXIF data say; of 16 bits a channel in the mode "I"."""
+    is_negative = getattr(picture, "tag_v2", {}).get(PHOTOMETRIC) == 0  # which Pillow leaves so
     picture = upright(picture)
     if picture.mode.startswith("I"):  # of which `convert` to bytes would cut off what is white
         picture = picture.convert("I")
+        picture = picture.point(lambda value: value * -1 + 65_535) if is_negative else picture
     if picture.mode == "F" or (picture.mode == "I" and np.asarray(picture).max() > 65_535):
         raise ValueError("numbers of 32 bits, expected 8 or 16")
     return picture

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image, TiffImagePlugin
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.pictures import (
@@ -100,6 +100,15 @@ def test_16_bits_of_grey_become_8(tmp_path, name, picture):
     for read in (picture_size, read_picture):
         with pytest.raises(FileFormatError):
             read(tmp_path / name, 5)
+
+
+def test_negatives_of_16_bits_are_developed(tmp_path):
+    told = TiffImagePlugin.ImageFileDirectory_v2()
+    told[262] = 0
+    Image.fromarray(65_535 - GREY).save(tmp_path / "a.tiff", tiffinfo=told)
+    with Image.open(tmp_path / "a.tiff") as picture:
+        assert picture.tag_v2[262] == 0
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.tiff", 6)[..., 0], GREY >> 8)
 
 
 def test_numbers_without_a_white_are_no_picture(tmp_path):
