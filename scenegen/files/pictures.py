@@ -62,11 +62,6 @@ def picture_size(path: Path, most: int) -> tuple[int, int]:
         return picture.size if swapped else picture.size[::-1]
 
 
-def is_turned(picture: "Image") -> bool:
-    """Return whether a picture has EXIF data that turn it."""
-    return bool(picture.getexif().get(ORIENTATION, 1) != 1)
-
-
 def read_picture(path: Path, most: int) -> NDArray[np.uint8]:
     """Return a picture as it is to be seen, (H, W, 3) sRGB bytes, turned as its EXIF data say.
 
