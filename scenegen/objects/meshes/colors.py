@@ -81,7 +81,7 @@ def read_triangles(
     materials: dict[int, MeshMaterial] = {}
     try:
         if suffix == ".glb":
-            data, lying = plain_glb(data, unread)
+            data = plain_glb(data, unread)
         elif suffix == ".obj":
             data = utf8(data)
             if LARGE_COLOR.search(data, 0, HEAD):
@@ -98,18 +98,17 @@ def read_triangles(
             if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
                 placed = trimesh.transform_points(mesh.triangles.reshape(-1, 3), matrix)
                 triangles.append(placed.reshape(-1, 3, 3))
-                told, uv, made = mesh.visual, None, None
-                if told.kind == "texture":
-                    key = id(told.material)
-                    if key not in materials:
-                        materials[key] = (
-                            glb_material(told.material, lying[int(told.material.name)], unread)
-                            if suffix == ".glb"
-                            else mtl_material(told.material, getattr(resolver, "is_linear", False))
-                        )
-                    made = materials[key]
-                    uv = None if told.uv is None else made.moved(told.uv)
-                pieces.append(Piece(mesh, made, uv))
+                told = getattr(mesh.visual, "material", None)
+                if told is not None and id(told) not in materials:
+                    is_linear = getattr(resolver, "is_linear", False)
+                    materials[id(told)] = (
+                        glb_material(told, unread) if suffix == ".glb"
+                        else mtl_material(told, is_linear)
+                    )  # fmt: skip
+                made, uv = materials.get(id(told)), getattr(mesh.visual, "uv", None)
+                pieces.append(
+                    Piece(mesh, made, made.moved(uv) if made and uv is not None else None)
+                )
     except BadMeshError:
         raise
     except Exception as error:  # trimesh raises what its parsers meet
