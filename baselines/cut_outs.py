@@ -14,7 +14,6 @@ All know where floor and walls are, as `empty-room` does.
 
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,19 +22,13 @@ from scipy import ndimage
 
 from baselines.picture import outline_mask, residual
 from metrics.measures.relief import empty_room
-from metrics.prediction_writer import RoomPredictionWriter
-from metrics.submissions.layout import Shown
 from scenegen.camera import pixel_directions, pixel_size, transform_points
-from scenegen.common.errors import SpecError
-from scenegen.common.names import check_choice
 from scenegen.common.threads import one_thread
 from scenegen.rooms.reader import RoomsFile, radiance_of
 
 Array = NDArray[Any]
-Progress = Callable[[int, int], Any]  # rows done since the last call, in all
 DepthOf = Callable[[RoomsFile, int], Array]  # planar depth (H, W) of a row
 
-NAMES = ("cut-out", "picture-outline", "balls", "outline-regression", "outline-relief", "nearest")
 LEARNING = ("outline-regression", "outline-relief", "nearest")
 # Scene units: between the median (0.166) and the mean (0.182) of the relief of objects in images of
 # `--preset shapes --views 0,5,35,55,80 --n 300 --seed 7 --size 64`.
@@ -44,44 +37,20 @@ MOST_IMAGES = 1500  # of training rooms, spread evenly
 CELLS = 16  # a side, of the pictures that `nearest` compares
 
 
-@one_thread()
-def write_cut_outs(
-    name: str,
-    data: str | Path,
-    out: str | Path,
-    *,
-    train: str | Path | None = None,
-    overwrite: bool = False,
-    progress: Progress = lambda done, total: None,
-) -> None:
-    """Write the submission of one of NAMES for a rooms file.
-
-    Raises SpecError for an unknown name, and where training rooms are missing, not used by the
-    baseline, or made with the test file's seed; else as `RoomsFile`.
-    """
-    check_choice("baseline", name, NAMES)
-    if (name in LEARNING) != (train is not None):
-        expected = "rooms to learn from" if name in LEARNING else f"none, as {name} learns nothing"
-        raise SpecError("train", "none" if train is None else train, expected)
-    shown: Shown = "first_view" if name == "balls" else "scored_view"
-    with RoomsFile(data) as rooms:
-        depth_of = _learned(name, rooms, train) if train is not None else WITHOUT_TRAINING[name]
-        how: dict[str, Any] = {"method": name, "shown": shown, "overwrite": overwrite}
-        with RoomPredictionWriter(out, data, **how) as submission:
-            for row in range(len(rooms)):
-                submission.add(row, depth_of(rooms, row))
-                progress(1, len(rooms))
-
-
 def _camera(rooms: RoomsFile, row: int) -> tuple[Array, float]:
     """Return world_from_camera and the vertical field of view of a row."""
     matrix = rooms.read("camera/world_from_camera", row)
     return matrix, float(rooms.read("camera/fov_y_degrees", row))
 
 
-def _empty(rooms: RoomsFile, row: int) -> Array:
+def empty(rooms: RoomsFile, row: int) -> tuple[Array, Array]:
+    """Return depth and normals of the room of a row without its objects."""
     size = rooms.spec.height, rooms.spec.width
-    return empty_room(*_camera(rooms, row), *size, rooms.room_size(row))[0]
+    return empty_room(*_camera(rooms, row), *size, rooms.room_size(row))
+
+
+def _empty(rooms: RoomsFile, row: int) -> Array:
+    return empty(rooms, row)[0]
 
 
 def _mask(rooms: RoomsFile, row: int) -> Array:
@@ -149,20 +118,13 @@ WITHOUT_TRAINING: dict[str, DepthOf] = {
 }
 
 
-def _learned(name: str, rooms: RoomsFile, train: str | Path) -> DepthOf:
+def learned(name: str, training: RoomsFile) -> DepthOf:
     """Return what a baseline of LEARNING predicts after it has seen training rooms."""
-    with RoomsFile(train) as training:
-        if training.spec.seed == rooms.spec.seed:
-            found = f"the test file's seed, {rooms.spec.seed}, and so its cameras and places"
-            raise SpecError("train", found, "another seed", "render training rooms with another")
-        sizes = [f"images of {file.spec.height}x{file.spec.width}" for file in (training, rooms)]
-        if name == "nearest" and sizes[0] != sizes[1]:
-            raise SpecError("train", sizes[0], f"{sizes[1]}, as in the test file")
-        count = min(len(training), MOST_IMAGES)
-        rows = np.unique(np.linspace(0, len(training) - 1, count).astype(int))
-        if name == "nearest":
-            return partial(_nearest, *_pictures(training, rows))
-        seen = [_outline_pixels(training, row) for row in rows.tolist()]
+    count = min(len(training), MOST_IMAGES)
+    rows = np.unique(np.linspace(0, len(training) - 1, count).astype(int))
+    if name == "nearest":
+        return partial(_nearest, *_pictures(training, rows))
+    seen = [_outline_pixels(training, row) for row in rows.tolist()]
     features = np.concatenate([features for _, features, _ in seen])
     relief = np.concatenate([relief[mask] for mask, _, relief in seen])
     known = np.isfinite(relief)

@@ -1,6 +1,7 @@
 """Shared fixtures: tiny files, damaged copies, folders of meshes, the commands."""
 
 import re
+import shlex
 import shutil
 import signal
 import sys
@@ -10,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from named_options import command_named, command_of, named_options
 
 TINY = {"height": 32, "width": 32, "min_visible_pixels": 3, "seed": 3}
 
@@ -20,6 +22,28 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 if sys.platform != "win32" and signal.getsignal(signal.SIGHUP) == signal.SIG_IGN:
     signal.signal(signal.SIGHUP, lambda *_: None)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _messages_name_options_that_there_are():
+    """Look at all messages of commands that tests call: an option is one of the command.
+
+    Or it is one of the last command that the message names before it, or was given.
+    """
+    invoke = CliRunner.invoke
+
+    def looked_at(runner, group, args=None, **more):
+        result = invoke(runner, group, args, **more)
+        given = shlex.split(args) if isinstance(args, str) else list(args or ())
+        for option, before in named_options(result.stderr):
+            command = command_named(before) or command_of(group, given)
+            known = {name for p in command.params for name in (*p.opts, *p.secondary_opts)}
+            assert option in {*known, *given, "--help"}, result.stderr
+        return result
+
+    CliRunner.invoke = looked_at
+    yield
+    CliRunner.invoke = invoke
 
 
 @pytest.fixture(autouse=True)

@@ -4,10 +4,10 @@
     batch.py      images, and what the model is told about them; made by rooms.py and questions.py
     weights.py    the card of weights, and the weights that come with the package
     pictures.py   pictures of training, samples, interpolations and rotations
-    matching/     relief by search, which training may take for the truth
+    matching.py   relief by search, which training may take for the truth
     training/     losses, steps, and a run
     predict.py    submissions
-    commands.py   the command line `pix2shape`, with drawing_commands.py
+    commands.py   the command line `pix2shape`
 
 Each may import those above it. Start reading in `network/model.py`, then `training/steps.py`.
 docs/pix2shape.md says where the paper leaves something open and what is done here.

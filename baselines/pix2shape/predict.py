@@ -20,12 +20,11 @@ from baselines.pix2shape.network.surfels import extrapolated, normals_from_depth
 from baselines.pix2shape.questions import check_background
 from baselines.pix2shape.training.losses import squared_distances
 from baselines.pix2shape.weights import open_weights
-from baselines.training.baseline import Answers, Views
+from baselines.training.baseline import Answers, RowsDone, Views, answer_questions, predict_rooms
 from baselines.training.images import Array, check_reducible, row_batches
 from baselines.training.machine import chosen_device
 from baselines.training.questions import is_question_file
 from baselines.training.rooms import camera_poses, input_views, room_images
-from baselines.training.submission import Progress, answer_questions, predict_rooms
 from iqtt import QuestionsFile
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
@@ -45,7 +44,7 @@ def predict_file(
     run: str = "",
     method: str | None = None,
     overwrite: bool = False,
-    progress: Progress = lambda done, total: None,
+    progress: RowsDone = lambda done, total: None,
 ) -> None:
     """Write a submission for rooms or questions.
 

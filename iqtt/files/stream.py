@@ -54,6 +54,7 @@ class QuestionStream(RowStream):
         rank: int | None = None,
         world_size: int | None = None,
         on_device: bool = False,
+        drop_last: bool = False,
     ) -> None:
         """Take a kind of questions, a request, or several with the share of rows that each gets.
 
@@ -67,7 +68,7 @@ class QuestionStream(RowStream):
         """
         variant = select_variant(device)
         check_choice("split", split, SPLITS)
-        makers, asked = [], []
+        makers, asked, told = [], [], list[str]()
         kept = [n for n in ON_DEVICE if n in fields and on_device and variant != "scalar_rgb"]
         for request, share in requests_and_shares(kind_or_spec, SplitSpec).items():
             if isinstance(request, str):
@@ -79,10 +80,11 @@ class QuestionStream(RowStream):
             asked.append(chosen_columns(fields, known))
             common_columns(asked)  # before pools are made, which takes a second
             pools = make_pools(replace(spec, with_depth="depth" in fields))
+            told.append(f"{split} {spec.to_json()}")
             makers.append((partial(_rows, pools, split, asked[0], kept, device, batch), share))
         super().__init__(
             asked[0], makers, batch, start, stop, workers, rank, world_size,
-            on_device=dict.fromkeys(kept, _stacked),
+            1, dict.fromkeys(kept, _stacked), drop_last, told,
         )  # fmt: skip
 
 

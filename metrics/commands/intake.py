@@ -246,7 +246,8 @@ def _print_hints(out: str, data: Any) -> None:
 @click.option("--dtype", help="Handed to the model's load(), such as bfloat16.")
 @click.option("--python", type=InputPath(), metavar="PROGRAM",
               help="The Python that runs the model, of another environment, such as"
-              " ~/envs/da3/bin/python. It needs NumPy and nothing of this project.")
+              " ~/envs/da3/bin/python. It needs Python 3.9 or newer, NumPy and nothing of this"
+              " project.")
 @click.option("--batch", type=click.IntRange(1, 4096),
               help="Images for each call of the model's infer_batch [default: 8]; handed to its"
               " load(), too.")
@@ -271,13 +272,19 @@ def run(
     intrinsics: bool, curve: str, exposure: float, key: str | None, frame: Any, missing: Any,
     keep: str | None, timeout: float | None, traceback: bool, overwrite: bool,
 ) -> None:
-    """Run a model on every image of a file and write its predictions.
+    r"""Run a model on every image of a file and write its predictions.
 
     MODEL is a public depth model by its name, hf:NAME for what transformers loads, moge:NAME for
-    MoGe; or a Python file. That holds infer(image, intrinsics=None), which returns a dict with
-    depth, disparity or points; for questions infer(reference, answers), which returns an index or
-    scores. It may be a class, what load() returns, or a Baseline of MoGe's evaluation, whose load
-    gets what stands after --. docs/your-model.md has examples.
+    MoGe; or a Python file. That holds infer(image, intrinsics=None), which returns a dict with one
+    of the keys below; for questions infer(reference, answers), which returns an index or scores. It
+    may be a class, what load() returns, or a Baseline of MoGe's evaluation, whose load gets what
+    stands after --. docs/your-model.md has examples.
+
+    \b
+    depth_metric, points_metric: in metres, in scene units of open rooms
+    depth_scale_invariant, points_scale_invariant: times an unknown factor
+    depth_affine_invariant, points_affine_invariant: and plus an unknown term
+    disparity_affine_invariant: 1 / depth, times a factor and plus a term
 
     A killed run loses nothing: the same command goes on where it stopped.
     """

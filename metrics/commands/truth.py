@@ -63,6 +63,7 @@ def truth(
     from metrics.measured.writer import write_measured
     from scenegen.files.new_file import check_writable
 
+    hints: list[str] = []
     check_writable(Path(out), overwrite)
     if bool(layout) != bool(data) or bool(images) != bool(depth) or bool(layout) == bool(images):
         raise click.UsageError("give --images and --depth, or --layout and --data")
@@ -90,10 +91,12 @@ def truth(
             read_matrices(intrinsics) if intrinsics else {}, read_groups(groups) if groups else {},
             normals, mask,
         )
-        rows = truth_of_files(images, depth, reading, beside)
+        rows = truth_of_files(images, depth, reading, beside, hints.append)
     with progress_bar(len(rows), "image") as bar:
         write_measured(out, rows, source=source, licence=licence, overwrite=overwrite,
                        progress=bar.update)
+    for text in hints[:1]:
+        print_line(f"hint: {text} (in {len(hints)} of {len(rows)} images)", err=True)
     print_line(f"{out}: {len(rows)} images in {len({row.group for row in rows})} groups")
     command = ["bench", "run", "MODEL", "--data", out, "--out", "predictions.h5"]
     print_line(f"now: {shlex.join(command)}")

@@ -160,7 +160,7 @@ def numbered(paths: Sequence[Path]) -> Mapping[Key, Path]:
         key = tuple(int(words[1::2][place]) for place in places)
         if key in by_key:
             found = f"{by_key[key].name} and {path.name}, both numbered {_text(key)}"
-            raise MatchError(path.parent, found, "each number once")
+            raise MatchError(path.parent, found, "each number once", ORDER)
         by_key[key] = path
     return by_key
 

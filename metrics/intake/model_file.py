@@ -31,11 +31,25 @@ PACKAGES = {  # what to install, by the module that is missing
     "transformers": "transformers torch torchvision",
     "moge": "dlr-moge torch",
 }
-# For `python -c`: runs a file without its folder among those of imports; -P is of Python 3.11.
-BOOT = (
-    "import runpy, sys; sys.path = [p for p in sys.path if p];"
-    " runpy.run_path(sys.argv[1], run_name='__main__')"
-)
+READY, NEEDED = "ready", "a Python of 3.9 or newer with NumPy"
+# For `python -c`, of any version: says whether it can run the runner, and runs it without its
+# folder among those of imports; -P is of Python 3.11.
+BOOT = """
+import os, sys
+said = "ready"
+if sys.version_info < (3, 9):
+    said = "Python " + sys.version.split()[0]
+else:
+    try:
+        import numpy
+    except Exception as error:
+        said = "no NumPy (%s)" % " ".join(str(error).split())
+os.write(1, (said + "\\n").encode("ascii", "replace"))
+if said == "ready":
+    import runpy
+    sys.path = [p for p in sys.path if p]
+    runpy.run_path(sys.argv[1], run_name="__main__")
+"""
 WEIGHTS = (".pt", ".pth", ".ckpt", ".safetensors", ".onnx", ".bin")
 PIPE_BYTES = 1 << 20
 PATIENCE = 10.0  # seconds that a model has to end by itself, after the last row
@@ -76,15 +90,16 @@ class Model:
         self.named = name.startswith(LIBRARIES)
         self.name, self.path = name, DOORS if self.named else Path(name)
         self.sha256, self.calls = _digest(self.path, name if self.named else None), deque[str]()
-        self._timeout, self._note = timeout, note
-        command = [str(python or sys.executable), "-c", BOOT, model_runner.__file__]
+        self._timeout, self._note, self._said = timeout, note, ""
+        self._program = str(python or sys.executable)
+        command = [self._program, "-c", BOOT, model_runner.__file__]
         # Of its own session, so that Ctrl-C is not told to it, and what it starts ends with it.
         try:
             self._process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True
             )
         except OSError as error:
-            found = f"{command[0]}: {error.strerror}"
+            found = f"{self._program}: {error.strerror}"
             raise ModelError("--python", found, "a Python that starts") from error
         for pipe in (self._process.stdin, self._process.stdout):
             _widen(pipe)
@@ -110,7 +125,7 @@ class Model:
         if not self.named:
             return self.path.stem
         name, revision = self.name.partition(":")[2], self.provenance.get("revision", "")
-        name = Path(name).name if Path(name).exists() else name
+        name = Path(name).resolve().name if Path(name).exists() else name
         return f"{name}@{revision[:7]}" if revision else name
 
     def ask_provenance(self) -> None:
@@ -149,6 +164,10 @@ class Model:
 
     def _answer(self, message: bytes) -> bytes:
         assert self._process.stdout is not None
+        if self._said != READY:  # before anything that a process might not take
+            self._said = self._process.stdout.readline(300).decode("ascii", "replace").strip()
+            if self._said != READY:
+                raise EOFError
         self._tell(message)
         return model_runner.read(self._process.stdout)
 
@@ -197,6 +216,10 @@ class Model:
     def _lost(self, place: str) -> ModelError:
         code = self._process.poll()
         how = "closed its pipes" if code is None else f"ended with {ended(code)}"
+        if self._said != READY:
+            tells = self._said.startswith(("no NumPy", "Python "))
+            found = f"{self._program}: {self._said if tells else how}"
+            return ModelError("--python", found, NEEDED)
         hint = "memory may be short" if code == -getattr(signal, "SIGKILL", 9) else ""
         return ModelError(place, f"a model whose process {how}", "", hint)
 

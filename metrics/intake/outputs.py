@@ -229,7 +229,7 @@ def _refuse_zeros(geometry: Geometry, name: str) -> None:
     """Raise OutputError for depths of 0: the camera's own place, or a file's mark for no value."""
     zeros = np.count_nonzero(geometry.geometry == 0.0)
     if geometry.kind == "depth" and geometry.alignment != "scale_shift" and zeros:
-        hint = "where 0 stands for no value, say --invalid 0, or let the model return NaN"
+        hint = "if 0 stands for no value, bench import --invalid 0, or let the model return NaN"
         raise OutputError(name, f"0 at {zeros} pixels", "depths above 0", hint)
 
 

@@ -77,7 +77,11 @@ class Reading:
         `rays` returns the directions of the pixels of an image of a height and a width, z = -1.
         """
         values = image_of(stored, self.kind, vectors=self.kind == "points")
-        invalid = np.isin(values, self.invalid)
+        marks = np.asarray(self.invalid)
+        if stored.dtype.kind == "f":  # in which a mark such as 255.996 has fewer digits
+            with np.errstate(over="ignore"):
+                marks = marks.astype(stored.dtype)
+        invalid = np.isin(values, marks)
         values = np.where(
             invalid.all(axis=-1, keepdims=True) if values.ndim == 3 else invalid,
             np.nan,
@@ -103,6 +107,7 @@ def geometry_reader(
     normals: str | None = None,
     masks: str | None = None,
     confidence: str | None = None,
+    look: Callable[[str, Array, Array], None] = lambda where, stored, known: None,
 ) -> tuple[GeometryReader, str]:
     """Return what reads the geometry of each row from files, and in words how rows have them.
 
@@ -113,8 +118,9 @@ def geometry_reader(
         depth, normals, masks, confidence: patterns of files, as `folders.row_reader`; a mask is 0
             where the geometry has no value.
         names, keys: of the rows, as `folders.match_files`.
+        look: is called with each file's place, its numbers, and where they are taken for depth.
 
-    Raises as `row_reader`; the reader ArrayFileError and OutputError.
+    Raises as `row_reader` and `look`; the reader ArrayFileError and OutputError.
     """
     rows = partial(row_reader, names=names, keys=keys, by=reading.match)
     read, how = rows(depth, array=reading.array, vectors=reading.kind == "points")
@@ -137,6 +143,7 @@ def geometry_reader(
             if read_mask is not None:
                 place, values = read_mask(row)
                 geometry = geometry.within(image_of(values, "mask") > 0.0, place)
+            look(where, stored, np.isfinite(geometry.geometry))
         except OutputError as error:
             raise error.inside(where) from error
         return geometry, where

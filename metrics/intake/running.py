@@ -204,21 +204,24 @@ def _ask(
     if not model.takes_batches:
         wait_for_it = model.begin("infer", f"row {rows[0]}", *images, *cameras)
         return lambda: {rows[0]: wait_for_it()}
-    where = f"rows {rows[0]} to {rows[-1]}"
-    sizes = {image.shape for image in images}
-    if len(sizes) > 1:
-        found = f"images of {len(sizes)} sizes"
-        raise OutputError(f"{model.name}: {where}", found, "one", "say --batch 1")
-    batch = (np.stack(images), *([np.stack(cameras)] if cameras else []))
-    wait_for_all = model.begin("infer_batch", where, *batch)
+    runs = [list(run) for _, run in itertools.groupby(range(len(rows)), lambda i: images[i].shape)]
+    waits = []
+    for run in runs:  # of pictures of one size
+        numbers = [rows[i] for i in run]
+        some = [np.stack([of[i] for i in run]) for of in (images, cameras) if of]
+        where = f"rows {numbers[0]} to {numbers[-1]}"
+        waits.append((numbers, where, model.begin("infer_batch", where, *some)))
 
     def wait() -> dict[int, Any]:
-        outputs = wait_for_all()
-        if not isinstance(outputs, list) or len(outputs) != len(rows):
-            count = f" of {len(outputs)}" if isinstance(outputs, list) else ""
-            place, found = f"{model.name}: {where}: infer_batch", type(outputs).__name__ + count
-            raise OutputError(place, found, f"a list of {len(rows)} dicts")
-        return dict(zip(rows, outputs, strict=True))
+        returned = dict[int, Any]()
+        for numbers, where, wait_for_all in waits:
+            outputs = wait_for_all()
+            if not isinstance(outputs, list) or len(outputs) != len(numbers):
+                count = f" of {len(outputs)}" if isinstance(outputs, list) else ""
+                place, found = f"{model.name}: {where}: infer_batch", type(outputs).__name__ + count
+                raise OutputError(place, found, f"a list of {len(numbers)} dicts")
+            returned |= zip(numbers, outputs, strict=True)
+        return returned
 
     return wait
 

@@ -2,7 +2,8 @@
 
 import csv
 import json
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -25,6 +26,11 @@ Array = NDArray[Any]
 # What the median of a room's or a street's depth in metres is multiplied by, and how to say it.
 GUESSES = ((1000.0, "--unit mm"), (256.0, "--scale 1/256"), (100.0, "--unit cm"), (1.0, "--unit m"))
 USUAL = (0.5, 60.0)  # metres, of such a median
+# Numbers that stand for no value: a few that many pixels share, at so many times the depth of all
+# others. That is certain beyond rooms and streets, and for the largest number of 16 bits or more.
+MOST_MARKS, CERTAIN, LIKELY = 3, 10.0, 2.0
+FARTHEST, NEAREST, ENDLESS = 30.0, 0.01, 1e5  # metres
+USUAL_MARK = re.compile(r"(255|65504|65535|9{3,}|10{3,})(\.0)?")
 
 
 @dataclass(frozen=True)
@@ -43,8 +49,17 @@ class Beside:
     masks: str | None = None
 
 
-def truth_of_files(images: str, depth: str, reading: Reading, beside: Beside) -> list[Source]:
+def truth_of_files(
+    images: str,
+    depth: str,
+    reading: Reading,
+    beside: Beside,
+    hint: Callable[[str], Any] = lambda text: None,
+) -> list[Source]:
     """Return a row for each picture of a pattern, with the depth that has its name or number.
+
+    Rows raise TruthError where numbers are certain to stand for no value; `hint` is called with a
+    line where they may.
 
     Raises MatchError for a picture without truth, two truths for one, or none; TruthError for names
     in `beside` that no picture has; and as `folders.files_of`.
@@ -52,8 +67,9 @@ def truth_of_files(images: str, depth: str, reading: Reading, beside: Beside) ->
     pictures = files_of(images, READ)
     names = [path.name for path in pictures]
     read, _ = geometry_reader(
-        reading, depth, names, lambda: [list(numbered(pictures))], beside.normals, beside.masks
-    )
+        reading, depth, names, lambda: [list(numbered(pictures))], beside.normals, beside.masks,
+        partial(_look_for_marks, reading, hint),
+    )  # fmt: skip
     matrices = _of_each(pictures, beside.matrices, "intrinsics")
     groups = _of_each(pictures, beside.groups, "groups")
     sizes = [picture_size(path, MAX_PIXELS) for path in pictures]
@@ -65,12 +81,43 @@ def truth_of_files(images: str, depth: str, reading: Reading, beside: Beside) ->
         if reading.kind == "disparity":
             truth = np.divide(1.0, truth, out=np.full_like(truth, np.nan), where=truth > 0.0)
         normal = None if normal is None else normal * FRAMES[reading.frame]
-        return Measured(read_picture(path, MAX_PIXELS), truth, matrix, normal, path)
+        return Measured(read_picture(path, MAX_PIXELS), truth, matrix, normal)
 
     return [
         Source(path.name, groups[row] or path.name, sizes[row], partial(measured, row))
         for row, path in enumerate(pictures)
     ]
+
+
+def _look_for_marks(
+    reading: Reading, hint: Callable[[str], Any], where: str, stored: Array, known: Array
+) -> None:
+    """Raise TruthError, or give a hint, where numbers among depth stand for no value."""
+    values = image_of(stored, "depth")
+    known &= (values > 0.0) & (values <= np.finfo(np.float32).max)
+    numbers, counts = np.unique(values[known], return_counts=True)
+    highest = np.iinfo(stored.dtype).max if stored.dtype.kind in "iu" else 0
+    for step in (1, -1):  # the largest numbers, and the smallest
+        sizes = (numbers * reading.scale)[::step] ** step  # ascending
+        is_far = (step > 0) != (reading.kind == "disparity")
+        beyond = FARTHEST if is_far else 1.0 / NEAREST
+        for k in range(1, min(MOST_MARKS, len(sizes)) + 1):
+            marks, count = numbers[::step][-k:], int(counts[::step][-k:].sum())
+            away = sizes[-k] / (sizes[-k - 1] if len(sizes) > k else ENDLESS / CERTAIN)
+            is_beyond, is_highest = sizes[-k] > beyond, marks.max() == highest
+            texts = [str(stored.dtype.type(mark)) for mark in sorted(marks)]
+            is_usual = is_highest or all(map(USUAL_MARK.fullmatch, texts))
+            found = f"{' and '.join(texts)} at {count:,} pixels, far from all other numbers"
+            says = f"say {' '.join(f'--invalid {text}' for text in texts)}"
+            if count <= k and away < 1e4:
+                continue
+            if away >= (LIKELY if is_highest and highest > 255 else CERTAIN) and (
+                is_beyond or is_highest
+            ):
+                raise TruthError(where, found, "depth; it stands for no value", says)
+            if away >= LIKELY and (is_usual or (is_beyond and away >= 1.5 * LIKELY)):
+                hint(f"{where}: {found}; if it stands for no value, {says}")
+                return
 
 
 def _of_each(pictures: Sequence[Path], by_name: Mapping[str, Any], what: str) -> list[Any]:

@@ -5,6 +5,7 @@ hand: the tests write files of these layouts. What a set leaves open about its c
 """
 
 import json
+import os
 import re
 import struct
 from collections.abc import Callable, Iterable, Iterator
@@ -37,8 +38,13 @@ Array = NDArray[Any]
 Measure = Callable[..., tuple[Array, Array | None]]  # from files to depth and matrix
 STEPS = 65533  # of MoGe's depth, between near and far
 INFINITE = 65535
+PICTURES = (".png", ".jpg", ".jpeg")  # of KITTI, whose pictures many keep as JPEG
 SINTEL_TAG = 202021.25  # begins files of depth and of cameras
-FRAME = re.compile(r"(\d{4}_\d\d_\d\d_drive_\d{4}_sync)\D(?:.*\D)?(\d{10})(?!\d)")
+SINTEL_SKY = 1e9  # Blender's depth of what is no surface is 1e10
+DRIVE = r"(\d{4}_\d\d_\d\d_drive_\d{4}_sync)"
+FRAME = re.compile(DRIVE + r"\D(?:.*\D)?(\d{10})(?!\d)")
+SHORT_FRAME = re.compile(DRIVE + r"(?:\S*[\\/]|[\s,]+)(\d{1,9})(?!\d)")  # of lists alone
+LEFT, RIGHT = "2", "3"  # numbers of the colour cameras
 
 
 class Layout(NamedTuple):
@@ -54,7 +60,7 @@ def read_layout(name: str, data: Path, split: Path | None = None) -> list[Source
 
     Raises TruthError and FileFormatError, naming the file; OSError.
     """
-    return list(LAYOUTS[name].rows(data, split))
+    return list(LAYOUTS[name].rows(Path(os.path.abspath(data)), split))  # whose name is no dot
 
 
 def _pinhole(fx: float, fy: float, cx: float, cy: float) -> Array:
@@ -83,11 +89,16 @@ def _other(path: Path, what: str) -> Path:
     return path
 
 
+def _below(folder: Path, path: Path) -> str:
+    """Return the path of a folder within another one; of that itself its name."""
+    return folder.name if path == folder else path.relative_to(folder).as_posix()
+
+
 def _row(name: str, group: str, picture: Path, measure: Measure, *files: Path) -> Source:
     """Return a row of a picture, whose depth and matrix `measure` reads from files."""
 
     def read() -> Measured:
-        return Measured(read_picture(picture, MAX_PIXELS), *measure(*files), file=picture)
+        return Measured(read_picture(picture, MAX_PIXELS), *measure(*files))
 
     return Source(name, group, picture_size(picture, MAX_PIXELS), read)
 
@@ -106,9 +117,8 @@ def moge(folder: Path, _split: Path | None) -> Iterator[Source]:
         picture = next((p for p in (place / "image.jpg", place / "image.png") if p.is_file()), None)
         if picture is None:
             raise TruthError(place, "no image.jpg", "a picture beside its depth.png")
-        name = place.relative_to(folder).as_posix()
-        group = place.parent.relative_to(folder).as_posix()
-        yield _row(name, name if group == "." else group, picture, _of_moge, place)
+        name = _below(folder, place)
+        yield _row(name, name.rpartition("/")[0] or name, picture, _of_moge, place)
 
 
 def _of_moge(place: Path) -> tuple[Array, Array]:
@@ -192,44 +202,55 @@ def kitti(folder: Path, split: Path | None) -> Iterator[Source]:
 
     A folder holds DRIVE/proj_depth/groundtruth/image_02/FRAME.png, at any depth, and the pictures
     of the raw data, DATE/DRIVE/image_02/data/FRAME.png, with DATE/calib_cam_to_cam.txt. Depth is
-    256 metres a step, 0 where nothing was measured. Groups are drives.
+    256 metres a step, 0 where nothing was measured. Groups are drives. Lists may name frames of the
+    right camera, image_03, and leave out zeros before a number: `DATE/DRIVE 69 r`.
     """
-    depths, pictures = dict[tuple[str, str], Path](), dict[tuple[str, str], Path]()
-    for path in _matching(folder, "*/image_02/*.png"):
-        match = FRAME.search(path.as_posix())
-        if match is not None and "velodyne_raw" not in path.parts:
-            places = depths if "groundtruth" in path.parts else pictures
-            places[match[1], match[2]] = path
-    keys = sorted(depths)
+    depths, pictures = dict[tuple[str, ...], Path](), dict[tuple[str, ...], Path]()
+    for path in _matching(folder, "*/image_0[23]/*"):
+        match, parts = FRAME.search(path.as_posix()), path.relative_to(folder).parts
+        if match and path.suffix.lower() in PICTURES and "velodyne_raw" not in parts:
+            places = depths if "groundtruth" in parts else pictures
+            places[match[1], match[2], _side(path.as_posix())] = path
+    keys = sorted(key for key in depths if key[2] == LEFT)
     if split is not None:
-        lines = split.read_text(encoding="utf-8", errors="replace").splitlines()
-        found = [FRAME.search(line) for line in lines if line.strip()]
-        if not found or not all(found):
-            raise TruthError(split, "lines without drive and frame", "a list of the Eigen split")
-        listed = [(match[1], match[2]) for match in found if match]
+        lines = split.read_text(encoding="utf-8-sig", errors="replace").splitlines()
+        listed = []
+        for line in filter(str.strip, lines):
+            match = FRAME.search(line) or SHORT_FRAME.search(line)
+            if match is None:
+                raise TruthError(split, repr(line[:80]), "drive and frame, as in the Eigen split")
+            listed.append((match[1], f"{int(match[2]):010d}", _side(line)))
         keys = [key for key in listed if key in depths]  # 45 of 697 frames have no annotated depth
     if not keys:
         raise TruthError(folder, "no annotated depth", "DRIVE/proj_depth/groundtruth/image_02")
-    for drive, frame in keys:
-        if (drive, frame) not in pictures:
-            found_name = f"no picture of {drive}, frame {frame}"
-            raise TruthError(folder, found_name, f"{drive[:10]}/{drive}/image_02/data/{frame}.png")
-        picture = pictures[drive, frame]
-        calibration = picture.parents[3] / "calib_cam_to_cam.txt"
-        depth = depths[drive, frame]
-        yield _row(f"{drive}_{frame}", drive, picture, _of_kitti, depth, calibration)
+    for key in keys:
+        drive, frame, side = key
+        if key not in pictures:
+            expected = f"{drive[:10]}/{drive}/image_0{side}/data/{frame}.png"
+            raise TruthError(folder, f"no picture of {drive}, frame {frame}", expected)
+        calibration = pictures[key].parents[3] / "calib_cam_to_cam.txt"
+        name = f"{drive}_{frame}" + f"_image_0{side}" * (side == RIGHT)
+        measure = partial(_of_kitti, side)
+        yield _row(name, drive, pictures[key], measure, depths[key], calibration)
 
 
-def _of_kitti(path: Path, calibration: Path) -> tuple[Array, Array | None]:
+def _side(line: str) -> str:
+    """Return the number of the camera that a path or a line names; the left one by default."""
+    match = re.search(r"image_0([23])|[\s,]r\s*$", line)
+    return (match[1] or RIGHT) if match else LEFT
+
+
+def _of_kitti(side: str, path: Path, calibration: Path) -> tuple[Array, Array | None]:
     matrix = None
     if calibration.is_file():
         text = calibration.read_text(encoding="utf-8", errors="replace")
-        line = re.search(r"^P_rect_02: (.+)$", text, re.MULTILINE)
+        line = re.search(rf"^P_rect_0{side}: (.+)$", text, re.MULTILINE)
         numbers = line[1].split() if line else []
         try:
             matrix = np.array(numbers, np.float64).reshape(3, 4)[:, :3]
         except ValueError as error:
-            raise TruthError(calibration, "no P_rect_02 of 12 numbers", "KITTI's file") from error
+            found = f"no P_rect_0{side} of 12 numbers"
+            raise TruthError(calibration, found, "KITTI's file") from error
     return read_array(path) / 256.0, matrix
 
 
@@ -242,8 +263,7 @@ def diode(folder: Path, _split: Path | None) -> Iterator[Source]:
         stem = path.name.removesuffix("_depth.npy")
         picture = _other(path.with_name(f"{stem}.png"), "picture")
         mask = path.with_name(f"{stem}_depth_mask.npy")
-        group = path.parent.relative_to(folder).as_posix()
-        yield _row(picture.stem, group, picture, _of_diode, path, mask)
+        yield _row(picture.stem, _below(folder, path.parent), picture, _of_diode, path, mask)
 
 
 def _of_diode(path: Path, mask_path: Path) -> tuple[Array, Array | None]:
@@ -302,6 +322,7 @@ def _of_sintel(path: Path, camera: Path) -> tuple[Array, Array | None]:
     if min(width, height) < 1 or len(data) != 8 + 4 * width * height:
         raise TruthError(path, f"{len(data)} bytes for {height}x{width}", "4 bytes a pixel")
     depth = np.frombuffer(data[8:], "<f4").reshape(height, width)
+    depth = np.where(depth < SINTEL_SKY, depth, 0.0)
     matrix = None
     if camera.is_file():
         numbers = _tagged(camera)

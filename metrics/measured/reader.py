@@ -224,4 +224,4 @@ def rays_of(truth: Images, row: int, height: int, width: int) -> Array:
     return rays
 
 
-NO_MATRIX = "make the file with --intrinsics"
+NO_MATRIX = "make the file with bench truth --intrinsics"

@@ -114,13 +114,14 @@ def scores_of_view(
             height, width = mask.shape
             sure = predicted.confidence[:height, :width][mask]
             scores |= scores_of_confidence(pair, sure, edge_distance, mask)
+        flat = scores.pop("flat", None)
         if broken:
             farthest = float(true.max(initial=0.0))
             scores = {name: metric(name).worst(farthest) for name in scores}
         alignment = protocol.alignment or scored_alignment(predicted.kind, predicted.alignment)
         scores |= _guesses(replace(protocol, alignment=alignment), mask, true)
-        if "flat" in scores:
-            scores[f"{FLAT}relative_normal_degrees"] = scores.pop("flat")
+        if flat is not None:
+            scores[f"{FLAT}relative_normal_degrees"] = flat
         found |= {(protocol.name, name): value for name, value in scores.items()}
         found[protocol.name, PIXELS] = len(true)
     return found

@@ -61,7 +61,7 @@ def require_truth(
     """
     if protocol not in (None, file.protocol):
         found, expected = f"scores under the protocol {file.protocol}", f"{protocol}, as {owner}"
-        hint = f"score it again with --protocol {protocol}"
+        hint = f"say bench score --protocol {protocol}"
         raise OtherTruthError(file.place, found, expected, hint)
     if file.truth != truth:
         found, expected = (
@@ -69,7 +69,7 @@ def require_truth(
             for task, digest in (file.truth, truth)
         )
         expected = f"{expected}, as {owner} has"
-        raise OtherTruthError(file.place, found, expected, "score it with the same --truth")
+        raise OtherTruthError(file.place, found, expected, "say bench score --truth with that one")
 
 
 def images_digest(truth: Images, scored: Mapping[int, RowDigests]) -> str:

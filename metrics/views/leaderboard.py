@@ -51,7 +51,7 @@ REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"
 NOT_COMPARABLE = (
     f"{INCOMPARABLE_MARK} not comparable, so not ranked: not all of the test set was scored, or"
     " values that are not finite were given the worst score, or only the submission named the truth"
-    " (score it again with --truth)"
+    " (bench score --truth tells it)"
 )
 BELOW = (
     "methods below the line of the baseline are not better than it, by their interval, so they have"

@@ -34,7 +34,7 @@ def protocols_report(
 
 def protocols_table(scores: Sequence[ScoreFile]) -> Table:
     """Return the headline under each protocol."""
-    names = [name for name in HEADLINE["measured"] if name in scores[0].metrics]
+    names = [n for n in HEADLINE["measured"] if all(n in file.metrics for file in scores)]
     rows: list[Sequence[Cell | str]] = []
     for file in scores:
         protocol = BY_NAME[file.protocol]

@@ -6,6 +6,7 @@ Own processes write to memory that they share with this one. It has no name, and
 last process and the last array are.
 """
 
+import hashlib
 import math
 import mmap
 import os
@@ -17,6 +18,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from contextlib import closing, suppress
 from dataclasses import replace
+from functools import partial
 from itertools import accumulate, chain, count, cycle, islice
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -58,11 +60,13 @@ class RowStream(Base):
 
     Every loop begins at row `start`, or where `load_state_dict` says. It raises what the makers
     raise, and LostWorkerError where a process ended, twice for the same batch if by a signal. Where
-    torch is imported, this is an `IterableDataset`; torch is not imported here.
+    torch is imported, this is an `IterableDataset`; torch is not imported here. Own processes live
+    as long as the stream.
 
     Attributes:
         columns: what the arrays are: `schema.Column`s with unit, frame and meaning, by field.
-        batch: rows in each batch; where the stream ends, the last one may have fewer.
+        batch: rows in each batch; where the stream ends, the last one of each rank may have fewer,
+            equally many for all.
     """
 
     def __init__(
@@ -77,6 +81,8 @@ class RowStream(Base):
         world_size: int | None,
         together: int = 1,
         on_device: Mapping[str, Stack] = MappingProxyType({}),
+        drop_last: bool = False,
+        requests: Sequence[str] = (),
     ) -> None:
         """Take makers of rows, and the share of the rows that each of them makes.
 
@@ -84,6 +90,9 @@ class RowStream(Base):
             together: how many rows have one maker: row 0 and the next ones, and so on.
             on_device: fields that are no arrays, each with the function that makes what is handed
                 out of a list of values, one a row, and of the shape of all.
+            drop_last: whether rows at the end that do not suffice for all ranks are left out; by
+                default some are shown twice.
+            requests: what the rows are of, in words that tell it apart, for states.
 
         Raises SpecError.
         """
@@ -105,23 +114,34 @@ class RowStream(Base):
         self._start, self._stop, self._processes = start, stop, workers
         self._place = None if rank is None else (rank, ranks)
         self._on_device, self._row, self._resumed = dict(on_device), start, False
+        self._drop_last = drop_last
+        self._workers: _Workers | None = None
+        told = "\n".join([*requests, *map(str, shares)])
+        self._request = hashlib.sha256(told.encode()).hexdigest()[:16]
 
     def __iter__(self) -> Iterator[Batch]:
         """Begin a loop."""
         self._row, self._resumed = (self._row if self._resumed else self._start), False
         return self._batches(self._row)
 
-    def state_dict(self) -> dict[str, int]:
-        """Return where the stream is: {"row": the first that no rank and worker has shown yet}.
+    def state_dict(self) -> dict[str, Any]:
+        """Return where the stream is: "row" is the first that no rank and worker has shown yet.
 
         It holds where all of them have shown equally many batches. Any number of them can then go
-        on from it.
+        on from it. "request" tells what the rows are of.
         """
-        return {"row": self._row}
+        return {"row": self._row, "request": self._request}
 
-    def load_state_dict(self, state: Mapping[str, int]) -> None:
-        """Let the next loop begin where `state_dict` was asked for."""
-        self._row, self._resumed = int(state["row"]), True
+    def load_state_dict(self, state: Mapping[str, Any]) -> None:
+        """Let the next loop begin where `state_dict` was asked for.
+
+        Raises SpecError for the state of a stream of another request, or what is no state.
+        """
+        row, request = state.get("row"), state.get("request", self._request)
+        if not isinstance(row, int) or row < 0 or request != self._request:
+            found = f"row {row!r:.20} of request {request!r:.20}"
+            raise SpecError("state", found, "what state_dict gave, of a stream of this request")
+        self._row, self._resumed = row, True
 
     def _batches(self, first: int) -> Iterator[Batch]:
         if self._stop is not None and first >= self._stop:
@@ -153,7 +173,8 @@ class RowStream(Base):
         return self._place or (0, 1)
 
     def __getstate__(self) -> dict[str, Any]:
-        return {**vars(self), "_place": self._ranks()}  # a worker of a loader would not know it
+        # A worker of a loader would not know its rank, and has processes of its own.
+        return {**vars(self), "_place": self._ranks(), "_workers": None}
 
     def made(
         self, first: int, share: int, shares: int, processes: int, new: Callable[[int], Batch]
@@ -164,10 +185,8 @@ class RowStream(Base):
             processes: that share the processors.
             new: returns what so many rows are written to.
         """
-        size, end = self.batch, self._stop
-        starts = count(first + share * size, shares * size)
-        parts = (range(i, i + size if end is None else min(i + size, end)) for i in starts)
-        while chunk := [part for part in islice(parts, max(1, CHUNK // size)) if part]:
+        parts = map(partial(self._part, first, self._ranks()[1]), count(share, shares))
+        while chunk := [part for part in islice(parts, max(1, CHUNK // self.batch)) if part]:
             rows = self._rows(list(chain.from_iterable(chunk)), processes)
             for numbers in chunk:
                 batch = new(len(numbers))
@@ -177,6 +196,15 @@ class RowStream(Base):
                 for name, stack in self._on_device.items():
                     batch[name] = stack(batch[name], (len(numbers), *self.columns[name].shape))
                 yield batch
+
+    def _part(self, first: int, ranks: int, number: int) -> range:
+        """Return the rows of a batch: at the end, equally many for all ranks."""
+        size, end = self.batch, self._stop
+        begin = first + number // ranks * ranks * size
+        left = ranks * size if end is None else min(max(0, end - begin), ranks * size)
+        rows = left // ranks if self._drop_last else -(-left // ranks)
+        place = min(begin + number % ranks * rows, begin + left - rows)
+        return range(place, place + rows)
 
     def _rows(self, numbers: list[int], processes: int) -> Iterator[Mapping[str, Any]]:
         """Yield rows, each from the maker whose turn it is.
@@ -208,62 +236,50 @@ class RowStream(Base):
         self, first: int, share: int, shares: int, processes: int, readers: int
     ) -> Generator[Batch]:
         """Yield batches from processes, which write the next ones meanwhile."""
-        memory, owner = _Memory(self, _unnamed_file()), os.getpid()
-        waiting = [deque[int]() for _ in range(processes)]
-        started: list[Process] = []
+        workers = self._workers
+        if workers is None or (workers.owner, workers.count) != (os.getpid(), processes):
+            workers = self._workers = _Workers(self, processes)
+            weakref.finalize(self, workers.close)
         step, taken = shares * processes, [0] * processes  # batches that each process has made
 
         def begin(which: int) -> None:
-            """Start a process that makes the batches that were not taken yet."""
-            started[which:] = [Process([memory.file]), *started[which + 1 :]]
+            """Let a process make the batches that were not taken yet."""
             row = first + taken[which] * step * self.batch
-            part = (row, share + shares * which, step, processes * readers)
-            started[which].ask(pickle.dumps(_Filler(self, part, memory.file)))
-            for slot in waiting[which]:
-                started[which].ask(pickle.dumps(slot))
+            workers.begin(which, self, (row, share + shares * which, step, processes * readers))
 
-        def answer(which: int) -> Any:
-            succeeded, result = started[which].heard()
-            if not succeeded:
-                raise result
-            return result
-
-        def rows_of_next(which: int) -> int:
+        def next_of(which: int) -> tuple[int, int]:
             """Wait for a batch; where a signal ended its process, another one makes it again."""
             try:
-                return int(answer(which))
+                return workers.answer(which)
             except LostWorkerError as error:
                 if not error.by_signal:
                     raise
             try:
+                del workers.started[which]
                 begin(which)
-                answer(which)
-                return int(answer(which))
+                return workers.answer(which)
             except LostWorkerError as error:
                 row = first + (taken[which] * step + share + shares * which) * self.batch
                 raise error.of(f"rows {row} to {row + self.batch - 1}") from None
 
         try:
             for which in range(processes):
-                waiting[which].extend(memory.free_slot() for _ in range(AHEAD))
+                workers.rest(which)
                 begin(which)
-            for which in range(processes):
-                answer(which)  # that it is ready
             for which in cycle(range(processes)):
-                rows, slot = rows_of_next(which), waiting[which].popleft()
+                slot, rows = next_of(which)
                 if not rows:
+                    workers.memory.free.append(slot)
                     return
                 taken[which] += 1
-                waiting[which].append(memory.free_slot())
-                with suppress(LostWorkerError):  # `rows_of_next` meets it
-                    started[which].ask(pickle.dumps(waiting[which][-1]))
-                yield memory.arrays(slot, rows)
-        finally:
-            if os.getpid() == owner:  # not in a fork
-                for process in started:
-                    process.kill()
-                    process.end()
-                os.close(memory.file)
+                following = workers.memory.free_slot()
+                workers.ask(which, following, following)
+                yield workers.memory.arrays(slot, rows)
+        except GeneratorExit:  # the loop ends early
+            raise
+        except BaseException:
+            workers.close()
+            raise
 
     @property  # type: ignore[misc]
     def __class__(self) -> type:
@@ -331,12 +347,12 @@ class _Memory:
             (-(-size // ALIGNED) * ALIGNED for size in sizes), initial=0
         )
         self._size = -(-end // mmap.ALLOCATIONGRANULARITY) * mmap.ALLOCATIONGRANULARITY
-        self._free, self._maps = list[int](), dict[int, mmap.mmap]()
+        self.free, self._maps = list[int](), dict[int, mmap.mmap]()
 
     def free_slot(self) -> int:
         """Return the number of a free slot, perhaps a new one."""
-        if self._free:
-            return self._free.pop()
+        if self.free:
+            return self.free.pop()
         slot = len(self._maps)
         os.ftruncate(self.file, (slot + 1) * self._size)
         self._open(slot)
@@ -345,7 +361,7 @@ class _Memory:
     def arrays(self, slot: int, rows: int) -> dict[str, Array]:
         """Return the first rows of a slot, by field."""
         whole = np.frombuffer(self._open(slot), np.uint8)
-        weakref.finalize(whole, self._free.append, slot)
+        weakref.finalize(whole, self.free.append, slot)
         return {
             name: np.ndarray((self._rows, *column.shape), column.dtype, whole, place)[:rows]
             for (name, column), place in zip(self._columns.items(), self._places, strict=True)
@@ -360,20 +376,77 @@ class _Memory:
 class _Filler:
     """What a process does: it writes the next batch of a share to a slot."""
 
-    def __init__(self, stream: RowStream, part: tuple[int, int, int, int], file: int) -> None:
-        """Take the first arguments of `made`, and the descriptor of the memory."""
-        self._stream, self._part, self._file = stream, part, file
-        self._batches: Iterator[Batch] | None = None
+    def __init__(self, stream: RowStream, file: int) -> None:
+        """Take a stream, and the descriptor of the memory."""
+        self._stream, self._file = stream, file
+        self._memory: _Memory | None = None
 
-    def __call__(self, slot: int) -> int:
-        """Return how many rows were written; 0 at the end of the share."""
-        self._slot = slot
-        if self._batches is None:
-            memory = _Memory(self._stream, self._file)
-            self._batches = self._stream.made(
-                *self._part, lambda rows: memory.arrays(self._slot, rows)
-            )
+    def __call__(self, asked: int | tuple[int, int, int, int]) -> int:
+        """Return how many rows were written to a slot; 0 at the end of the share.
+
+        The first arguments of `made` begin another share.
+        """
+        if isinstance(asked, tuple):
+            memory = self._memory = self._memory or _Memory(self._stream, self._file)
+            self._batches = self._stream.made(*asked, lambda rows: memory.arrays(self._slot, rows))
+            return 0
+        self._slot = asked
         return len(next(iter(next(self._batches, {"": ()}).values())))
+
+
+class _Workers:
+    """Processes that make batches of a stream, loop after loop, and the memory that they share."""
+
+    def __init__(self, stream: RowStream, count: int) -> None:
+        self.memory = _Memory(stream, _unnamed_file())
+        self.owner, self.count, self.started = os.getpid(), count, dict[int, Process]()
+        # Slots that each was asked to fill, -1 for what needs none, and whose answers are due.
+        self.asked = [deque[int]() for _ in range(count)]
+
+    def ask(self, which: int, slot: int, message: Any) -> None:
+        """Hand a message over to a process."""
+        self.asked[which].append(slot)
+        with suppress(LostWorkerError):  # `answer` meets it
+            self.started[which].ask(pickle.dumps(message))
+
+    def begin(self, which: int, stream: RowStream, part: tuple[int, int, int, int]) -> None:
+        """Let a process, a new one where there is none, make a share, in AHEAD slots."""
+        slots = [slot for slot in self.asked[which] if slot >= 0]
+        self.asked[which].clear()
+        if which not in self.started:
+            self.started[which] = Process([self.memory.file])
+            self.ask(which, -1, _Filler(stream, self.memory.file))
+        self.ask(which, -1, part)
+        for slot in slots or [self.memory.free_slot() for _ in range(AHEAD)]:
+            self.ask(which, slot, slot)
+
+    def answer(self, which: int) -> tuple[int, int]:
+        """Return the oldest slot of a process, and how many rows are in it."""
+        while True:
+            succeeded, result = self.started[which].heard()
+            if not succeeded:
+                raise result
+            slot = self.asked[which].popleft()
+            if slot >= 0:
+                return slot, int(result)
+
+    def rest(self, which: int) -> None:
+        """Wait until a process has done what nobody wants any more."""
+        with suppress(LostWorkerError):
+            while which in self.started and self.asked[which]:
+                self.started[which].heard()
+                self.memory.free += [slot for slot in (self.asked[which].popleft(),) if slot >= 0]
+        if self.asked[which]:
+            del self.started[which]
+
+    def close(self) -> None:
+        """End the processes, unless this is a fork, and let the memory go."""
+        if os.getpid() == self.owner and self.count:
+            self.count = 0
+            for process in self.started.values():
+                process.kill()
+                process.end()
+            os.close(self.memory.file)
 
 
 def _unnamed_file() -> int:

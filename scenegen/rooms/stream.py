@@ -61,6 +61,7 @@ class RoomStream(RowStream):
         world_size: int | None = None,
         objects: Objects | None = None,
         on_device: bool = False,
+        drop_last: bool = False,
     ) -> None:
         """Take a preset, a request, or several with the share of scenes that each gets.
 
@@ -75,6 +76,8 @@ class RoomStream(RowStream):
             rank, world_size: which share of the batches comes, of how many; torch.distributed's by
                 default.
             objects: models of requests for folders of meshes.
+            drop_last: with `stop`, ranks get equally many batches of equally many rows each: by
+                default some rows of the end are shown twice; with this, some are left out.
             on_device: leave pixels on the device, as Dr.Jit tensors, which `torch.from_dlpack`
                 takes without a copy. Other fields, and all of path tracing, are numpy arrays.
 
@@ -106,7 +109,7 @@ class RoomStream(RowStream):
             makers.append((maker, share))
         super().__init__(
             common, makers, batch, start, stop, workers, rank, world_size, views,
-            dict.fromkeys(kept, stacked),
+            dict.fromkeys(kept, stacked), drop_last, [spec.to_json() for spec in specs],
         )  # fmt: skip
 
 

@@ -25,4 +25,6 @@ def counted(batch=4, start=0, stop=None, workers=0, rank=None, world_size=None, 
     maker = partial(rows, how.get("refused", -1), how.get("killed", -1))
     makers = [(maker, share) for share in how.get("shares", [1.0])]
     together = how.get("together", 1)
-    return RowStream(COLUMNS, makers, batch, start, stop, workers, rank, world_size, together)
+    more = {name: how[name] for name in ("drop_last", "requests") if name in how}
+    ranks = rank, world_size
+    return RowStream(COLUMNS, makers, batch, start, stop, workers, *ranks, together, **more)

@@ -16,7 +16,7 @@ from torch import Tensor
 from torch.utils.data import DataLoader, Dataset, default_collate
 
 from baselines.pix2shape.batch import Batch
-from baselines.pix2shape.matching.relief import matched_rows, relief_of_rows
+from baselines.pix2shape.matching import matched_rows, relief_of_rows
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.questions import QuestionImages
 from baselines.pix2shape.rooms import RoomImages

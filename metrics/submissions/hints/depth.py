@@ -188,7 +188,7 @@ def _scale(images: Sequence[_Image], alignment: str) -> str | None:
         return None
     unit = next((u for f, u in UNITS.items() if f / 2.0 < scale < 2.0 * f), "another unit")
     exact = next((u for f, u in FACTORS.items() if abs(np.log(scale / f)) < EXACT), "")
-    by_focal = scales * USUAL_FOCAL / np.array([1.0 / image.sample.pitch for image in images])
+    by_focal = scales * USUAL_FOCAL * np.array([image.sample.pitch for image in images])
     if not exact and (np.abs(np.log(by_focal)) < EXACT).all():
         exact = f"multiplied by focal length / {USUAL_FOCAL:g}"
     unit = exact or unit

@@ -46,7 +46,7 @@ def no_value_hints(predictions: RoomPredictions, truth: Images) -> list[Problem]
     pixels, ids = sum(count for _, count in found), [row for row, _ in found]
     text = (
         f"{value:g} at {pixels:,} pixels of {len(ids)} images looks like a mark for no value;"
-        f" say --invalid {value:g} --missing nearest to bench import"
+        f" say bench import --missing nearest --invalid, and the number that files have for it"
     )
     expected = "a value of the surface at each pixel"
     return [Problem(predictions.kind, HINT, expected, text, first_ids(ids))]

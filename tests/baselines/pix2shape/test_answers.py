@@ -12,8 +12,8 @@ from pix2shape_models import made, of_questions
 
 from baselines.pix2shape import predict as module
 from baselines.pix2shape.predict import answers_of
+from baselines.training.baseline import answer_questions
 from baselines.training.images import channels_first
-from baselines.training.submission import answer_questions
 from iqtt.files.reader import open_questions
 from metrics.scoring.evaluate import score
 from metrics.submissions.reader import open_predictions

@@ -14,7 +14,7 @@ from torch.utils.data import default_collate
 from baselines.pix2shape import predict
 from baselines.pix2shape.network.empty_rooms import empty_rooms
 from baselines.pix2shape.predict import enlarged, predict_file, views_of
-from baselines.training.submission import predict_rooms
+from baselines.training.baseline import predict_rooms
 from metrics.submissions.reader import open_predictions
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import SpecError

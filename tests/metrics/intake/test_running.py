@@ -98,6 +98,38 @@ def test_a_model_sees_developed_pictures_as_they_are(run, interior_path, tmp_pat
         np.testing.assert_array_equal(np.load(tmp_path / "seen.npy"), rooms[0].image)
 
 
+@pytest.mark.parametrize(
+    ("program", "found"),
+    [
+        ("echo no NumPy here", "no NumPy here"),
+        ("echo Python 2.7.18", "Python 2.7.18"),
+        ("exit 3", "exit code 3"),
+        ("echo hello; cat", "hello"),
+    ],
+)
+def test_a_python_that_cannot_run_models_is_told(program, found, tmp_path):
+    """Older ones and those without NumPy say so; what is none says something else, or nothing."""
+    (tmp_path / "m.py").write_text(INFER)
+    python = tmp_path / "python"
+    python.write_text(f"#!/bin/sh\n{program}\n")
+    python.chmod(0o755)
+    with (
+        pytest.raises(ModelError) as error,
+        opened_model(tmp_path / "m.py", python=python),
+    ):
+        pass
+    assert error.value.where == "--python"
+    assert (found in error.value.found) == (found != "hello")
+
+
+@pytest.mark.parametrize("change", ["modules['numpy'] = None", "version_info = (3, 6)"])
+def test_what_begins_the_process_of_a_model_looks_for_what_it_needs(change, capfd):
+    text = f"import sys\nsys.{change}\n{model_file.BOOT}"
+    done = subprocess.run([sys.executable, "-c", text], check=False)
+    assert done.returncode == 0
+    assert capfd.readouterr().out.split()[0] in ("no", "Python")
+
+
 def failing(folder, error="ValueError"):
     """A model that fails once, at its sixth call; it counts its calls in a file."""
     return f"""

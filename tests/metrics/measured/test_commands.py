@@ -12,9 +12,11 @@ from measured_scenes import scene
 from PIL import Image
 
 import cli
+from metrics.intake.outputs import KEYS
 from metrics.measured.reader import MeasuredFile
 from metrics.score_file import read_scores
 from metrics.scoring.metric_names import OBJECT_SCORES
+from metrics.submissions.reader import open_predictions
 from metrics.views.score_tables import confidence_warnings
 
 MODEL = "def infer(image):\n    return {'depth_metric': image[..., 0] / 25.0 + 0.1}\n"
@@ -189,6 +191,47 @@ def test_one_file_of_all_rows_with_masks_and_normals(here):
     Image.fromarray(mask[1:]).save("masks/frame_3.png")
     found = made("--unit", "m", "--depth", "all.npz", *more, "--overwrite")
     assert (found.exit_code, found.stderr.count("\n")) == (2, 1)
+
+
+def test_pictures_of_several_sizes_go_to_batches_of_one(measured, tmp_path):
+    """Each call gets those of one size that follow each other; rows keep their places."""
+    text = """
+import numpy as np
+class M:
+    def infer(self, image): return {"depth_metric": np.full(image.shape[:2], image.shape[0] / 10)}
+    def infer_batch(self, images):
+        assert len(images) < 4
+        return [self.infer(image) for image in images]
+"""
+    truth, out = measured(), tmp_path / "p.h5"
+    (tmp_path / "m.py").write_text(text)
+    for more in ([], ["--batch", "3", "--overwrite", "--restart"]):
+        done = bench("run", tmp_path / "m.py", "--data", truth, "--out", out, *more)
+        assert done.exit_code == 0, done.output
+        with open_predictions(out) as found, MeasuredFile(truth) as file:
+            for row in range(len(file)):
+                height, _ = file.size(row)
+                assert found.depth(row)[0, 0] == pytest.approx(height / 10)
+
+
+def test_depth_of_a_picture_that_is_turned(here):
+    """Truth of the stored picture is refused, and EXIF is named; that of the turned one is read."""
+    exif = Image.Exif()
+    exif[0x0112] = 6
+    for i in range(8):
+        with Image.open(f"rgb/frame_{i}.png") as picture:
+            picture.rotate(90, expand=True).save(f"rgb/frame_{i}.png", exif=exif)
+    assert made(*MM).exit_code == 0
+    for i in range(8):
+        with Image.open(f"gt/depth_{i}.png") as depth:
+            Image.fromarray(np.rot90(np.asarray(depth)).copy()).save(f"gt/depth_{i}.png")
+    found = made(*MM, "--overwrite")
+    assert found.exit_code == 2
+    assert "EXIF" in found.stderr
+
+
+def test_the_help_names_all_keys_that_models_return():
+    assert all(key in bench("run", "--help").output for key in KEYS)
 
 
 def linked(path):

@@ -6,6 +6,7 @@ set that it has on the rooms, but for the steps in which the set stores depth.
 
 import json
 import struct
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -16,7 +17,9 @@ from PIL.PngImagePlugin import PngInfo
 from scipy.io import savemat
 
 import cli
+from metrics.intake.truth_layouts import read_layout
 from metrics.measured.reader import MeasuredFile
+from metrics.measured.writer import TruthError
 from metrics.scoring.evaluate import score
 from metrics.submissions.writer import RoomPredictionWriter
 from scenegen.camera import intrinsics
@@ -209,3 +212,85 @@ def test_cameras_are_those_of_the_kits(tmp_path):
     bench("truth", "--layout", "diode", "--data", tmp_path, "--out", tmp_path / "diode.h5")
     with MeasuredFile(tmp_path / "diode.h5") as truth:
         assert truth.matrix(0).ravel().tolist() == [886.81, 0, 512, 0, 927.06, 384, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("name", "inside", "groups"),
+    [
+        ("hypersim", "ai_001_000", {"ai_001_000"}),
+        ("moge", "scene 0", {"0", "1"}),
+        ("moge", "scene 0/0", {"0"}),
+        ("diode", "indoors/scene_00000/scan_00001", {"scan_00001"}),
+        ("kitti", f"raw/2011_09_26/{DRIVE}", None),
+    ],
+)
+def test_a_part_of_a_set_has_its_names_from_within(name, inside, groups, scenes, tmp_path,
+                                                   monkeypatch):  # fmt: skip
+    """Where its folder is named by a dot, and where by its path."""
+    data, _ = LAYOUTS[name][0](tmp_path, scenes)
+    (data / ".index.txt").unlink(missing_ok=True)
+    monkeypatch.chdir(data / inside)
+    for folder in (".", data / inside):
+        if groups is None:  # the depth is elsewhere
+            with pytest.raises(TruthError):
+                read_layout(name, Path(folder))
+            continue
+        rows = read_layout(name, Path(folder))
+        assert {row.group for row in rows} == groups
+        assert all(row.name.strip("._") == row.name != "" for row in rows)
+
+
+def listed(form, side="", zeros=10):
+    return lambda frames: "\n".join(form.format(DRIVE, f"{i:0{zeros}d}", side) for i in frames)
+
+
+FORMS = {
+    "eigen": listed("2011_09_26/{0}/image_02/data/{1}.png"),
+    "zhou": listed("2011_09_26/{0} {1} {2}", "l", 0),
+    "zhou, right": listed("2011_09_26/{0} {1} {2}", "r", 0),
+    "no side": listed("{0} {1}", zeros=0),
+    "commas": listed("{0},{1},{2}", "l", 0),
+    "short names": listed("2011_09_26/{0}/image_02/data/{1}.png", zeros=0),
+    "Windows": listed("2011_09_26\\{0}\\image_03\\data\\{1}.png\r"),
+    "benchmark": listed("{0}_image_{1}_image_02.png"),
+    "no frame": listed("2011_09_26/{0}"),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_lists_of_frames_of_many_habits(form, scenes, tmp_path):
+    """Pictures and depth of the right camera are those of the left one, doubled; as JPEG, too."""
+    kitti(tmp_path, scenes)
+    for path in sorted(tmp_path.rglob("image_02/**/*.png")):
+        other = Path(str(path).replace("image_02", "image_03"))
+        other.parent.mkdir(parents=True, exist_ok=True)
+        steps = np.asarray(Image.open(path))
+        save(other, steps * 2 if steps.ndim == 2 else steps)
+    for path in (tmp_path / "raw").rglob("image_03/data/*.png"):
+        Image.open(path).save(path.with_suffix(".jpg"))
+        path.unlink()
+    calibration = tmp_path / "raw/2011_09_26/calib_cam_to_cam.txt"
+    calibration.write_text(calibration.read_text() + "P_rect_03: 9 0 9 0 0 9 9 0 0 0 1 0\n")
+    (tmp_path / "list.txt").write_text(FORMS[form]([5, 0]))
+    if form == "no frame":
+        with pytest.raises(TruthError):
+            read_layout("kitti", tmp_path, tmp_path / "list.txt")
+        return
+    rows, right = (
+        read_layout("kitti", tmp_path, tmp_path / "list.txt"),
+        form in ("zhou, right", "Windows"),
+    )
+    assert [row.name[:37] for row in rows] == [f"{DRIVE}_{i:010d}" for i in (5, 0)]
+    depth = np.nan_to_num(scenes[1][1]) * (2 if right else 1)
+    read = rows[0].read()
+    np.testing.assert_allclose(read.depth, depth, atol=1 / 128)
+    assert (read.matrix[0, 0] == 9) == right
+
+
+def test_the_sky_of_sintel_has_no_depth(scenes, tmp_path):
+    picture, depth, k = scenes[0]
+    sky = depth.copy()
+    sky[:3] = 1e10
+    sintel(tmp_path, [(picture, sky, k)])
+    (row,) = read_layout("sintel", tmp_path)
+    assert (row.read().depth[:3] <= 0).all()

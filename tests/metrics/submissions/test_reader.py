@@ -83,7 +83,7 @@ def test_texts_of_any_kind(by_hand):
         file.attrs.create("run", "seed 1", dtype=h5py.string_dtype("ascii"))
         file.attrs["notes"] = "two\nlines"
         file.attrs["unknown"] = np.arange(3)
-        file["confidence"] = np.zeros(4)
+        file["further"] = np.zeros(4)
     with open_predictions(path) as found:
         assert found.method == "Größe 大 \U0001f600"
         assert (found.run, found.notes) == ("seed 1", "two\nlines")

@@ -46,7 +46,7 @@ if __name__ == "__main__":
     halves = [shown(DataLoader(counted(batch=4, start=3, stop=50, rank=rank, world_size=2),
                                batch_size=None, num_workers=2,
                                multiprocessing_context=sys.argv[1])) for rank in (0, 1)]
-    assert halves == [expected[::2], expected[1::2]]
+    assert halves == [expected[::2], [*expected[1:-1:2], [46, 47, 48, 49]]]
     print("each once")
 """
 INTERRUPTED = """
@@ -96,8 +96,58 @@ def test_every_row_comes_once_and_in_order(batch):
     rows = rows_of(counted(batch, 3, 50))
     assert rows == [list(range(i, min(i + batch, 50))) for i in range(3, 50, batch)]
     shares = [rows_of(counted(batch, 3, 50, rank=rank, world_size=3)) for rank in range(3)]
-    assert shares == [rows[rank::3] for rank in range(3)]
+    whole = 47 // (3 * batch)  # rounds in which each rank has a whole batch
+    assert [share[:whole] for share in shares] == [rows[r : 3 * whole : 3] for r in range(3)]
     assert rows_of(counted(batch, 50, 50)) == rows_of(counted(batch, 51, 50, 2)) == []
+
+
+@pytest.mark.parametrize(
+    ("ranks", "batch", "stop", "workers"),
+    [(2, 4, 20, 0), (2, 4, 22, 2), (3, 4, 25, 0), (4, 8, 9, 0), (3, 5, 30, 0), (3, 1, 4, 1),
+     (8, 4, 3, 0)],
+)  # fmt: skip
+def test_ranks_get_equally_many_rows_in_equally_many_batches(ranks, batch, stop, workers):
+    """All rows are shown, some of the end twice; or none twice, and too few for all are not."""
+    for drop_last in (False, True):
+        shares = [rows_of(counted(batch, 0, stop, workers * (rank == 1), rank, ranks,
+                                  drop_last=drop_last)) for rank in range(ranks)]  # fmt: skip
+        assert len({tuple(map(len, share)) for share in shares}) == 1
+        shown = [row for share in shares for rows in share for row in rows]
+        assert set(shown) == set(range(stop - stop % ranks if drop_last else stop))
+        assert len(shown) == (len(set(shown)) if drop_last else -(-stop // ranks) * ranks)
+        assert all(rows == sorted(rows) for share in shares for rows in share)
+
+
+def test_states_of_other_requests_are_refused():
+    stream = counted(requests=["a"])
+    stream.load_state_dict({"row": 4})  # of an earlier release
+    state = stream.state_dict()
+    counted(8, workers=2, requests=["a"], rank=1, world_size=2).load_state_dict(state)
+    for other in ({"requests": ["b"]}, {"requests": ["a"], "shares": [1.0, 2.0]}):
+        with pytest.raises(SpecError):
+            counted(**other).load_state_dict(state)
+    for wrong in ({}, {"row": -1}, {"row": "4"}):
+        with pytest.raises(SpecError):
+            stream.load_state_dict(wrong)
+
+
+@linux
+def test_processes_are_kept_between_loops(nothing_left):
+    """Through loops that end early, a state, and a process that is lost meanwhile."""
+    others, stream = children(), counted(4, 3, 120, workers=2)
+    whole = rows_of(stream)
+    started = children() - others
+    assert len(started) == 2
+    for _ in range(3):
+        assert next(iter(stream))["row"].tolist() == [3, 4, 5, 6]
+    stream.load_state_dict({"row": 43})
+    assert rows_of(stream) == whole[10:]
+    assert rows_of(stream) == whole
+    assert children() - others == started
+    assert len(stream._workers.memory._maps) < 9, "memory of earlier loops is used again"
+    os.kill(int(min(started)), signal.SIGKILL)
+    assert rows_of(stream) == whole
+    assert len(children() - others) == 2
 
 
 def test_a_stream_goes_on_where_its_state_was_asked_for():
