@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.description.specs import MAX_PIXELS
 from scenegen.files.exr import exr_channels, layers_of
-from scenegen.files.pictures import is_turned, opened_picture, upright
+from scenegen.files.pictures import ORIENTATION, opened_picture, upright
 
 Array = NDArray[Any]
 MOST_CHANNELS = 4
@@ -100,7 +100,7 @@ def _picture(path: Path, _name: str | None, vectors: bool) -> Array:
         if picture.mode in ("P", "PA"):
             raise ArrayFileError(path, "colours of a palette", "numbers", _AS_NUMBERS)
         is_colour_png = picture.format == "PNG" and picture.mode not in ("L", "I", "I;16", "F", "1")
-        if is_colour_png and is_turned(picture):
+        if is_colour_png and picture.getexif().get(ORIENTATION, 1) != 1:
             raise ArrayFileError(path, "EXIF data that turn it", "none", "save it without them")
         values = _colour_png(path) if is_colour_png else np.asarray(upright(picture))
         return _channels(path, values, vectors)

@@ -98,7 +98,7 @@ def _row(name: str, group: str, picture: Path, measure: Measure, *files: Path) -
     """Return a row of a picture, whose depth and matrix `measure` reads from files."""
 
     def read() -> Measured:
-        return Measured(read_picture(picture, MAX_PIXELS), *measure(*files), file=picture)
+        return Measured(read_picture(picture, MAX_PIXELS), *measure(*files))
 
     return Source(name, group, picture_size(picture, MAX_PIXELS), read)
 

@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 from scenegen.common.errors import FileFormatError
 
 Array = NDArray[Any]
-WHOLE = (
-    "Composite.Combined.",
-    "Combined.",
-    "rgba.",
-    "beauty.",
-)  # layers that show all, by renderer
+WHOLE = "Composite.Combined.", "Combined.", "rgba.", "beauty."  # ends of layers that show all
 
 
 def exr_channels(path: Path, most: int) -> dict[str, Array]:

@@ -98,17 +98,14 @@ def read_triangles(
             if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
                 placed = trimesh.transform_points(mesh.triangles.reshape(-1, 3), matrix)
                 triangles.append(placed.reshape(-1, 3, 3))
-                told = getattr(mesh.visual, "material", None)
+                told, uv = (getattr(mesh.visual, name, None) for name in ("material", "uv"))
                 if told is not None and id(told) not in materials:
-                    is_linear = getattr(resolver, "is_linear", False)
-                    materials[id(told)] = (
-                        glb_material(told, unread) if suffix == ".glb"
-                        else mtl_material(told, is_linear)
-                    )  # fmt: skip
-                made, uv = materials.get(id(told)), getattr(mesh.visual, "uv", None)
-                pieces.append(
-                    Piece(mesh, made, made.moved(uv) if made and uv is not None else None)
-                )
+                    is_linear, glb = getattr(resolver, "is_linear", False), suffix == ".glb"
+                    made = glb_material(told, unread) if glb else mtl_material(told, is_linear)
+                    materials[id(told)] = made
+                material = materials.get(id(told))
+                uv = material.moved(uv) if material and uv is not None else None
+                pieces.append(Piece(mesh, material, uv))
     except BadMeshError:
         raise
     except Exception as error:  # trimesh raises what its parsers meet

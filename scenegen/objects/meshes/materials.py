@@ -102,9 +102,8 @@ def glb_material(told: Any, unread: Unread) -> MeshMaterial:
     if about["picture"] and picture is None:
         words = f"names {about['picture']!r}, which cannot be read; such models are plain"
         unread.setdefault("picture", words)
-    means = [
-        np.ones(3) if x is None else np.asarray(x).mean((0, 1)) / 255 for x in (picture, other)
-    ]
+    both = picture, other
+    means = [np.ones(3) if x is None else np.asarray(x).mean((0, 1)) / 255 for x in both]
     roughness, metallic = (
         otherwise if value is None and other is None
         else float(np.clip((1.0 if value is None else value) * mean, 0.0, 1.0))
