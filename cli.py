@@ -37,7 +37,7 @@ def bench() -> None:
 
 @click.group(
     cls=PackageCommands,
-    modules=("baselines.pix2shape.commands", "baselines.pix2shape.drawing_commands"),
+    modules=("baselines.pix2shape.commands",),
 )
 @click.version_option(package_name="pix2shape-bench")
 def pix2shape() -> None:

@@ -59,10 +59,6 @@ UNTRAINED = {
     "pix2shape-views": "questions: the same, with an encoder of its own",
 }
 REFERENCE = ("pix2shape", "pix2shape-compact", "pix2shape-rays", "pix2shape-views")
-# What `baselines.cut_outs` makes; it reads images, which takes scipy.
-CUT_OUTS = (
-    "cut-out", "picture-outline", "balls", "outline-regression", "outline-relief", "nearest",
-)  # fmt: skip
 # Baselines that are trained with `bench train NAME`: the modules of their `BASELINE`, and what they
 # are. A new one is a line here.
 HOMES = {
@@ -148,7 +144,7 @@ def baseline(
     overwrite: bool,
 ) -> None:
     """Write the submission of a baseline for rooms or questions."""
-    from baselines.training.test_sets import refuse_test_set
+    from baselines.training.data import refuse_test_set
     from scenegen.files.sets.shards import OpenFile
 
     if train is not None and not allow_test_set:
@@ -170,22 +166,23 @@ def baseline(
         with shown_rows() as show:
             how: dict[str, Any] = {"overwrite": overwrite, "progress": show}
             if name in TRAINED:
-                from baselines.training.submission import write_submission
+                from baselines.training.baseline import write_submission
 
                 write_submission(_baseline(name), data, out, weights, **how)
-            elif name in CUT_OUTS:
-                from baselines.cut_outs import write_cut_outs
-
-                write_cut_outs(name, data, out, train=train, **how)
             elif name == "cubes":
-                _answer_by_cubes(data, out, how)
+                needs("cubes", ("numba",), "cubes")
+                from baselines.cubes.answer import write_cubes
+
+                write_cubes(data, out, **how)
             elif features is not None:
                 from baselines.features import write_features
 
                 how = {"train": train, "train_features": train_features, "labels": labels}
                 write_features(data, out, features, **how, overwrite=overwrite)
             elif name in ("outline", "outline-trees"):
-                _answer_by_outline(name, data, out, train, labels, how)
+                from baselines.outline import write_outline
+
+                write_outline(data, out, train, labels, **how)
             else:
                 from baselines.trivial import write_room_baseline
 
@@ -202,6 +199,9 @@ def _check_options(
     if train is not None and name in (*REFERENCE, *TRAINED):
         command = "pix2shape train" if name in REFERENCE else f"bench train {name}"
         raise click.UsageError(f"--train: {name} is trained already; see {command}")
+    if name in ("outline", "outline-trees") and (train is None) == (name == "outline-trees"):
+        wants = "needs" if train is None else "uses no"
+        raise click.UsageError(f"--train: {name} {wants} labelled questions")
     if labels is not None and name not in ("outline-trees", "features"):
         raise click.UsageError(f"--labels: {name} learns from none")
     if (features is None) == (name == "features"):
@@ -223,27 +223,6 @@ def _check_task(name: str, data: str) -> None:
     if task in ("rooms", "questions") and task != stored:
         others = ", ".join(other for other in ALL if ALL[other].startswith(f"{stored}:"))
         raise click.UsageError(f"{name} predicts {task}, and {data} holds {stored}; try {others}")
-
-
-def _answer_by_cubes(data: str, out: str, how: Mapping[str, Any]) -> None:
-    needs("cubes", ("numba",), "cubes")
-    from baselines.cubes.answer import write_cubes
-
-    write_cubes(data, out, **how)
-
-
-def _answer_by_outline(
-    name: str, data: str, out: str, train: str | None, labels: int | None, how: Mapping[str, Any]
-) -> None:
-    from baselines.outline import write_outline, write_outline_trees
-
-    if (train is None) == (name == "outline-trees"):
-        needs = "needs" if train is None else "uses no"
-        raise click.UsageError(f"--train: {name} {needs} labelled questions")
-    if train is None:
-        write_outline(data, out, **how)
-    else:
-        write_outline_trees(data, out, train, labels, **how)
 
 
 @click.command(
@@ -364,22 +343,22 @@ def probe(model: str, data: str, out: str, device: str, batch: int) -> None:
     learned. The folder gets answers and scores of each layer, and a curve, layers.png.
     """
     needs_torch("bench probe", ("torch", "transformers"))
-    from baselines import encoders
+    from baselines import features
     from iqtt.files.reader import open_questions
     from scenegen.common.text_table import aligned, number, with_interval
 
-    if not model.startswith(encoders.PREFIX):
+    if not model.startswith(features.PREFIX):
         raise click.BadParameter(f"found {model!r:.60}, expected hf:NAME", param_hint="MODEL")
-    with open_questions(encoders.split_paths(data)[0]) as questions:
+    with open_questions(features.split_paths(data)[0]) as questions:
         count = len(questions)
     with progress_bar(count, "question") as bar:
-        scores = encoders.probe(model, data, out, device=device, batch=batch, progress=bar.update)
-    encoders.draw(scores, Path(out) / "layers.png")
-    kinds = list(encoders.accuracies(scores[0]))
+        scores = features.probe(model, data, out, device=device, batch=batch, progress=bar.update)
+    features.draw(scores, Path(out) / "layers.png")
+    kinds = list(features.accuracies(scores[0]))
     floors = scores[0].question_floors
     rows = [["layer", *kinds]]
     for i, layer in enumerate(scores):
-        values = encoders.accuracies(layer).values()
+        values = features.accuracies(layer).values()
         rows.append([str(i), *(" ".join(with_interval(v.value, v.low, v.high)) for v in values)])
     rows.append(["floor", *(number(floors[k].accuracy) if k in floors else "" for k in kinds)])
     for line in aligned(rows):

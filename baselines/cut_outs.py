@@ -4,38 +4,41 @@ All know where floor and walls are, as `empty-room` does.
 
 - cut-out: each object as its true mask, flat, at its true median depth. It is told the truth, and
   what it lacks is shape.
-- picture-outline: the mask of `picture.outline_mask`, lifted by one constant.
+- picture-outline: the mask of `outline_mask`, lifted by one constant.
 - outline-regression, outline-relief: that mask, lifted by what a linear regression or
   gradient-boosted trees make of features of the outline; both learn from the depth of other rooms.
 - balls: each blob of the mask in a scene's first view as a ball, drawn in all its views.
 - nearest: the relief of that training image whose picture is left over from the fitted shading of
   the walls most alike.
+
+A mask is what the shading of an empty room does not explain. Floor and walls are matte and of one
+colour each, so that the radiance of each is smooth over the picture: a polynomial of the two
+coordinates of a wall fits it. Pixels that lie off the fit show objects. The fit is robust: it
+begins with all pixels of a wall and goes on with those that lie near it.
 """
 
+import itertools
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from baselines.picture import outline_mask, residual
 from metrics.measures.relief import empty_room
-from metrics.prediction_writer import RoomPredictionWriter
-from metrics.submissions.layout import Shown
-from scenegen.camera import pixel_directions, pixel_size, transform_points
-from scenegen.common.errors import SpecError
-from scenegen.common.names import check_choice
+from scenegen.camera import back_project, pixel_directions, pixel_size, transform_points
 from scenegen.common.threads import one_thread
 from scenegen.rooms.reader import RoomsFile, radiance_of
 
 Array = NDArray[Any]
-Progress = Callable[[int, int], Any]  # rows done since the last call, in all
-DepthOf = Callable[[RoomsFile, int], Array]  # planar depth (H, W) of a row
 
-NAMES = ("cut-out", "picture-outline", "balls", "outline-regression", "outline-relief", "nearest")
+ROUNDS = 12
+OFF = 1.5  # standard deviations, estimated by the median absolute deviation
+LEAST = 1.5 / 255.0  # of radiance: 8-bit pictures hold no smaller difference
+DEGREE = 2
+SMALLEST = 12  # pixels of a blob
+DepthOf = Callable[[RoomsFile, int], Array]  # planar depth (H, W) of a row
 LEARNING = ("outline-regression", "outline-relief", "nearest")
 # Scene units: between the median (0.166) and the mean (0.182) of the relief of objects in images of
 # `--preset shapes --views 0,5,35,55,80 --n 300 --seed 7 --size 64`.
@@ -44,33 +47,64 @@ MOST_IMAGES = 1500  # of training rooms, spread evenly
 CELLS = 16  # a side, of the pictures that `nearest` compares
 
 
-@one_thread()
-def write_cut_outs(
-    name: str,
-    data: str | Path,
-    out: str | Path,
-    *,
-    train: str | Path | None = None,
-    overwrite: bool = False,
-    progress: Progress = lambda done, total: None,
-) -> None:
-    """Write the submission of one of NAMES for a rooms file.
+def outline_mask(
+    image: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+) -> Array:
+    """Return the pixels that show objects, (H, W) bool.
 
-    Raises SpecError for an unknown name, and where training rooms are missing, not used by the
-    baseline, or made with the test file's seed; else as `RoomsFile`.
+    Args:
+        image: linear radiance, (H, W, 3).
+        world_from_camera: (4, 4).
+        room_size: of a closed room, (3,); None for the paper's room.
     """
-    check_choice("baseline", name, NAMES)
-    if (name in LEARNING) != (train is not None):
-        expected = "rooms to learn from" if name in LEARNING else f"none, as {name} learns nothing"
-        raise SpecError("train", "none" if train is None else train, expected)
-    shown: Shown = "first_view" if name == "balls" else "scored_view"
-    with RoomsFile(data) as rooms:
-        depth_of = _learned(name, rooms, train) if train is not None else WITHOUT_TRAINING[name]
-        how: dict[str, Any] = {"method": name, "shown": shown, "overwrite": overwrite}
-        with RoomPredictionWriter(out, data, **how) as submission:
-            for row in range(len(rooms)):
-                submission.add(row, depth_of(rooms, row))
-                progress(1, len(rooms))
+    return residual(image, world_from_camera, fov_y_degrees, room_size)[1]
+
+
+def residual(
+    image: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+) -> tuple[Array, Array]:
+    """Return how far each pixel lies off the fitted shading, (H, W, 3), and the mask (H, W)."""
+    height, width = image.shape[:2]
+    depth, normal = empty_room(world_from_camera, fov_y_degrees, height, width, room_size)
+    points = transform_points(world_from_camera, back_project(depth, fov_y_degrees))
+    places = points if room_size is None else points / room_size
+    facing = normal @ world_from_camera[:3, :3].T
+    walls = np.argmax(np.abs(facing), axis=-1)
+    off, mask = np.zeros(image.shape), np.zeros(image.shape[:2], bool)
+    for axis, far in itertools.product(range(3), (False, True)):
+        wall = (walls == axis) & ((facing[..., axis] < 0) == far)
+        if np.count_nonzero(wall) < 4 * (DEGREE + 1) ** 2:
+            continue
+        a, b = (2.0 * places[wall][:, k] - 1.0 for k in range(3) if k != axis)
+        basis = np.stack(
+            [a**i * b**j for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)], axis=1
+        )
+        off[wall], mask[wall] = _off_the_fit(basis, image[wall].astype(np.float64))
+    return off, _cleaned(mask)
+
+
+def _off_the_fit(basis: Array, values: Array) -> tuple[Array, Array]:
+    """Return the residuals of colours (N, 3) from a robust fit, and which lie off it, (N,)."""
+    kept = np.ones(len(values), bool)
+    for _ in range(ROUNDS):
+        weights = np.linalg.lstsq(basis[kept], values[kept], rcond=None)[0]
+        rest = values - basis @ weights
+        distance = np.abs(rest).max(axis=1)
+        limit = max(OFF * 1.4826 * float(np.median(distance[kept])), LEAST)
+        new = distance <= limit
+        if np.array_equal(new, kept) or np.count_nonzero(new) < 2 * basis.shape[1]:
+            break
+        kept = new
+    return rest, ~kept
+
+
+def _cleaned(mask: Array) -> Array:
+    """Return a mask without single pixels, holes and small blobs."""
+    smooth = ndimage.median_filter(mask, 3)
+    filled = ndimage.binary_fill_holes(smooth)
+    blobs, count = ndimage.label(filled)
+    pixels = np.bincount(blobs.ravel(), minlength=count + 1)
+    return np.asarray(filled & (pixels[blobs] >= SMALLEST))
 
 
 def _camera(rooms: RoomsFile, row: int) -> tuple[Array, float]:
@@ -79,9 +113,14 @@ def _camera(rooms: RoomsFile, row: int) -> tuple[Array, float]:
     return matrix, float(rooms.read("camera/fov_y_degrees", row))
 
 
-def _empty(rooms: RoomsFile, row: int) -> Array:
+def empty(rooms: RoomsFile, row: int) -> tuple[Array, Array]:
+    """Return depth and normals of the room of a row without its objects."""
     size = rooms.spec.height, rooms.spec.width
-    return empty_room(*_camera(rooms, row), *size, rooms.room_size(row))[0]
+    return empty_room(*_camera(rooms, row), *size, rooms.room_size(row))
+
+
+def _empty(rooms: RoomsFile, row: int) -> Array:
+    return empty(rooms, row)[0]
 
 
 def _mask(rooms: RoomsFile, row: int) -> Array:
@@ -149,20 +188,13 @@ WITHOUT_TRAINING: dict[str, DepthOf] = {
 }
 
 
-def _learned(name: str, rooms: RoomsFile, train: str | Path) -> DepthOf:
+def learned(name: str, training: RoomsFile) -> DepthOf:
     """Return what a baseline of LEARNING predicts after it has seen training rooms."""
-    with RoomsFile(train) as training:
-        if training.spec.seed == rooms.spec.seed:
-            found = f"the test file's seed, {rooms.spec.seed}, and so its cameras and places"
-            raise SpecError("train", found, "another seed", "render training rooms with another")
-        sizes = [f"images of {file.spec.height}x{file.spec.width}" for file in (training, rooms)]
-        if name == "nearest" and sizes[0] != sizes[1]:
-            raise SpecError("train", sizes[0], f"{sizes[1]}, as in the test file")
-        count = min(len(training), MOST_IMAGES)
-        rows = np.unique(np.linspace(0, len(training) - 1, count).astype(int))
-        if name == "nearest":
-            return partial(_nearest, *_pictures(training, rows))
-        seen = [_outline_pixels(training, row) for row in rows.tolist()]
+    count = min(len(training), MOST_IMAGES)
+    rows = np.unique(np.linspace(0, len(training) - 1, count).astype(int))
+    if name == "nearest":
+        return partial(_nearest, *_pictures(training, rows))
+    seen = [_outline_pixels(training, row) for row in rows.tolist()]
     features = np.concatenate([features for _, features, _ in seen])
     relief = np.concatenate([relief[mask] for mask, _, relief in seen])
     known = np.isfinite(relief)

@@ -5,6 +5,7 @@ cubes nor rotations. The audit's probes see the same; `iqtt floors` measures wha
 """
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +25,6 @@ Array = NDArray[Any]
 Progress = Callable[[int, int], Any]  # questions done since the last call, in all
 CHUNK = 64  # questions in memory at once
 ENSEMBLE = 3  # sets of trees
-
-
 Outlines = tuple[Array, Array]  # features and distances, as `iqtt.audit.features.outlines` has them
 
 
@@ -33,48 +32,34 @@ Outlines = tuple[Array, Array]  # features and distances, as `iqtt.audit.feature
 def write_outline(
     data: str | Path,
     out: str | Path,
-    *,
-    overwrite: bool = False,
-    progress: Progress = lambda done, total: None,
-) -> None:
-    """Answer the questions of a file by the nearest outline; no label is used.
-
-    Raises as `open_questions` and `write_answers`.
-    """
-    with open_questions(data) as questions:
-        seen = read_outlines(questions, len(questions), progress)
-    scores = nearest_scores(seen)
-    write_answers(out, data, method="outline", scores=scores, overwrite=overwrite)
-
-
-@one_thread()
-def write_outline_trees(
-    data: str | Path,
-    out: str | Path,
-    train: str | Path,
+    train: str | Path | None = None,
     labels: int | None = None,
     *,
     overwrite: bool = False,
     progress: Progress = lambda done, total: None,
 ) -> None:
-    """Answer the questions of a file by trees that learn from labelled ones. Deterministic.
+    """Answer the questions of a file by the nearest outline, or by trees. Deterministic.
 
     Args:
-        train: a file with labelled questions of as many answers, such as iqtt-train.h5.
+        train: a file with labelled questions of as many answers, such as iqtt-train.h5, from which
+            the trees learn; without it no label is used.
         labels: how many of its labelled questions to learn from, the first ones; all by default.
 
-    Raises SpecError where the training file has no answers or fewer than `labels`, asks questions
-    with another number of answers, or is the file to answer; else as `open_questions` and
-    `write_answers`.
+    Raises SpecError as `check_training`; else as `open_questions` and `write_answers`.
     """
-    with open_questions(data) as questions, open_labelled(train) as labelled:
-        count = check_training(questions, labelled, labels)
-        learned = read_outlines(labelled, count, progress)
-        right = labelled.read("answers", slice(0, count)).astype(np.int64)
+    with ExitStack() as stack:
+        questions = stack.enter_context(open_questions(data))
+        if train is not None:
+            labelled = stack.enter_context(open_labelled(train))
+            count = check_training(questions, labelled, labels)
+            learned = read_outlines(labelled, count, progress)
+            right = labelled.read("answers", slice(0, count)).astype(np.int64)
         seen = read_outlines(questions, len(questions), progress)
-    scores = tree_scores(learned, right, seen)
-    text = f"{count} labels of {train}"
-    write_answers(out, data, method="outline-trees", scores=scores, notes=text, overwrite=overwrite)
+    method, notes, scores = "outline", "", nearest_scores(seen)
+    if train is not None:
+        method, notes = "outline-trees", f"{count} labels of {train}"
+        scores = tree_scores(learned, right, seen)
+    write_answers(out, data, method=method, scores=scores, notes=notes, overwrite=overwrite)
 
 
 def read_outlines(

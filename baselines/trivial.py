@@ -1,7 +1,6 @@
 """Trivial submissions, which any model should beat, and the oracle, which none can.
 
-`constant` and `mean-depth` take their means from a training file and never see the test file's
-truth; `empty-room` is told the test file's cameras and the room's exact walls, but no objects.
+Those of rooms have no 3D, and all but the oracle know nothing of objects but what `cut_outs` says.
 """
 
 from collections.abc import Callable
@@ -11,20 +10,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from baselines import cut_outs
 from iqtt.files.reader import open_questions
-from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.submissions.layout import Shown
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
 from scenegen.common.random.seeding import Purpose, item_rng
+from scenegen.common.threads import one_thread
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
-ROOM_BASELINES = ("constant", "mean-depth", "empty-room", "oracle")
+Predict = Callable[[RoomsFile, int], tuple[Array, ...]]  # depth, perhaps normals, of a row
+MEANS = ("constant", "mean-depth")
+LEARNING = (*MEANS, *cut_outs.LEARNING)
+ROOM_BASELINES = (*MEANS, "empty-room", "oracle", *cut_outs.WITHOUT_TRAINING, *cut_outs.LEARNING)
+SHOWN: dict[str, Shown] = {
+    **dict.fromkeys((*MEANS, "empty-room"), "no_view"),
+    "balls": "first_view",
+}
 Progress = Callable[[int, int], Any]  # rows done since the last call, in all
 
 
+@one_thread()
 def write_room_baseline(
     name: str,
     data: str | Path,
@@ -40,36 +48,22 @@ def write_room_baseline(
     - mean-depth: at each pixel the mean of the training file's depths there.
     - empty-room: depth and normals of the room without objects, computed from the known camera.
     - oracle: the truth itself, which must score perfectly.
+    - those of `cut_outs`.
 
     Raises SpecError for an unknown name, and where a training file is missing, not used by the
     baseline, of another image size, or made with the test file's seed; else as `RoomsFile`.
     """
-    learns = name in ("constant", "mean-depth")
     check_choice("baseline", name, ROOM_BASELINES)
-    if learns and train is None:
-        expected = f"rooms to learn from, as {name} predicts their mean depth"
+    if (name in LEARNING) != (train is not None):
+        expected = "rooms to learn from" if name in LEARNING else f"none, as {name} learns nothing"
         hint = "such as those of: scenegen render --n 1000 --seed 1 --out train.h5"
-        raise SpecError("train", "none", expected, hint)
-    if not learns and train is not None:
-        raise SpecError("train", train, "none", f"{name} learns nothing")
+        raise SpecError("train", train or "none", expected, "" if train else hint)
     with RoomsFile(data) as rooms:
-        learned = _mean_depth(rooms, train) if train is not None else np.empty(0)
-        if name == "constant":
-            learned = np.full_like(learned, learned.mean())
-        shown: Shown = "scored_view" if name == "oracle" else "no_view"
-        with RoomPredictionWriter(
-            out, data, method=name, shown=shown, overwrite=overwrite
-        ) as submission:
+        predict = _untaught(name) if train is None else _learned(name, rooms, train)
+        how: dict[str, Any] = {"shown": SHOWN.get(name, "scored_view"), "overwrite": overwrite}
+        with RoomPredictionWriter(out, data, method=name, **how) as submission:
             for row in range(len(rooms)):
-                if learns:
-                    submission.add(row, learned)
-                elif name == "oracle":
-                    submission.add(row, rooms.read("depth", row), rooms.read("normal", row))
-                else:
-                    matrix = rooms.read("camera/world_from_camera", row)
-                    fov = float(rooms.read("camera/fov_y_degrees", row))
-                    size = rooms.spec.height, rooms.spec.width
-                    submission.add(row, *empty_room(matrix, fov, *size, rooms.room_size(row)))
+                submission.add(row, *predict(rooms, row))
                 progress(1, len(rooms))
 
 
@@ -81,26 +75,44 @@ def write_chance(data: str | Path, out: str | Path, seed: int = 0, overwrite: bo
     write_answers(out, data, method="chance", answer=answers, overwrite=overwrite)
 
 
-def _mean_depth(rooms: RoomsFile, train: str | Path) -> Array:
-    """Return the training file's mean depth at each pixel, (H, W), scene units.
+def _untaught(name: str) -> Predict:
+    if name == "oracle":
+        return lambda rooms, row: (rooms.read("depth", row), rooms.read("normal", row))
+    if name == "empty-room":
+        return cut_outs.empty
+    depth_of = cut_outs.WITHOUT_TRAINING[name]
+    return lambda rooms, row: (depth_of(rooms, row),)
 
-    A pixel that never shows a surface gets the mean of all pixels.
-    """
+
+def _learned(name: str, rooms: RoomsFile, train: str | Path) -> Predict:
+    """Return what a baseline of LEARNING predicts after it has seen training rooms."""
     with RoomsFile(train) as training:
-        same_rooms = training.fingerprint == rooms.fingerprint
-        if same_rooms or training.spec.seed == rooms.spec.seed:
+        if training.fingerprint == rooms.fingerprint or training.spec.seed == rooms.spec.seed:
             message = f"the test file's seed, {rooms.spec.seed}, and so its cameras and places"
             hint = "scenegen render --seed makes others"
             raise SpecError("train", message, "another seed", hint)
         sizes = [f"images of {file.spec.height}x{file.spec.width}" for file in (training, rooms)]
-        if sizes[0] != sizes[1]:
+        if sizes[0] != sizes[1] and name in (*MEANS, "nearest"):
             raise SpecError("train", sizes[0], f"{sizes[1]}, as in the test file")
-        shape = training.spec.height, training.spec.width
-        total, count = np.zeros(shape), np.zeros(shape)
-        for row in range(len(training)):
-            depth = training.read("depth", row)
-            surface = np.isfinite(depth)
-            total += np.where(surface, depth, 0.0)
-            count += surface
+        if name in MEANS:
+            mean = _mean_depth(training)
+            mean = np.full_like(mean, mean.mean()) if name == "constant" else mean
+            return lambda rooms, row: (mean,)
+        depth_of = cut_outs.learned(name, training)
+    return lambda rooms, row: (depth_of(rooms, row),)
+
+
+def _mean_depth(training: RoomsFile) -> Array:
+    """Return the mean depth at each pixel, (H, W), scene units.
+
+    A pixel that never shows a surface gets the mean of all pixels.
+    """
+    shape = training.spec.height, training.spec.width
+    total, count = np.zeros(shape), np.zeros(shape)
+    for row in range(len(training)):
+        depth = training.read("depth", row)
+        surface = np.isfinite(depth)
+        total += np.where(surface, depth, 0.0)
+        count += surface
     overall = total.sum() / max(count.sum(), 1.0)
     return np.where(count > 0, total / np.maximum(count, 1.0), overall)

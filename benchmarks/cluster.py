@@ -11,7 +11,8 @@ import time
 from functools import partial
 from pathlib import Path
 
-from benchmarks.markdown import table
+from tabulate import tabulate
+
 from scenegen.common.cgroup import processors
 from scenegen.description.specs import DatasetSpec
 from scenegen.files.sets.cluster import LOCAL, connected
@@ -59,7 +60,7 @@ def main() -> None:
     rates |= {f"a cluster of {n}": of_cluster(options.n, size, n) for n in (1, 2, 4)}
     first = rates["--workers 1"]
     rows = [[name, f"{rate:.0f}", f"{rate / first:.2f}"] for name, rate in rates.items()]
-    print(table(["who renders", "images/s", "ratio"], rows))
+    print(tabulate(rows, ["who renders", "images/s", "ratio"], "pipe", disable_numparse=True))
     print(f"\nscheduling with two workers: {1e3 * scheduling(options.empty, 2):.2f} ms a call")
 
 

@@ -113,7 +113,7 @@ def rooms(_seeds: int) -> Commands:
 
 # ---- studies: the paper's ablations; settings of the reference model on one training file ----
 
-NO_LOSS = "reconstruction=0 code_reconstruction=0 consistency=0 mutual_information=0 contrast=0"
+NO_LOSS = "reconstruction=0 code_reconstruction=0 mutual_information=0 contrast=0"
 RECONSTRUCTION = "reconstruction=1 code_reconstruction=1 absolute_differences=false"
 LOSSES = {
     "adversarial": f"{NO_LOSS} adversarial=1",

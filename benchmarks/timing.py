@@ -26,7 +26,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from benchmarks.markdown import table
+from tabulate import tabulate
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def print_table(head: str, rows: Iterable[Row], folder: str) -> dict[str, Speed]
         *(head, "images/s, median", "best", "images", "processors busy", "CPU-ms an image"),
         *("MiB", "remarks"),
     ]
-    print(table(columns, cells), "\n")
+    print(tabulate(cells, columns, "pipe", disable_numparse=True), "\n")
     return speeds
 
 

@@ -13,8 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from baselines.depth_match.answers import answers_of
-from baselines.depth_match.network import METHOD, Card, Settings, channels, symmetric
+from baselines.depth_match.network import METHOD, Card, Settings, answers_of, channels, symmetric
 from baselines.relief.network import UNet
 from baselines.relief.training import learning_rate, shape_loss
 from baselines.training.baseline import Baseline, Lesson, Run

@@ -1,4 +1,4 @@
-"""`pix2shape train` and `predict`: each reads its options and makes one library call.
+"""The commands `pix2shape`: each reads its options and makes one library call.
 
 Heavy imports happen inside the commands, so that `--help` is quick and works without torch.
 """
@@ -12,9 +12,9 @@ from typing import Any
 import click
 
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import LARGEST, MOST_PROCESSES, OVERWRITE
+from scenegen.command_line.options import LARGEST, MOST_PROCESSES, OVERWRITE, Items
 from scenegen.command_line.output import print_line, progress_bar
-from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder
+from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder, OutputPath
 from scenegen.common.errors import SceneGenError
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
@@ -37,6 +37,22 @@ DEVICE = click.option(
     default="auto",
     show_default=True,
     help="Where to compute; auto takes a GPU if there is one.",
+)
+MINUTES = click.option(
+    "--minutes",
+    type=click.FloatRange(0, 1e6, min_open=True),
+    help="End training so many minutes from now, with a schedule of as many iterations as fit.",
+)
+STREAM = click.option(
+    "--stream",
+    metavar="NAME,...",
+    help="Instead of --data: presets of rooms, or kinds of questions, that are rendered meanwhile.",
+)
+ALLOW_TEST_SET = click.option(
+    "--allow-test-set", is_flag=True, help="Learn from a named test set, or from its scenes."
+)
+ROOMS = click.option(
+    "--data", type=InputPath(), required=True, help="Rooms whose images are encoded."
 )
 
 
@@ -74,21 +90,6 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
             raise click.UsageError(f"--set: {name!r:.40} is given twice")
         chosen[name] = value
     return chosen
-
-
-MINUTES = click.option(
-    "--minutes",
-    type=click.FloatRange(0, 1e6, min_open=True),
-    help="End training so many minutes from now, with a schedule of as many iterations as fit.",
-)
-STREAM = click.option(
-    "--stream",
-    metavar="NAME,...",
-    help="Instead of --data: presets of rooms, or kinds of questions, that are rendered meanwhile.",
-)
-ALLOW_TEST_SET = click.option(
-    "--allow-test-set", is_flag=True, help="Learn from a named test set, or from its scenes."
-)
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape train --data rooms.h5 --out run")
@@ -173,14 +174,18 @@ def train(
     needs_torch()
     from baselines.pix2shape.network.config import model_config
     from baselines.pix2shape.training.run import train_run
-    from baselines.training import launch
-    from baselines.training.machine import Machine
+    from baselines.training.machine import (
+        Machine,
+        is_first_here,
+        is_told_elsewhere,
+        torchrun_counts,
+    )
 
     chosen = named_once(settings, **({} if seed is None else {"seed": seed}))
     if resume and (config or chosen or labels or conditional or start):
         options = "--config, --set, --seed, --labels, --conditional and --start"
         raise click.UsageError(f"--resume goes on with the run's own {options}; leave them out")
-    here, machines = launch.torchrun_counts()
+    here, machines = torchrun_counts()
     machine = Machine(device, devices or here, nodes or machines, workers, every, minutes)
     try:
         given = training_data(() if data is None else (data,), stream, allow_test_set)
@@ -199,11 +204,11 @@ def train(
                 progress=show,
             )
     except KeyboardInterrupt:
-        if not launch.is_first_here():
+        if not is_first_here():
             sys.exit(1)
         raise
     except (SceneGenError, OSError) as error:
-        if launch.is_told_elsewhere(error):
+        if is_told_elsewhere(error):
             sys.exit(2)
         raise
     if weights is not None:  # None in all processes but the first
@@ -218,9 +223,8 @@ def training_data(paths: tuple[str, ...], stream: str | None, allow_test_set: bo
 
     Raises UsageError unless one of --data and --stream is given, SpecError for a named test set.
     """
-    from baselines.training.data import TrainingFiles
+    from baselines.training.data import TrainingFiles, refuse_test_set
     from baselines.training.streams import TrainingStreams
-    from baselines.training.test_sets import refuse_test_set
 
     if (stream is None) == (not paths):
         raise click.UsageError("say where to learn from: --data or --stream, one of them")
@@ -259,7 +263,7 @@ def shown_training(
     try:
         yield show
     except KeyboardInterrupt:
-        from baselines.training.launch import is_first_here
+        from baselines.training.machine import is_first_here
 
         if is_first_here():
             click.echo()
@@ -332,4 +336,104 @@ def needs_torch(who: str = "pix2shape", packages: tuple[str, ...] = PACKAGES) ->
     needs(who, packages, "model")
 
 
-COMMANDS = (train, predict)
+def _picture(name: str, text: str = "Picture to write.") -> Any:
+    """Return the option `--out` of a command that draws."""
+    return click.option("--out", type=OutputPath(), default=name, show_default=True, help=text)
+
+
+@click.command(epilog=f"{EXAMPLE}pix2shape sample --weights shapes-rays --out samples.png")
+@click.option(
+    "--weights", type=WEIGHTS_PATH, default="shapes-rays", show_default=True, help=f"{A_MODEL}."
+)
+@_picture("samples.png")
+@number("--n", "count", least=1, most=256, default=16, text="Number of samples.")
+@click.option("--class", "label", help="Class that a conditional model samples  [each in turn].")
+@number("--seed", least=0, default=0, text="Seed of codes, cameras and lights.")
+@OVERWRITE
+def sample(
+    weights: str, out: str, count: int, label: str | None, seed: int, overwrite: bool
+) -> None:
+    """Draw samples of the model's prior, as images, depths and normals."""
+    needs_torch()
+    from baselines.pix2shape.pictures import check_picture, sample_sheet, save_pictures
+    from baselines.pix2shape.weights import open_weights
+
+    check_picture(out, False, overwrite)
+    model, card = open_weights(weights)
+    save_pictures([sample_sheet(model, card, count, seed, label)], out, overwrite)
+    print_line(f"{out}: {count} samples")
+
+
+@click.command(
+    epilog=f"{EXAMPLE}pix2shape interpolate --data rooms.h5 --items 0,5 --out interpolation.png"
+)
+@WEIGHTS
+@ROOMS
+@click.option(
+    "--items", type=Items(), default="0,1", show_default=True, help="The two rows to go between."
+)
+@number("--steps", least=2, most=64, default=8, text="Number of codes.")
+@_picture("interpolation.png")
+@OVERWRITE
+def interpolate(
+    weights: str | None, data: str, items: list[int], steps: int, out: str, overwrite: bool
+) -> None:
+    """Draw the way from one room's code to another's, seen from the first room's camera."""
+    if len(items) != 2:
+        raise click.UsageError(f"--items: found {len(items)} rows, expected two such as 0,1")
+    model, rooms, items = _model_and_rooms(weights, data, items, out, overwrite)
+    from baselines.pix2shape.pictures import interpolation_sheet, save_pictures
+
+    save_pictures([interpolation_sheet(model, rooms, items[0], items[1], steps)], out, overwrite)
+    print_line(f"{out}: from row {items[0]} to row {items[1]} of {data}")
+
+
+@click.command(epilog=f"{EXAMPLE}pix2shape rotate --data rooms.h5 --items 0-5 --out rotation.gif")
+@WEIGHTS
+@ROOMS
+@click.option(
+    "--items", type=Items(), default="0-5", show_default=True, help="Rows of the rooms to turn."
+)
+@number("--degrees", least=0, most=90, default=80, text="Camera's turn about the vertical axis.")
+@number("--frames", least=2, most=200, default=33, text="Number of pictures on the way there.")
+@_picture("rotation.gif", "GIF or WebP to write.")
+@OVERWRITE
+def rotate(
+    weights: str | None,
+    data: str,
+    items: list[int],
+    degrees: int,
+    frames: int,
+    out: str,
+    overwrite: bool,
+) -> None:
+    """Draw an animation in which the camera turns around rooms that the model saw in one image."""
+    model, rooms, items = _model_and_rooms(weights, data, items, out, overwrite, animated=True)
+    from baselines.pix2shape.pictures import rotation_frames, save_pictures
+
+    angles = [degrees * i / (frames - 1) for i in range(frames)]
+    save_pictures(rotation_frames(model, rooms, items, angles), out, overwrite)
+    print_line(f"{out}: {len(items)} scenes turned by {degrees} degrees")
+
+
+def _model_and_rooms(
+    weights: str | None,
+    data: str,
+    items: list[int],
+    out: str,
+    overwrite: bool,
+    animated: bool = False,
+) -> tuple[Any, Any, list[int]]:
+    """Check the picture's name; return model, rooms and the rows, which are checked, too."""
+    needs_torch()
+    from baselines.pix2shape.pictures import check_picture, open_known_rooms
+    from baselines.pix2shape.weights import open_weights, suited
+    from scenegen.files.pictures import pick_rows
+
+    check_picture(out, animated, overwrite)
+    model, card = open_weights(weights or suited(data))
+    rooms = open_known_rooms(data, card)
+    return model, rooms, pick_rows(len(rooms), items)
+
+
+COMMANDS = (train, predict, sample, interpolate, rotate)

@@ -10,7 +10,7 @@ from baselines.pix2shape.network.config import TAUGHT_DEPTH, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.training.checkpoint import Card as BaseCard
 from baselines.training.checkpoint import Method, check_numbers, load_weights
-from baselines.training.launch import PRECISIONS
+from baselines.training.machine import PRECISIONS
 from baselines.training.questions import is_question_file
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError

@@ -1,8 +1,7 @@
 """Depth from one image of a room: networks that learn relief in three ways.
 
     network.py           the network: an encoder and a decoder joined at every size
-    training.py          how they learn, on any targets, and the loss of shape
-    predict.py           submissions
+    training.py          how they learn, on any targets, the loss of shape, and what they predict
     depth_supervised.py  targets are the true depth
     view_pairs.py        targets are found by matching views of a scene
     depth_completed.py   what the first view shows, completed for other cameras

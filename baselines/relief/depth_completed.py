@@ -11,13 +11,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from baselines.pix2shape.matching.search import STEPS, paper_rooms_only, reliefs, reprojected
+from baselines.pix2shape.matching import STEPS, paper_rooms_only, reliefs, reprojected
 from baselines.pix2shape.network.architecture import RAY_PLANES
 from baselines.pix2shape.network.empty_rooms import NEAREST, Cameras, empty_rooms, planes_of
 from baselines.relief import depth_supervised, training
 from baselines.relief.network import Card, Relief, Settings, UNet, predicted_depth
-from baselines.relief.predict import FILES, views_of
-from baselines.relief.training import Lessons
+from baselines.relief.training import FILES, Lessons, views_of
 from baselines.training.baseline import Baseline, Lesson, Run
 from baselines.training.checkpoint import Method, bundled, load_weights
 from baselines.training.rooms import Rooms

@@ -10,8 +10,7 @@ from torch import Tensor
 from baselines.pix2shape.network.empty_rooms import empty_rooms
 from baselines.relief import training
 from baselines.relief.network import Card, Settings, relief_network
-from baselines.relief.predict import FILES, views_of
-from baselines.relief.training import Lessons
+from baselines.relief.training import FILES, Lessons, views_of
 from baselines.training.baseline import Baseline
 from baselines.training.checkpoint import Method
 from baselines.training.rooms import Rooms

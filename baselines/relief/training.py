@@ -1,4 +1,4 @@
-"""How relief networks learn, on any targets."""
+"""How relief networks learn, on any targets, and what they predict of rooms."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -12,13 +12,21 @@ import torch
 from torch import Tensor
 
 from baselines.pix2shape.network.empty_rooms import Cameras
-from baselines.relief.network import Card, Relief, Settings
-from baselines.training.baseline import Lesson, Run
+from baselines.pix2shape.predict import enlarged_views
+from baselines.relief.network import Card, Relief, Settings, predicted_depth
+from baselines.training.baseline import Lesson, Run, Views
 from baselines.training.checkpoint import State
 from baselines.training.data import requests
 from baselines.training.fit import Loss
-from baselines.training.images import Draws
-from baselines.training.rooms import Rooms, read_rooms
+from baselines.training.images import Array, Draws, check_reducible
+from baselines.training.rooms import (
+    Rooms,
+    camera_poses,
+    input_views,
+    read_rooms,
+    room_images,
+    room_sizes,
+)
 from baselines.training.streams import Shown, TrainingStreams
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.rooms.reader import RoomsFile
@@ -26,6 +34,10 @@ from scenegen.rooms.reader import RoomsFile
 WARM_UP = 200  # iterations
 SLOPE = 2.0  # weight of differences between neighbours, in the loss of shape
 WHOLE = 0.2  # of training, its end: whole images are shown; before that, windows around objects
+FILES = Path(__file__).with_name("files")
+TOLD = "told: the camera, and where the empty room's floor and walls are"
+FROM = "each view is predicted from its own image"
+FROM_FIRST = "each view is predicted from the image of the scene's first one"
 
 
 @dataclass(frozen=True, eq=False)
@@ -248,3 +260,32 @@ def windows(maps: Sequence[Tensor], shown: Tensor, side: int, place: Tensor) -> 
         window = channels_last[images, row[:, :, None], column[:, None]]
         cut.append(window.movedim(-1, 1) if each.dim() == 4 else window)
     return cut
+
+
+def views_of(told_in_training: str, network: Relief, card: Card, rooms: RoomsFile) -> Views:
+    """Return what a network predicts of every view of a file of rooms.
+
+    It predicts each view from its own image, or each scene from one image alone, view 0 or the
+    first that the file holds. The submission's notes say it, too.
+    """
+    size, from_first = card.settings.size, network.from_first_view
+    check_reducible(rooms.path, rooms.spec.height, rooms.spec.width, size)
+    poses = torch.from_numpy(camera_poses(rooms, closed=True).astype(np.float32))
+    fov = rooms.read("camera/fov_y_degrees", slice(None))
+    sizes = room_sizes(rooms) if rooms.spec.interior else None
+    source = np.arange(len(rooms))
+    if from_first:
+        inputs, place = input_views(rooms)
+        source = inputs[place]
+
+    def depth(rows: Array) -> Tensor:
+        image = room_images(rooms, source[rows], size)
+        own = float(fov[rows[0]]), None if sizes is None else sizes[rows]
+        cameras = target_cameras = Cameras(poses[source[rows]], *own)
+        if from_first:
+            target_cameras = Cameras(poses[rows], *own)
+        return predicted_depth(network, image, cameras, target_cameras)
+
+    notes = f"{FROM_FIRST if from_first else FROM}; {TOLD}{told_in_training}"
+    shown = "first_view" if from_first else "scored_view"
+    return Views(enlarged_views(rooms, depth), shown, card.method, notes)

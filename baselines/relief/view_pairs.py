@@ -13,11 +13,10 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from baselines.pix2shape.matching.relief import matched_rows, relief_of_rows
+from baselines.pix2shape.matching import matched_rows, relief_of_rows
 from baselines.relief import training
 from baselines.relief.network import Card, Settings, relief_network
-from baselines.relief.predict import FILES, views_of
-from baselines.relief.training import Lessons
+from baselines.relief.training import FILES, Lessons, views_of
 from baselines.training.baseline import Baseline
 from baselines.training.checkpoint import Method
 from baselines.training.rooms import Rooms

@@ -8,8 +8,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from baselines.resnets.architecture import ResNet
-from baselines.resnets.card import Card
-from baselines.resnets.training import resnet_baseline
+from baselines.resnets.training import Card, resnet_baseline
 from baselines.training.checkpoint import Method
 
 HIDDEN = (2048, 512, 256)

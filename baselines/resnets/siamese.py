@@ -7,8 +7,7 @@ import torch
 from torch import Tensor, nn
 
 from baselines.resnets.architecture import ResNet
-from baselines.resnets.card import Card
-from baselines.resnets.training import resnet_baseline
+from baselines.resnets.training import Card, resnet_baseline
 from baselines.training.checkpoint import Method
 
 FEATURES = 2048

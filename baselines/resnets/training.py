@@ -1,27 +1,76 @@
-"""Training on labelled questions: each iteration takes one step on one batch."""
+"""ResNets that answer questions: settings, card, training on labelled questions, and answers."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 import torch
 from torch import Tensor, nn
 
-from baselines.resnets.answering import accuracy, answers_of
-from baselines.resnets.card import Card, Settings
-from baselines.training.baseline import Baseline, Lesson, Run
-from baselines.training.checkpoint import Method, State
+from baselines.resnets.architecture import DEPTHS
+from baselines.training import checkpoint
+from baselines.training.baseline import Answers, Baseline, Lesson, Run
+from baselines.training.checkpoint import Method, Ranges, State, check_numbers
 from baselines.training.data import only, requests
 from baselines.training.fit import Loss
 from baselines.training.images import Draws, check_reducible
-from baselines.training.questions import LABELED, check_labels, question_images, training_answers
-from iqtt import QuestionsFile
+from baselines.training.machine import chosen_device
+from baselines.training.questions import (
+    LABELED,
+    check_labels,
+    each_question,
+    question_images,
+    training_answers,
+)
+from iqtt import QuestionsFile, open_questions
+from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
+from scenegen.common.records import LARGEST, check
 
 VALIDATION = "iqtt-val.h5"
 AnswerLoss = Callable[[Tensor, Tensor], Tensor]
+BATCH = 32  # questions at a time
+
+
+@dataclass(frozen=True)
+class Settings(checkpoint.Settings):
+    """Settings of networks and training; `size` is 128 in the paper's released files.
+
+    Attributes:
+        depth: 18 or 50 layers of the ResNet; 50 in the paper.
+        width: channels of its first stage; 64 in the paper.
+        learning_rate: of the first step; it falls linearly to 0.
+    """
+
+    RANGES: ClassVar[Ranges] = {"width": (4, 256), "size": (16, 1024), "batch": (1, 4096)}
+    depth: int = 18
+    width: int = 16
+    iterations: int = 400
+
+    def __post_init__(self) -> None:
+        check(self.depth in DEPTHS, "depth", self.depth, " or ".join(map(str, DEPTHS)))
+        super().__post_init__()
+
+
+@dataclass(frozen=True)
+class Card(checkpoint.Card):
+    """The card of a ResNet.
+
+    Attributes:
+        answers: number of answers of each question.
+        validation: accuracy on iqtt-val.h5 beside the training file; None where there is none.
+    """
+
+    settings: Settings
+    answers: int = 3
+    validation: float | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_numbers(self, {"answers": (2, 16), "labels": (1, LARGEST)})
 
 
 def resnet_baseline(
@@ -118,3 +167,52 @@ def permuted(images: Tensor, right: Tensor, seed: int, iteration: int) -> tuple[
     rows = torch.arange(len(images))[:, None]
     mixed = torch.cat([images[:, :1], images[rows, 1 + order]], dim=1)
     return mixed, (order == right[:, None]).int().argmax(dim=1)
+
+
+def answers_of(
+    any_number: bool, network: nn.Module, card: Card, questions: QuestionsFile
+) -> Answers:
+    """Return how a network answers questions.
+
+    Args:
+        any_number: whether it answers questions of another number of answers than it was trained
+            on.
+
+    Raises SpecError where it does not.
+    """
+    count = questions.answers
+    if count != card.answers and not any_number:
+        raise SpecError(
+            questions.path,
+            f"questions of {count} answers",
+            f"{card.answers}, as those that {card.method} was trained on",
+            f"its last layer has an output for each answer; train it on questions of {count}",
+        )
+    device = chosen_device("auto")
+    network.to(device)
+    run = f"{card.labels} labels, seed {card.settings.seed}"
+    return Answers(lambda images: scores(network, images.to(device)), BATCH, run=run)
+
+
+def scores(network: nn.Module, images: Tensor) -> Tensor:
+    """Return the score of each answer, (Q, K), of images on the network's device."""
+    answered: Tensor = network.eval()(images)
+    return answered
+
+
+def accuracy(network: nn.Module, path: Path, size: int, answers: int) -> float | None:
+    """Return the share of a file's questions that are answered right.
+
+    None where there is no such file, or it has no questions of so many answers, or tells none.
+    """
+    if not path.is_file():
+        return None
+    device = next(network.parameters()).device
+    with open_questions(path) as questions:
+        if not len(questions) or not questions.has_answers or questions.answers != answers:
+            return None
+        values = each_question(
+            questions, size, lambda images: scores(network, images.to(device)), BATCH
+        )
+        chosen = values.argmax(dim=1).numpy()
+        return float((chosen == questions.read("answers", slice(None))).mean())

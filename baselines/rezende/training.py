@@ -9,12 +9,14 @@ bound, all random choices of which derive from (seed, i):
 
 The second term keeps at the sphere what no image shows, the far side.
 
-The gradient of the first term with respect to decoder(z) is sampled by
-`estimator.sampled_gradient`. From there it goes to decoder and encoder by the chain rule, as z is
-reparametrised.
+The first term is behind a renderer that has no gradients. So the decoder's output is taken as the
+mean of a Gaussian of fixed width over meshes, and the expected loss is differentiated (REINFORCE:
+Williams, Machine Learning 8, 1992), with antithetic pairs of samples: `sampled_gradient`. From
+there the gradient goes to decoder and encoder by the chain rule, as z is reparametrised.
 """
 
-from dataclasses import replace
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import repeat
 from pathlib import Path
@@ -26,10 +28,8 @@ from torch.nn import functional
 from torch.optim import AdamW
 
 from baselines.rezende.answers import answers_of
-from baselines.rezende.estimator import sampled_gradient, with_gradient
-from baselines.rezende.images import Pictures, read_question_pictures
 from baselines.rezende.network import METHOD, Card, Head, Model, Settings, codes_of, divergence
-from baselines.rezende.rasteriser import project, rasterise
+from baselines.rezende.rasteriser import Views, project, rasterise
 from baselines.training.baseline import Baseline, Lesson, Run
 from baselines.training.checkpoint import State, load_weights
 from baselines.training.data import only
@@ -39,17 +39,117 @@ from baselines.training.questions import (
     LABELED,
     UNLABELED,
     check_labels,
+    check_truth,
     each_question,
+    question_images,
+    question_lights,
     training_answers,
 )
 from iqtt import QuestionsFile
 from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import check
 
+MOST_QUESTIONS = 5_000  # that are read; their 20,000 small images take 250 MB
 WINDOW = 0.16  # half the side of the window of pixels around a vertex, as a share of the picture
 LARGEST_SLOPE = 1000.0  # norm of all gradients
 # Of the head.
 STEPS, LEARNING_RATE, WEIGHT_DECAY = 300, 0.002, 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Pictures:
+    """N images of one object each, in memory.
+
+    Attributes:
+        image: linear radiance, (N, 3, S, S) float32.
+        radius: of the sphere that the mesh starts from, in the unit of `views`.
+        views: camera and shading of the images, with their N rows of lights.
+        fingerprint: of the data, so that a run goes on with the data that it began with.
+    """
+
+    image: Array
+    radius: float
+    views: Views
+    fingerprint: str
+
+    def __len__(self) -> int:
+        return len(self.image)
+
+    def views_of(self, rows: Array) -> Views:
+        """Return the camera and the lights of some images."""
+        position, color = self.views.light_position[rows], self.views.light_color[rows]
+        return replace(self.views, light_position=position, light_color=color)
+
+
+def read_question_pictures(questions: QuestionsFile, size: int) -> Pictures:
+    """Read the images of a file's first questions, at most MOST_QUESTIONS, four after four.
+
+    As in the Pix2Shape paper, lights, cameras, reflectance and background are told; shapes,
+    rotations and answers are not read. The mesh starts from half the sphere that the camera frames.
+    Lengths are scaled so that every question has the same distance of the camera, which changes no
+    image.
+
+    Raises FileFormatError; SpecError where the file tells no lights, or its images cannot be
+    reduced to `size` x `size`.
+    """
+    check_truth(questions)
+    check_reducible(questions.path, questions.height, questions.width, size)
+    spec, count = questions.spec, min(len(questions), MOST_QUESTIONS)
+    assert spec is not None, "check_truth asks for it"
+    images = [image for row in range(count) for image in question_images(questions, row, size)]
+    position, color = question_lights(questions, count)
+    rows = len(images), position.shape[2], 3
+    views = Views(
+        size=size,
+        fov_y_degrees=spec.fov_y_degrees,
+        distance=spec.camera_distance,
+        reflectance=np.array(spec.reflectance),
+        ambient=np.array(spec.ambient),
+        background=np.array(spec.background),
+        attenuation=(0.0, 1.0),
+        light_position=position.reshape(rows),
+        light_color=color.reshape(rows),
+    )
+    return Pictures(np.stack(images), 0.5 * spec.max_radius, views, str(questions.fingerprint))
+
+
+def sampled_gradient(
+    loss: Callable[[Tensor], Tensor],
+    mean: Tensor,
+    width: float,
+    pairs: int,
+    generator: torch.Generator,
+) -> Tensor:
+    """Return an unbiased estimate of d E[loss(x)] / d mean, x ~ N(mean, width^2), like `mean`.
+
+    The score of a Gaussian is eps / width, where x = mean + width eps. Samples come in pairs of
+    eps and -eps, each the baseline of the other:
+
+        gradient = sum_k eps_k (loss_k+ - loss_k-) / (2 width pairs)
+        loss_k+ = loss(mean + width eps_k),  loss_k- = loss(mean - width eps_k)
+
+    It is exact in expectation for the smoothed loss, and for a quadratic loss equals the gradient
+    of the loss itself. Where an element of x can only change a part of the loss, the rest of the
+    loss is noise to it; then `loss` may return to each element its own part.
+
+    Args:
+        loss: (M, B, ...) -> (M, B), or (M, B, V) with a part for each of the elements that follow
+            B; called once, and no gradient is asked of it.
+        mean: (B, ...); gradients of it are not followed.
+        pairs: number of antithetic pairs for each of the B.
+    """
+    with torch.no_grad():
+        noise = torch.randn((pairs, *mean.shape), generator=generator)
+        steps = width * torch.cat([noise, -noise])
+        losses = loss(mean.detach() + steps)
+        difference = (losses[:pairs] - losses[pairs:]) / (2 * width)
+        weights = difference.view(*difference.shape, *(1,) * (noise.dim() - difference.dim()))
+        return (weights * noise).mean(dim=0)
+
+
+def with_gradient(value: Tensor, gradient: Tensor) -> Tensor:
+    """Return a number whose gradient with respect to `value` is `gradient`."""
+    return (value * gradient.detach()).sum()
 
 
 def lesson(run: Run, *, labels: int = 0, start: str | None = None) -> Lesson:

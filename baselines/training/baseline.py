@@ -1,22 +1,41 @@
-"""A trained baseline as data: what it adds to the training and the submissions that all share."""
+"""A trained baseline as data, and the training and the submissions that all share."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import torch
 from torch import Tensor
 
-from baselines.training.checkpoint import WEIGHTS, Method, Settings, State, save_weights
+from baselines.training.checkpoint import (
+    WEIGHTS,
+    Method,
+    Settings,
+    State,
+    alone_in,
+    begun,
+    bundled,
+    earlier_state,
+    load_weights,
+    save_weights,
+)
 from baselines.training.data import TrainingFiles
 from baselines.training.fit import Loss, Progress, falling_late, fit
 from baselines.training.images import Array, read_ahead
 from baselines.training.machine import Machine, chosen_device
-from baselines.training.run_folder import alone_in, begun, earlier_state
+from baselines.training.questions import each_question, is_question_file, open_test
 from baselines.training.streams import TrainingStreams
 from iqtt import QuestionsFile
+from metrics.prediction_writer import RoomPredictionWriter, write_answers
+from scenegen import open_rooms
+from scenegen.common.errors import SpecError
 from scenegen.common.records import check
+from scenegen.files.new_file import check_writable
 from scenegen.rooms.reader import RoomsFile
+
+RowsDone = Callable[[int, int], Any]  # rows done since the last call, rows in all
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +113,7 @@ class Views:
 
     predicted: Iterator[tuple[Array, Array, Array]]
     shown: Any
-    method: str
+    method: str = ""
     notes: str = ""
     run: str = ""
 
@@ -180,3 +199,69 @@ def train(
             network, card = state.network, state.card
         save_weights(folder / WEIGHTS, method, network, lesson.finish(network, card))
     return folder / WEIGHTS
+
+
+def write_submission(
+    baseline: Baseline,
+    data: str | Path,
+    out: str | Path,
+    weights: str | Path | None = None,
+    *,
+    overwrite: bool = False,
+    progress: RowsDone = lambda done, total: None,
+) -> None:
+    """Predict rooms or answer questions with the weights of a baseline.
+
+    Args:
+        weights: a file that `train` wrote; None for those of the package.
+
+    Raises SpecError where weights and data do not fit; FileFormatError; OSError.
+    """
+    method, tasks = baseline.method, {"questions": baseline.answers, "rooms": baseline.views}
+    task = "questions" if is_question_file(data) else "rooms"
+    able = [name for name, act in tasks.items() if act]
+    if task not in able:
+        raise SpecError(data, task, f"{able[0]}, which {method.name} is for")
+    name = method.name if len(able) == 1 else f"{method.name}-{task}"
+    network, card = load_weights(weights or bundled(baseline.files, method, name), method)
+    predict: Any = partial(tasks[task], network, card)  # type: ignore[arg-type, misc]
+    how: dict[str, Any] = {"overwrite": overwrite, "progress": progress}
+    submit(data, out, method.name, card.settings.size, predict, **how)
+
+
+@torch.inference_mode()
+def submit(
+    data: str | Path,
+    out: str | Path,
+    method: str,
+    size: int,
+    predict: Callable[[Any], Any],
+    *,
+    overwrite: bool = False,
+    progress: RowsDone = lambda done, total: None,
+) -> None:
+    """Write answers to questions and their scores, or depth and normals of every view of rooms.
+
+    Args:
+        method: of the submission, unless `Views` have another one.
+        size: of the images of questions that the network takes, pixels.
+        predict: gives `Answers` of an open file of questions, or `Views` of one of rooms. It raises
+            SpecError where it cannot.
+    """
+    check_writable(Path(out), overwrite)
+    how: dict[str, Any] = {"overwrite": overwrite}
+    if is_question_file(data):
+        with open_test(data, size) as questions:
+            told = predict(questions)
+            values = each_question(questions, size, told.scores, told.batch, progress=progress)
+        how |= {"method": method, "run": told.run, "notes": told.notes}
+        write_answers(out, data, scores=values.double().numpy(), **how)
+        return
+    with open_rooms(data) as rooms:
+        views = predict(rooms)
+        how |= {"method": views.method or method, "run": views.run, "notes": views.notes}
+        with RoomPredictionWriter(out, data, shown=views.shown, **how) as submission:
+            for rows, depths, normals in views.predicted:
+                for row, depth, normal in zip(rows.tolist(), depths, normals, strict=True):
+                    submission.add(row, depth, normal)
+                progress(len(rows), len(rooms))

@@ -1,11 +1,12 @@
 """Weights and checkpoints: safetensors files that hold their card. Reading them runs no code.
 
 Weights go by the network's own names for them. In a checkpoint these begin with "network.", and the
-moments of each optimiser with its name.
+moments of each optimiser with its name. One run has a folder at a time.
 """
 
 import errno
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar, Generic, TypeVar
@@ -20,6 +21,7 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.common.records import LARGEST, check, from_json, normalise, to_json
 from scenegen.files.new_file import written_beside
+from scenegen.files.sets.workspace import run_lock
 
 CHECKPOINT, WEIGHTS = "checkpoint.safetensors", "weights.safetensors"
 CONTENTS = ("weights 1", "checkpoint 1")  # by version; one note, as their order is not kept
@@ -27,6 +29,7 @@ NETWORK = "network."
 MOMENTS = ("exp_avg", "exp_avg_sq", "step")  # of Adam
 Ranges = Mapping[str, tuple[float, float]]  # of numbers, by name
 OTHER_CARD = "these are weights of another configuration than the card's"
+NetworkT = TypeVar("NetworkT", bound=nn.Module)
 
 
 @dataclass(frozen=True)
@@ -90,7 +93,6 @@ def check_numbers(record: Any, ranges: Ranges) -> None:
 
 
 CardT = TypeVar("CardT", bound=Card)
-NetworkT = TypeVar("NetworkT", bound=nn.Module)
 
 
 def one_adam(_card: Any, network: nn.Module) -> dict[str, Adam]:
@@ -186,7 +188,9 @@ def bundled(folder: Path, method: Method[Any, Any], name: str = "") -> Path:
     """
     path = folder / f"{name or method.name}.safetensors"
     if not path.is_file():
-        hint = f"train some with `bench train {method.name}`, and name them with --weights"
+        hint = (
+            f"`bench train {method.name}` makes some for `bench baseline {method.name} --weights`"
+        )
         raise SpecError("weights", f"none of {method.name} in this package", "a file", hint)
     return path
 
@@ -306,3 +310,70 @@ def _load(
         wrong = error.inside(path)
         raise FileFormatError(wrong.where, wrong.found, wrong.expected, wrong.hint) from error
     return tensors, card
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Make the folder of a run, and keep other runs out of it for the block.
+
+    New folders in which nothing was written are removed. Raises SceneGenError where another run
+    trains there, whose checkpoints this one would replace; OSError.
+    """
+    new = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with run_lock(folder / ".lock", folder, "wait for it, or name another folder"):
+            yield
+    finally:
+        for path in new:
+            with suppress(OSError):  # it is not empty
+                path.rmdir()
+
+
+def check_new(folder: Path) -> None:
+    """Raise FileExistsError where a new run would replace a checkpoint or weights."""
+    if (folder / CHECKPOINT).exists():
+        message = "holds a checkpoint; say --resume, or name another folder"
+        raise FileExistsError(errno.EEXIST, message, str(folder))
+    if (folder / WEIGHTS).exists():
+        message = "is there, and a new run would replace it; name another folder"
+        raise FileExistsError(errno.EEXIST, message, str(folder / WEIGHTS))
+
+
+def earlier_state(
+    folder: Path, method: Method[CardT, NetworkT], resume: bool
+) -> State[CardT, NetworkT] | None:
+    """Return the state of the folder's checkpoint, with `resume`; None for a new run.
+
+    Raises FileExistsError where a new run finds files of another; OSError, FileFormatError.
+    """
+    if resume:
+        return load_checkpoint(folder, method)
+    check_new(folder)
+    return None
+
+
+def begun(
+    method: Method[CardT, NetworkT],
+    card: CardT,
+    earlier: State[CardT, NetworkT] | None,
+    where: object,
+    device: torch.device | None = None,
+) -> State[CardT, NetworkT]:
+    """Return the state from which a run goes on: that of its checkpoint, or a new one.
+
+    Args:
+        card: of a new run on these data.
+        where: the data, for messages.
+        device: to which the state is moved; by default it stays on the CPU.
+
+    Raises SpecError where the earlier state saw other data.
+    """
+    state = new_state(method, card) if earlier is None else earlier
+    trained_on, mark = state.card.fingerprint, card.fingerprint
+    if mark != trained_on:
+        expected = f"{trained_on[:12]}, on which the run was trained"
+        raise SpecError(where, f"fingerprint {mark[:12]}", expected, "resume with the same data")
+    if device is not None:
+        state.to(device)
+    return state

@@ -30,8 +30,7 @@ from baselines.training.checkpoint import (
     save_weights,
 )
 from baselines.training.machine import Machine
-from baselines.training.processes import average, is_first, processes
-from scenegen.common.errors import SceneGenError
+from baselines.training.processes import TrainingError, average, is_first, processes
 from scenegen.common.records import check
 
 Progress = Callable[[int, int, Mapping[str, float]], Any]  # iterations done, in all, losses
@@ -39,10 +38,6 @@ DIVERGED = "begin again with a smaller learning rate or other weights of the los
 FETCHED = 20  # iterations after which losses come from a GPU
 PLANS = 50  # how often a run with a limit of time plans the rest of its schedule
 UNPLANNED = 10**7  # iterations of its schedule before it knows its pace
-
-
-class TrainingError(SceneGenError):
-    """Training cannot go on: a loss is not finite, or memory is short."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,10 @@ from torch import Tensor, distributed, nn
 from scenegen.common.errors import SceneGenError
 
 
+class TrainingError(SceneGenError):
+    """Training cannot go on: a loss is not finite, or memory is short."""
+
+
 class LostProcessError(SceneGenError):
     """Another process of the run ended, or cannot be reached any more."""
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import iqtt
-from baselines.training.test_sets import refuse_request
+from baselines.training.data import refuse_request
 from iqtt import QuestionStream, SplitSpec
 from iqtt.questions.kinds import DISTRACTORS
 from iqtt.questions.specs import MAX_QUESTIONS

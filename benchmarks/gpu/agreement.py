@@ -17,8 +17,8 @@ from typing import Any
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+from tabulate import tabulate
 
-from benchmarks.markdown import table
 from iqtt.files.make import make_split
 from iqtt.questions.specs import SUITE, SplitSpec
 from scenegen.common.errors import BackendError
@@ -121,7 +121,8 @@ def main() -> None:
         cells += [f"{rates[device]:,.0f}", f"{rates['cpu']:,.0f}"]
         cells += [f"{rates[device] / rates['cpu']:.1f}", f"{waits[device]:.0%}"]
         # A line at a time: a run that is stopped leaves the rows before.
-        print("\n".join(table(HEAD, [cells]).splitlines()[2 if row else 0 :]), flush=True)
+        lines = tabulate([cells], HEAD, "pipe", disable_numparse=True).splitlines()
+        print("\n".join(lines[2 if row else 0 :]), flush=True)
         if ids < 1 or depths < GOAL:
             missed.append(name)
     print(f"\n{NOTES}")

@@ -17,8 +17,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
+from tabulate import tabulate
+
 from benchmarks.commands import is_done, run
-from benchmarks.markdown import table
 from scenegen.files.new_file import write_text
 
 MOST_BYTES = 60_000_000  # of the result
@@ -207,7 +208,8 @@ def gather(folder: Path, outcomes: Sequence[tuple[str, str, float]]) -> str:
     if files and run(work, command):
         parts.append(f"## Scores\n\n{ranked.read_text()}")
     rows = [(name, outcome, f"{seconds:.0f}") for name, outcome, seconds in outcomes]
-    parts.append(f"## Steps\n\n{table(('step', 'outcome', 'seconds'), rows, texts=2)}")
+    steps = tabulate(rows, ("step", "outcome", "seconds"), "pipe", disable_numparse=True)
+    parts.append(f"## Steps\n\n{steps}")
     return "\n\n".join(parts) + "\n"
 
 

@@ -9,7 +9,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from benchmarks.markdown import table
+from tabulate import tabulate
+
 from scenegen.common.cgroup import processors
 from scenegen.common.errors import BackendError
 from scenegen.description.presets import preset_spec
@@ -48,7 +49,7 @@ def main() -> None:
     for workers in options.workers:
         rates = [images_a_second(device, workers, options.images) for device in devices]
         rows.append([str(workers), *(f"{rate:,.0f}" for rate in rates)])
-    print(table(("processes", *devices), rows, texts=0))
+    print(tabulate(rows, ("processes", *devices), "pipe", disable_numparse=True))
 
 
 if __name__ == "__main__":

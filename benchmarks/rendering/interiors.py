@@ -16,8 +16,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from tabulate import tabulate
 
-from benchmarks.markdown import table
 from scenegen.objects.catalogue import objects_of
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import RoomsFile
@@ -109,4 +109,4 @@ if __name__ == "__main__":
         "depths",
         "drawn again",
     ]
-    print(table(titles, rows))
+    print(tabulate(rows, titles, "pipe", disable_numparse=True))

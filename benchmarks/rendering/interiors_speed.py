@@ -11,7 +11,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from benchmarks.markdown import table
+from tabulate import tabulate
+
 from scenegen.common.cgroup import processors
 from scenegen.description.presets import preset_spec
 from scenegen.objects.catalogue import objects_of
@@ -98,4 +99,4 @@ if __name__ == "__main__":
     scenes = int(sys.argv[1]) if len(sys.argv) > 1 else 16
     head = ["pixels", "drawing", "truth", "picture", "Mitsuba's paths"]
     print(f"seconds a scene, {scenes} scenes, {processors()} processors, no denoiser\n")
-    print(table(head, [row(size, scenes) for size in SIZES]))
+    print(tabulate([row(size, scenes) for size in SIZES], head, "pipe", disable_numparse=True))

@@ -1,8 +1,7 @@
 """Streams beside files of the same rows, once both are running: a Markdown table, and what follows.
 
-    python -m benchmarks.rendering.stream [--quick] [--device cuda]
+    python -m benchmarks.rendering.stream [--quick]
 
-With --device, a stream is measured whose pixels stay on the device, beside one of numpy arrays.
 Images have 128x128 pixels, with depth and normals; questions have four images each, colour only.
 To leave the start out, each row is the difference between a run of 3 N rows and one of N.
 """
@@ -23,12 +22,8 @@ STEP, ROWS = 0.04, 64  # seconds of a step of training that waits, and its image
 FIRST = "import scenegen; next(iter(scenegen.RoomStream('shapes', batch=64)))"
 
 
-def running(
-    what: str, preset: str, count: int, workers: int, folder: str, **device: Any
-) -> dict[str, Any]:
+def running(what: str, preset: str, count: int, workers: int, folder: str) -> dict[str, Any]:
     """Time the rows N to 3 N of a stream or a file of rooms or questions; `what` says which."""
-    import torch
-
     from iqtt import QuestionStream, SplitSpec, make_split
     from scenegen import RoomStream, make_dataset
     from scenegen.description.presets import preset_spec
@@ -45,9 +40,8 @@ def running(
             make_split(f"{folder}/split", spec, **how)
         else:
             stream = RoomStream if what == "rooms stream" else QuestionStream
-            for batch in stream(preset, batch=64, stop=rows, workers=workers, **device):
-                if device.get("on_device"):
-                    torch.from_dlpack(batch["depth"]).sum().item()  # waits for the device
+            for _ in stream(preset, batch=64, stop=rows, workers=workers):
+                pass
 
     make(3 * count)  # fills the caches
     few, few_busy = processors_busy(lambda: make(count))
@@ -74,16 +68,6 @@ def rows(folder: str, quick: bool) -> Iterator[Row]:
             "rendering.stream:running",
             {**how, "workers": 2, "folder": folder},
         )
-
-
-def rows_on_device(folder: str, device: str, count: int) -> Iterator[Row]:
-    """Yield the rows of the table of a device."""
-    how = {"what": "rooms stream", "count": count, "workers": 0, "folder": folder}
-    for preset in ("shapes", "shapenet"):
-        for on_device in (False, True):
-            where = "stays there" if on_device else "to numpy"
-            more = {"preset": preset, "device": device, "on_device": on_device}
-            yield f"{preset}, {device}, {where}", "rendering.stream:running", {**how, **more}
 
 
 def waiting(steps: int) -> float:
@@ -124,15 +108,9 @@ def main() -> None:
     """Print the table, and what is measured beside it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="measure fewer rows")
-    parser.add_argument("--device", help="measure streams on a device alone")
-    options = parser.parse_args()
-    quick = options.quick
+    quick = parser.parse_args().quick
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
         Path(folder, "cache").mkdir()
-        if options.device:
-            count = 1_000 if quick else 20_000
-            print_table("once running", rows_on_device(folder, options.device, count), folder)
-            return
         speeds = print_table("once running, 2 workers", rows(folder, quick), folder)
     named: dict[str, Speed | None] = dict.fromkeys(name for name, *_ in rows("", quick))
     named |= speeds

@@ -12,10 +12,10 @@ from collections import Counter
 from functools import partial
 from pathlib import Path
 
-from benchmarks.markdown import table
+from tabulate import tabulate
+
 from benchmarks.torture import cases
-from benchmarks.torture.growth import growth
-from benchmarks.torture.jobs import JOBS, job
+from benchmarks.torture.jobs import JOBS, growth, job
 from benchmarks.torture.runs import Torture
 
 PARTS = {
@@ -47,7 +47,7 @@ def main() -> None:
                 survived[trouble] += not problem
                 print(f"{trouble}: {problem or 'survived'}", file=sys.stderr, flush=True)
     lines = [[name, str(tried[name]), str(survived[name])] for name in sorted(tried)]
-    print(table(["trouble", "runs", "survived"], lines))
+    print(tabulate(lines, ["trouble", "runs", "survived"], "pipe", disable_numparse=True))
     print(f"\n{survived.total()} of {tried.total()} runs survived")
     sys.exit(survived != tried)
 

@@ -1,9 +1,16 @@
-"""Runs of the size of users' jobs, by name: each must end well, within a limit of memory."""
+"""Runs of the size of users' jobs: each must end well, within a limit of memory.
 
+In long runs, open files and memory must not grow with the number of shards and of images.
+"""
+
+import os
 import shlex
+import statistics
 import subprocess
 import sys
+import time
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +24,21 @@ WATCHED = """
 import resource, subprocess, sys
 done = subprocess.run([sys.executable, "-c", *sys.argv[1:]], stdout=subprocess.DEVNULL)
 print(done.returncode, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1000)
+"""
+MANY, LONG = "--n 600 --shard-size 2", "--n 100000 --shard-size 5000"
+RENDER = "render {} --size 32 --min-visible-pixels 3 --seed 3 --out rooms.h5 --workers 2"
+MOST_OPEN = 64  # files of a process, libraries' and the 32 shards that a reader keeps included
+GROWTH, ROOM = 1.05, 20  # by how much memory may grow: a factor, and MB
+# Read a row of each shard, twice, and print the largest number of open files.
+READER = """
+import os, sys
+from scenegen.rooms.reader import RoomsFile
+most = 0
+with RoomsFile("rooms.h5") as rooms:
+    for row in [*range(0, len(rooms), 2), *range(0, len(rooms), 2)]:
+        rooms.read("depth", row)
+        most = max(most, len(os.listdir("/proc/self/fd")))
+print(most)
 """
 
 
@@ -75,3 +97,63 @@ def run_job(name: str, folder: Path) -> str:
         if peak > JOBS[name].most:
             return f"{peak:.0f} MB: {command}"
     return ""
+
+
+def growth(torture: Torture, _count: int) -> Results:
+    """Count open files over runs of many shards, and memory over a run of many images."""
+    if not Path("/proc/self/statm").exists():
+        yield "open files and memory", "not tried: no /proc"
+        return
+    where = torture.fresh("many")
+    files, _ = _watched(torture, MANY)
+    yield "open files of a run of 300 shards", _too_many(files)
+    read = subprocess.run(
+        [sys.executable, "-c", READER], cwd=where, env=torture.environment,
+        stdout=subprocess.PIPE, text=True, check=False,
+    )  # fmt: skip
+    problem = _too_many([int(read.stdout or 0)])
+    yield "open files of a reader of 300 shards", problem
+    torture.fresh("long")
+    files, memory = _watched(torture, LONG)
+    yield "open files of a run of 100,000 images", _too_many(files)
+    quarter = len(memory) // 4
+    early = statistics.median(memory[quarter : 2 * quarter])
+    late = statistics.median(memory[-quarter:])
+    sizes = f"{early:.0f} MB in the second quarter, {late:.0f} MB in the last"
+    print(f"memory of all processes: {sizes}", file=sys.stderr)
+    yield "memory of a run of 100,000 images", sizes if late > GROWTH * early + ROOM else ""
+
+
+def _too_many(counts: Sequence[int]) -> str:
+    print(f"at most {max(counts)} open files", file=sys.stderr)
+    return "" if 0 < max(counts) < MOST_OPEN else f"at most {max(counts)}"
+
+
+def _watched(torture: Torture, options: str) -> tuple[list[int], list[float]]:
+    """Run a command; return its open files and the MB of all its processes, ten times a second.
+
+    The files are [0] where the command failed.
+    """
+    words = RENDER.format(options).split()
+    process = subprocess.Popen(
+        [sys.executable, "-c", "import cli; cli.scenegen()", *words],
+        cwd=torture.where, env=torture.environment, stdout=subprocess.DEVNULL,
+    )  # fmt: skip
+    files, memory = [0], []
+    while process.poll() is None:
+        with suppress(OSError):  # a process that has just ended
+            files.append(len(os.listdir(f"/proc/{process.pid}/fd")))
+            memory.append(sum(map(_resident, _family(process.pid))))
+        time.sleep(0.1)
+    return ([0] if process.returncode else files), memory
+
+
+def _family(number: int) -> list[int]:
+    """Return a process and all that it started."""
+    children = Path(f"/proc/{number}/task/{number}/children").read_text().split()
+    return [number, *(member for child in children for member in _family(int(child)))]
+
+
+def _resident(number: int) -> float:
+    pages = int(Path(f"/proc/{number}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.description.specs import MAX_PIXELS
-from scenegen.files.exr import exr_channels
-from scenegen.files.pictures import is_turned, opened_picture, upright
+from scenegen.files.exr import exr_channels, layers_of
+from scenegen.files.pictures import ORIENTATION, opened_picture, upright
 
 Array = NDArray[Any]
 MOST_CHANNELS = 4
@@ -100,7 +100,7 @@ def _picture(path: Path, _name: str | None, vectors: bool) -> Array:
         if picture.mode in ("P", "PA"):
             raise ArrayFileError(path, "colours of a palette", "numbers", _AS_NUMBERS)
         is_colour_png = picture.format == "PNG" and picture.mode not in ("L", "I", "I;16", "F", "1")
-        if is_colour_png and is_turned(picture):
+        if is_colour_png and picture.getexif().get(ORIENTATION, 1) != 1:
             raise ArrayFileError(path, "EXIF data that turn it", "none", "save it without them")
         values = _colour_png(path) if is_colour_png else np.asarray(upright(picture))
         return _channels(path, values, vectors)
@@ -183,12 +183,10 @@ def _depths_of(channels: Mapping[str, Array]) -> list[str]:
 def _three_of(channels: Mapping[str, Array], name: str | None, path: Path) -> list[str]:
     """Return the names of three channels that are a vector. Raises ArrayFileError."""
     triples = [tuple(name.split(","))] if name else VECTOR_CHANNELS
-    for x, *others in triples:
-        layers = [c.removesuffix(x) for c in channels if c.endswith(f".{x}")]
-        named = [[layer + last for last in (x, *others)] for layer in ["", *layers]]
-        found = [three for three in named if channels.keys() >= set(three)]
-        if found and (found[0][0] == x or len(found) == 1):
-            return found[0]
+    for triple in triples:
+        found = layers_of(channels, triple)
+        if "" in found or len(found) == 1:
+            return found.get("") or next(iter(found.values()))
     expected = " or ".join(",".join(triple) for triple in triples)
     raise ArrayFileError(path, _listed(channels), expected, "name three with --array X,Y,Z")
 

@@ -60,7 +60,6 @@ def import_rooms(
                         *size_of(rooms, row),
                         frame=reading.frame,
                         missing=reading.missing,
-                        zeros="say --invalid 0",
                     )
                     writer.add(row, **fitted.values)
                 progress(1)

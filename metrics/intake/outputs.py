@@ -40,7 +40,6 @@ FRAMES: dict[Frame, Array] = {  # what an axis is multiplied by to be one of our
     "opengl": np.array([1.0, 1.0, 1.0]),
 }
 FILL = "say --missing nearest to fill them from the nearest pixel that has a value"
-NAN = "let the model return NaN"
 _WANTED = "a dict with one of " + ", ".join(KEYS)
 
 
@@ -142,21 +141,12 @@ def read_output(
 
 
 def fitted_to(
-    geometry: Geometry,
-    height: int,
-    width: int,
-    *,
-    frame: Frame,
-    missing: Missing,
-    zeros: str = NAN,
+    geometry: Geometry, height: int, width: int, *, frame: Frame, missing: Missing
 ) -> Geometry:
-    """Return a geometry of any size and frame in ours, at (H, W) pixels. Raises OutputError.
-
-    `zeros` says what helps where 0 stands for no value.
-    """
+    """Return a geometry of any size and frame in ours, at (H, W) pixels. Raises OutputError."""
     name, image, normal = geometry.key or geometry.kind, geometry.geometry, geometry.normal
     _refuse_shape(image, name, height, width)
-    _refuse_zeros(geometry, name, zeros)
+    _refuse_zeros(geometry, name)
     image = np.where(np.isfinite(image), image, np.nan)
     if geometry.kind == "points":
         image = image * FRAMES[frame]
@@ -217,12 +207,12 @@ def _fov(matrix: Any, height: int) -> float | None:
     return math.degrees(2.0 * math.atan(half / float(values[1, 1])))
 
 
-def _refuse_zeros(geometry: Geometry, name: str, hint: str) -> None:
+def _refuse_zeros(geometry: Geometry, name: str) -> None:
     """Raise OutputError for depths of 0: the camera's own place, or a file's mark for no value."""
-    count = np.count_nonzero(geometry.geometry == 0.0)
-    if geometry.kind == "depth" and geometry.alignment != "scale_shift" and count:
-        hint = f"where 0 stands for no value, {hint}"
-        raise OutputError(name, f"0 at {count} pixels", "depths above 0", hint)
+    zeros = np.count_nonzero(geometry.geometry == 0.0)
+    if geometry.kind == "depth" and geometry.alignment != "scale_shift" and zeros:
+        hint = "if 0 stands for no value, bench import --invalid 0, or let the model return NaN"
+        raise OutputError(name, f"0 at {zeros} pixels", "depths above 0", hint)
 
 
 def _refuse_shape(image: Array, name: str, height: int, width: int) -> None:

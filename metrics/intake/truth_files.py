@@ -81,7 +81,7 @@ def truth_of_files(
         if reading.kind == "disparity":
             truth = np.divide(1.0, truth, out=np.full_like(truth, np.nan), where=truth > 0.0)
         normal = None if normal is None else normal * FRAMES[reading.frame]
-        return Measured(read_picture(path, MAX_PIXELS), truth, matrix, normal, path)
+        return Measured(read_picture(path, MAX_PIXELS), truth, matrix, normal)
 
     return [
         Source(path.name, groups[row] or path.name, sizes[row], partial(measured, row))

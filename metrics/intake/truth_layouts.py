@@ -44,8 +44,7 @@ SINTEL_SKY = 1e9  # Blender's depth of what is no surface is 1e10
 DRIVE = r"(\d{4}_\d\d_\d\d_drive_\d{4}_sync)"
 FRAME = re.compile(DRIVE + r"\D(?:.*\D)?(\d{10})(?!\d)")
 SHORT_FRAME = re.compile(DRIVE + r"(?:\S*[\\/]|[\s,]+)(\d{1,9})(?!\d)")  # of lists alone
-SIDE = re.compile(r"image_0([23])|[\s,]([lr])\s*$")
-SIDES = {"l": "2", "r": "3"}  # numbers of the colour cameras
+LEFT, RIGHT = "2", "3"  # numbers of the colour cameras
 
 
 class Layout(NamedTuple):
@@ -90,17 +89,16 @@ def _other(path: Path, what: str) -> Path:
     return path
 
 
-def _below(folder: Path, path: Path, otherwise: str = "") -> str:
-    """Return the path of a folder within another one; its name, or another one, for itself."""
-    inside = path.is_relative_to(folder) and path != folder
-    return path.relative_to(folder).as_posix() if inside else otherwise or folder.name
+def _below(folder: Path, path: Path) -> str:
+    """Return the path of a folder within another one; of that itself its name."""
+    return folder.name if path == folder else path.relative_to(folder).as_posix()
 
 
 def _row(name: str, group: str, picture: Path, measure: Measure, *files: Path) -> Source:
     """Return a row of a picture, whose depth and matrix `measure` reads from files."""
 
     def read() -> Measured:
-        return Measured(read_picture(picture, MAX_PIXELS), *measure(*files), file=picture)
+        return Measured(read_picture(picture, MAX_PIXELS), *measure(*files))
 
     return Source(name, group, picture_size(picture, MAX_PIXELS), read)
 
@@ -119,8 +117,8 @@ def moge(folder: Path, _split: Path | None) -> Iterator[Source]:
         picture = next((p for p in (place / "image.jpg", place / "image.png") if p.is_file()), None)
         if picture is None:
             raise TruthError(place, "no image.jpg", "a picture beside its depth.png")
-        name, group = _below(folder, place), place.parent
-        yield _row(name, _below(folder, group, name), picture, _of_moge, place)
+        name = _below(folder, place)
+        yield _row(name, name.rpartition("/")[0] or name, picture, _of_moge, place)
 
 
 def _of_moge(place: Path) -> tuple[Array, Array]:
@@ -213,15 +211,14 @@ def kitti(folder: Path, split: Path | None) -> Iterator[Source]:
         if match and path.suffix.lower() in PICTURES and "velodyne_raw" not in parts:
             places = depths if "groundtruth" in parts else pictures
             places[match[1], match[2], _side(path.as_posix())] = path
-    keys = sorted(key for key in depths if key[2] == SIDES["l"])
+    keys = sorted(key for key in depths if key[2] == LEFT)
     if split is not None:
         lines = split.read_text(encoding="utf-8-sig", errors="replace").splitlines()
         listed = []
         for line in filter(str.strip, lines):
             match = FRAME.search(line) or SHORT_FRAME.search(line)
             if match is None:
-                expected = "lines with drive and frame, such as those of the Eigen split"
-                raise TruthError(split, repr(line[:80]), expected)
+                raise TruthError(split, repr(line[:80]), "drive and frame, as in the Eigen split")
             listed.append((match[1], f"{int(match[2]):010d}", _side(line)))
         keys = [key for key in listed if key in depths]  # 45 of 697 frames have no annotated depth
     if not keys:
@@ -229,19 +226,18 @@ def kitti(folder: Path, split: Path | None) -> Iterator[Source]:
     for key in keys:
         drive, frame, side = key
         if key not in pictures:
-            found_name = f"no picture of {drive}, frame {frame}"
             expected = f"{drive[:10]}/{drive}/image_0{side}/data/{frame}.png"
-            raise TruthError(folder, found_name, expected)
+            raise TruthError(folder, f"no picture of {drive}, frame {frame}", expected)
         calibration = pictures[key].parents[3] / "calib_cam_to_cam.txt"
-        name = f"{drive}_{frame}" + ("" if side == SIDES["l"] else f"_image_0{side}")
+        name = f"{drive}_{frame}" + f"_image_0{side}" * (side == RIGHT)
         measure = partial(_of_kitti, side)
         yield _row(name, drive, pictures[key], measure, depths[key], calibration)
 
 
 def _side(line: str) -> str:
     """Return the number of the camera that a path or a line names; the left one by default."""
-    match = SIDE.search(line)
-    return (match[1] or SIDES[match[2]]) if match else SIDES["l"]
+    match = re.search(r"image_0([23])|[\s,]r\s*$", line)
+    return (match[1] or RIGHT) if match else LEFT
 
 
 def _of_kitti(side: str, path: Path, calibration: Path) -> tuple[Array, Array | None]:
@@ -253,9 +249,8 @@ def _of_kitti(side: str, path: Path, calibration: Path) -> tuple[Array, Array | 
         try:
             matrix = np.array(numbers, np.float64).reshape(3, 4)[:, :3]
         except ValueError as error:
-            raise TruthError(
-                calibration, f"no P_rect_0{side} of 12 numbers", "KITTI's file"
-            ) from error
+            found = f"no P_rect_0{side} of 12 numbers"
+            raise TruthError(calibration, found, "KITTI's file") from error
     return read_array(path) / 256.0, matrix
 
 

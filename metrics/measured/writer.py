@@ -13,7 +13,6 @@ from metrics.measured.reader import matrix_fault
 from scenegen.common.errors import SceneGenError
 from scenegen.description.specs import MAX_PIXELS
 from scenegen.files.content import SHA256, joint_digest, seal
-from scenegen.files.pictures import is_turned, opened_picture
 from scenegen.files.row_file import new_hdf5_file, writer_name
 from scenegen.files.table import Table
 from scenegen.layout import TRUTH_DIGEST
@@ -36,14 +35,12 @@ class Measured:
         matrix: pinhole matrix, (3, 3), pixels; None where it is not known.
         normal: (H, W, 3), camera frame (x right, y up, z towards the viewer), of any length; 0 or
             NaN for none; None without normals.
-        file: that the image was read from; None for others.
     """
 
     image: Array
     depth: Array
     matrix: Array | None = None
     normal: Array | None = None
-    file: Path | None = None
 
 
 @dataclass(frozen=True)
@@ -108,11 +105,9 @@ def _row(item: Source, measured: Measured, height: int, width: int) -> dict[str,
         raise TruthError(f"{item.name}: image", found, f"({item.size[0]}, {item.size[1]}, 3) bytes")
     if depth.shape != image.shape[:2]:
         found, expected = f"shape {depth.shape}", f"{image.shape[:2]}, as the picture"
-        hint = "depth is never resampled here"
-        if measured.file is not None:
-            with opened_picture(measured.file, MAX_PIXELS) as picture:
-                if is_turned(picture):
-                    hint = "its EXIF data turn the picture: turn the depth, too"
+        turned = depth.shape == image.shape[1::-1]
+        hint = "EXIF data may turn the picture: turn the depth, too" if turned else ""
+        hint = hint or "depth is never resampled here"
         raise TruthError(f"{item.name}: depth", found, expected, hint)
     with np.errstate(over="ignore", invalid="ignore"):
         single = depth.astype(np.float32)

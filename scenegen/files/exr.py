@@ -1,5 +1,6 @@
 """OpenEXR files: their channels, and the picture among them."""
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,12 +10,7 @@ from numpy.typing import NDArray
 from scenegen.common.errors import FileFormatError
 
 Array = NDArray[Any]
-WHOLE = (
-    "Composite.Combined.",
-    "Combined.",
-    "rgba.",
-    "beauty.",
-)  # layers that show all, by renderer
+WHOLE = "Composite.Combined.", "Combined.", "rgba.", "beauty."  # ends of layers that show all
 
 
 def exr_channels(path: Path, most: int) -> dict[str, Array]:
@@ -28,7 +24,7 @@ def exr_channels(path: Path, most: int) -> dict[str, Array]:
         with OpenEXR.File(str(path), header_only=True) as file:
             for part in file.parts:
                 low, high = part.header["dataWindow"]
-                height, width = int(high[1] - low[1]) + 1, int(high[0] - low[0]) + 1
+                width, height = (int(b - a) + 1 for a, b in zip(low, high, strict=True))
                 if height * width > most:
                     raise FileFormatError(path, f"{height}x{width}", f"at most {most:,} pixels")
         with OpenEXR.File(str(path), separate_channels=True) as file:
@@ -45,6 +41,13 @@ def exr_channels(path: Path, most: int) -> dict[str, Array]:
         raise FileFormatError(path, f"a file that cannot be read ({reason:.120})") from error
 
 
+def layers_of(channels: Mapping[str, Array], names: Sequence[str]) -> dict[str, list[str]]:
+    """Return the channels of layers that have all of some names, by what stands before these."""
+    before = [c.removesuffix(names[0]) for c in channels if c.endswith(names[0])]
+    found = {layer: [layer + n for n in names] for layer in before if layer[-1:] in ("", ".")}
+    return {layer: some for layer, some in found.items() if channels.keys() >= set(some)}
+
+
 def exr_picture(path: Path, most: int) -> Array:
     """Return the colours of a file, (H, W, 3) float32, linear; a single channel is grey.
 
@@ -52,19 +55,14 @@ def exr_picture(path: Path, most: int) -> Array:
     where none is, and as `exr_channels`.
     """
     channels = exr_channels(path, most)
-    threes = {}
-    for name in channels:
-        layer, letters = name[:-1], "rgb" if name.endswith("r") else "RGB"
-        names = [layer + letter for letter in letters]
-        if name == names[0] and channels.keys() >= set(names):
-            threes[layer] = names
-    ends = ([layer for layer in threes if layer.endswith(end)] for end in WHOLE)
-    layers = [""] if "" in threes else next(filter(None, ends), [*threes])
-    names = threes[layers[0]] if len(layers) == 1 else []
+    found = layers_of(channels, "RGB") or layers_of(channels, "rgb")
+    ends = ([layer for layer in found if layer.endswith(end)] for end in WHOLE)
+    layers = [""] if "" in found else next(filter(None, ends), [*found])
+    names = found[layers[0]] if len(layers) == 1 else []
     grey = list(channels) if len(channels) == 1 else ["Y"]
-    if not threes and channels.keys() >= set(grey) and not {"RY", "BY"} & channels.keys():
+    if not found and channels.keys() >= set(grey) and not {"RY", "BY"} & channels.keys():
         names = grey * 3
     if len({channels[name].shape for name in names}) != 1:
-        found = f"the channels {', '.join(list(channels)[:12])}"
-        raise FileFormatError(path, found, "R, G and B of one layer", "save that layer alone")
+        listed = f"the channels {', '.join(list(channels)[:12])}"
+        raise FileFormatError(path, listed, "R, G and B of one layer", "save that layer alone")
     return np.stack([channels[name] for name in names], axis=-1).astype(np.float32)

@@ -23,6 +23,7 @@ LARGEST_SIDE = {".webp": 16_383, ".jpg": 65_500, ".jpeg": 65_500, ".gif": 65_535
 READ = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp", ".ppm", ".pgm")  # endings
 ORIENTATION = 0x0112  # of EXIF
 SWAPPED = (5, 6, 7, 8)  # its values that swap the sides
+PHOTOMETRIC = 262  # tag of TIFF files, 0 where 0 is white
 
 
 @contextmanager
@@ -59,11 +60,6 @@ def picture_size(path: Path, most: int) -> tuple[int, int]:
         is_turned_later = picture.format != "TIFF"  # whose head Pillow turns itself
         swapped = is_turned_later and picture.getexif().get(ORIENTATION) in SWAPPED
         return picture.size if swapped else picture.size[::-1]
-
-
-def is_turned(picture: "Image") -> bool:
-    """Return whether a picture has EXIF data that turn it."""
-    return bool(picture.getexif().get(ORIENTATION, 1) != 1)
 
 
 def read_picture(path: Path, most: int) -> NDArray[np.uint8]:
@@ -106,9 +102,11 @@ def shares_of(picture: "Image", side: int) -> NDArray[np.float32]:
 
 def _turned(picture: "Image") -> "Image":
     """Return a picture turned as its EXIF data say; of 16 bits a channel in the mode "I"."""
+    is_negative = getattr(picture, "tag_v2", {}).get(PHOTOMETRIC) == 0  # which Pillow leaves so
     picture = upright(picture)
     if picture.mode.startswith("I"):  # of which `convert` to bytes would cut off what is white
         picture = picture.convert("I")
+        picture = picture.point(lambda value: value * -1 + 65_535) if is_negative else picture
     if picture.mode == "F" or (picture.mode == "I" and np.asarray(picture).max() > 65_535):
         raise ValueError("numbers of 32 bits, expected 8 or 16")
     return picture

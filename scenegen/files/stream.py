@@ -243,11 +243,11 @@ class RowStream(Base):
         step, taken = shares * processes, [0] * processes  # batches that each process has made
 
         def begin(which: int) -> None:
-            """Let a process, a new one where there is none, make batches that were not taken."""
+            """Let a process make the batches that were not taken yet."""
             row = first + taken[which] * step * self.batch
             workers.begin(which, self, (row, share + shares * which, step, processes * readers))
 
-        def rows_of_next(which: int) -> int:
+        def next_of(which: int) -> tuple[int, int]:
             """Wait for a batch; where a signal ended its process, another one makes it again."""
             try:
                 return workers.answer(which)
@@ -255,7 +255,7 @@ class RowStream(Base):
                 if not error.by_signal:
                     raise
             try:
-                workers.started[which] = None
+                del workers.started[which]
                 begin(which)
                 return workers.answer(which)
             except LostWorkerError as error:
@@ -264,15 +264,16 @@ class RowStream(Base):
 
         try:
             for which in range(processes):
-                workers.forget(which)
+                workers.rest(which)
                 begin(which)
             for which in cycle(range(processes)):
-                rows, slot = rows_of_next(which), workers.waiting[which].popleft()
+                slot, rows = next_of(which)
                 if not rows:
-                    workers.memory.release(deque([slot]))
+                    workers.memory.free.append(slot)
                     return
                 taken[which] += 1
-                workers.add(which)
+                following = workers.memory.free_slot()
+                workers.ask(which, following, following)
                 yield workers.memory.arrays(slot, rows)
         except GeneratorExit:  # the loop ends early
             raise
@@ -346,26 +347,21 @@ class _Memory:
             (-(-size // ALIGNED) * ALIGNED for size in sizes), initial=0
         )
         self._size = -(-end // mmap.ALLOCATIONGRANULARITY) * mmap.ALLOCATIONGRANULARITY
-        self._free, self._maps = list[int](), dict[int, mmap.mmap]()
+        self.free, self._maps = list[int](), dict[int, mmap.mmap]()
 
     def free_slot(self) -> int:
         """Return the number of a free slot, perhaps a new one."""
-        if self._free:
-            return self._free.pop()
+        if self.free:
+            return self.free.pop()
         slot = len(self._maps)
         os.ftruncate(self.file, (slot + 1) * self._size)
         self._open(slot)
         return slot
 
-    def release(self, slots: deque[int]) -> None:
-        """Let slots be free that hold nothing."""
-        self._free.extend(slots)
-        slots.clear()
-
     def arrays(self, slot: int, rows: int) -> dict[str, Array]:
         """Return the first rows of a slot, by field."""
         whole = np.frombuffer(self._open(slot), np.uint8)
-        weakref.finalize(whole, self._free.append, slot)
+        weakref.finalize(whole, self.free.append, slot)
         return {
             name: np.ndarray((self._rows, *column.shape), column.dtype, whole, place)[:rows]
             for (name, column), place in zip(self._columns.items(), self._places, strict=True)
@@ -399,73 +395,58 @@ class _Filler:
 
 
 class _Workers:
-    """Processes that make batches of a stream, loop after loop, and the memory that they share.
+    """Processes that make batches of a stream, loop after loop, and the memory that they share."""
 
-    Attributes:
-        owner: the process that started them.
-        waiting: slots that each of them was asked to fill and whose answers were not heard.
-    """
-
-    def __init__(self, stream: RowStream, processes: int) -> None:
+    def __init__(self, stream: RowStream, count: int) -> None:
         self.memory = _Memory(stream, _unnamed_file())
-        self.owner, self.count = os.getpid(), processes
-        self.started: list[Process | None] = [None] * processes
-        self.waiting = [deque[int]() for _ in range(processes)]
-        self._due = [0] * processes  # answers before those to slots
+        self.owner, self.count, self.started = os.getpid(), count, dict[int, Process]()
+        # Slots that each was asked to fill, -1 for what needs none, and whose answers are due.
+        self.asked = [deque[int]() for _ in range(count)]
+
+    def ask(self, which: int, slot: int, message: Any) -> None:
+        """Hand a message over to a process."""
+        self.asked[which].append(slot)
+        with suppress(LostWorkerError):  # `answer` meets it
+            self.started[which].ask(pickle.dumps(message))
 
     def begin(self, which: int, stream: RowStream, part: tuple[int, int, int, int]) -> None:
-        """Let a process, a new one where there is none, make a share."""
-        process = self.started[which]
-        asked: list[Any] = [part]
-        if process is None:
-            process = self.started[which] = Process([self.memory.file])
-            asked.insert(0, _Filler(stream, self.memory.file))
-        self._due[which] = len(asked)
-        waiting = self.waiting[which]
-        waiting.extend(self.memory.free_slot() for _ in range(AHEAD - len(waiting)))
-        with suppress(LostWorkerError):  # `answer` meets it
-            for message in (*asked, *waiting):
-                process.ask(pickle.dumps(message))
+        """Let a process, a new one where there is none, make a share, in AHEAD slots."""
+        slots = [slot for slot in self.asked[which] if slot >= 0]
+        self.asked[which].clear()
+        if which not in self.started:
+            self.started[which] = Process([self.memory.file])
+            self.ask(which, -1, _Filler(stream, self.memory.file))
+        self.ask(which, -1, part)
+        for slot in slots or [self.memory.free_slot() for _ in range(AHEAD)]:
+            self.ask(which, slot, slot)
 
-    def add(self, which: int) -> None:
-        """Let a process make one batch more."""
-        self.waiting[which].append(self.memory.free_slot())
-        with suppress(LostWorkerError):
-            self._process(which).ask(pickle.dumps(self.waiting[which][-1]))
-
-    def answer(self, which: int) -> int:
-        """Return how many rows are in the oldest slot of a process. Raises what it raised."""
+    def answer(self, which: int) -> tuple[int, int]:
+        """Return the oldest slot of a process, and how many rows are in it."""
         while True:
-            succeeded, result = self._process(which).heard()
+            succeeded, result = self.started[which].heard()
             if not succeeded:
                 raise result
-            if not self._due[which]:
-                return int(result)
-            self._due[which] -= 1
+            slot = self.asked[which].popleft()
+            if slot >= 0:
+                return slot, int(result)
 
-    def forget(self, which: int) -> None:
-        """Wait until a process has done what it was asked for, which nobody wants any more."""
-        process, waiting = self.started[which], self.waiting[which]
-        try:
-            for _ in range(self._due[which] + len(waiting) if process else 0):
-                self._process(which).heard()
-        except LostWorkerError:
-            self.started[which] = None
-        self.memory.release(waiting)
+    def rest(self, which: int) -> None:
+        """Wait until a process has done what nobody wants any more."""
+        with suppress(LostWorkerError):
+            while which in self.started and self.asked[which]:
+                self.started[which].heard()
+                self.memory.free += [slot for slot in (self.asked[which].popleft(),) if slot >= 0]
+        if self.asked[which]:
+            del self.started[which]
 
     def close(self) -> None:
         """End the processes, unless this is a fork, and let the memory go."""
         if os.getpid() == self.owner and self.count:
             self.count = 0
-            for process in filter(None, self.started):
+            for process in self.started.values():
                 process.kill()
                 process.end()
             os.close(self.memory.file)
-
-    def _process(self, which: int) -> Process:
-        process = self.started[which]
-        assert process is not None, "a share was begun"
-        return process
 
 
 def _unnamed_file() -> int:

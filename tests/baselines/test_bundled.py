@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 
 from baselines.commands import HOMES
-from baselines.training.baseline import Baseline
+from baselines.training.baseline import Baseline, write_submission
 from baselines.training.checkpoint import load_weights
-from baselines.training.submission import write_submission
 from iqtt import SplitSpec, make_split
 from metrics.scoring.evaluate import score
 

@@ -36,7 +36,7 @@ def test_train_answer_score(name, folder):
 @pytest.mark.parametrize("name", ["cnn", "pix2shape"])  # all but the latter have one `train`
 def test_two_runs_never_share_a_folder(name, folder):
     pytest.importorskip("torch")
-    from baselines.training.run_folder import alone_in
+    from baselines.training.checkpoint import alone_in
 
     reference = (pix2shape, "train", "--set=networks.size=32", "--set=networks.width=0.0625")
     train = reference if name == "pix2shape" else (bench, "train", name)

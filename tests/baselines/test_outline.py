@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 from refusals import refused
 
-from baselines.outline import write_outline, write_outline_trees
+from baselines.outline import write_outline
 from scenegen.common.errors import SpecError
 
 
@@ -35,8 +35,8 @@ def test_submissions_and_what_is_refused(tmp_path):
     write_outline(data, tmp_path / "out.h5")
     with h5py.File(tmp_path / "out.h5") as file:
         assert (file["scores"][:].argmax(axis=1) == right).mean() > 0.9
-    write_outline_trees(data, tmp_path / "trees.h5", train, 20)
+    write_outline(data, tmp_path / "trees.h5", train, 20)
     for training, labels, where in ((data, None, "train"), (train, 31, "labels")):
         with refused(SpecError, where):
-            write_outline_trees(data, tmp_path / "x.h5", training, labels)
+            write_outline(data, tmp_path / "x.h5", training, labels)
         assert not (tmp_path / "x.h5").exists()

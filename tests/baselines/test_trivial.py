@@ -39,6 +39,10 @@ def test_means_come_from_the_training_file_and_baselines_rank(make_rooms, rooms_
         ("oracle", {"seed": 5}, "train"),
         ("constant", {"seed": 3, "random_reflectance": True}, "train"),  # the same cameras, places
         ("mean-depth", {"seed": 5, "height": 40, "width": 40}, "train"),
+        ("nearest", None, "train"),
+        ("cut-out", {"seed": 5}, "train"),
+        ("outline-relief", {"seed": 3}, "train"),
+        ("nearest", {"seed": 5, "height": 40, "width": 40}, "train"),
     ],
 )
 def test_what_would_be_unfair_is_refused(make_rooms, rooms_path, tmp_path, name, train, field):

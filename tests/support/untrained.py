@@ -20,14 +20,13 @@ from baselines.relief import depth_completed, depth_supervised
 from baselines.relief.network import Card as ReliefCard
 from baselines.relief.network import Settings as ReliefSettings
 from baselines.resnets import cnn, siamese
-from baselines.resnets.card import Card as ResnetCard
-from baselines.resnets.card import Settings as ResnetSettings
+from baselines.resnets.training import Card as ResnetCard
+from baselines.resnets.training import Settings as ResnetSettings
 from baselines.rezende.network import Card as RezendeCard
 from baselines.rezende.network import Settings as RezendeSettings
 from baselines.rezende.training import BASELINE as REZENDE
-from baselines.training.baseline import Baseline
+from baselines.training.baseline import Baseline, write_submission
 from baselines.training.checkpoint import new_state, save_weights
-from baselines.training.submission import write_submission
 
 Write = Callable[..., None]  # (data, out, **how)
 

@@ -1,31 +1,32 @@
 """A training run and its folder: checkpoint, TensorBoard logs, a picture, and the weights."""
 
-from collections.abc import Collection, Mapping
-from contextlib import nullcontext
+import os
+import threading
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
+import numpy as np
 import torch
 from lightning_fabric import Fabric
 from torch.utils.data import DataLoader
+from torch.utils.tensorboard import SummaryWriter
 
-from baselines.pix2shape.matching.relief import matched_rows, relief_of_rows
+from baselines.pix2shape.images import RoomImages
+from baselines.pix2shape.matching import matched_rows, relief_of_rows
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.pictures import training_sheet
-from baselines.pix2shape.rooms import RoomImages
 from baselines.pix2shape.training.batches import Sources, readers_kept
 from baselines.pix2shape.training.beginnings import ModelState, new_run, resumed_run
-from baselines.pix2shape.training.iterations import Iterations, check_request
-from baselines.pix2shape.training.logs import Logs, opened_logs
+from baselines.pix2shape.training.steps import Iterations, check_request
 from baselines.pix2shape.weights import METHOD
-from baselines.training.checkpoint import CHECKPOINT, WEIGHTS
+from baselines.training.checkpoint import CHECKPOINT, WEIGHTS, alone_in, check_new
 from baselines.training.data import TrainingFiles
 from baselines.training.fit import Progress, falling_late, fit
-from baselines.training.launch import check_agreement, launched
-from baselines.training.machine import Machine
+from baselines.training.machine import Machine, check_agreement, launched
 from baselines.training.processes import summed
 from baselines.training.rooms import read_rooms
-from baselines.training.run_folder import alone_in, check_new
 from baselines.training.streams import TrainingStreams
 from scenegen.common.errors import SceneGenError
 from scenegen.files.new_file import check_writable
@@ -34,6 +35,49 @@ from scenegen.files.pictures import save_picture
 PICTURE, LOGS = "pictures.png", "logs"
 LOG_EVERY = 20  # iterations
 PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch size for that
+
+
+@contextmanager
+def opened_logs(folder: Path, first: int) -> Iterator[SummaryWriter]:
+    """Open TensorBoard's logs in a folder; what they have from iteration `first` on is hidden.
+
+    TensorBoard writes in a thread of its own. An error there, as of a full disk, would be printed
+    as a traceback; it comes to this thread, too, with what is logged next.
+    """
+    before = threading.excepthook
+
+    def quiet(error: threading.ExceptHookArgs) -> None:
+        if not isinstance(error.exc_value, OSError):
+            before(error)
+
+    threading.excepthook = quiet
+    try:
+        with _named(folder):
+            logs = SummaryWriter(str(folder), purge_step=first)
+        try:
+            yield logs
+        finally:
+            with _named(folder):
+                logs.close()
+    finally:
+        threading.excepthook = before
+
+
+@contextmanager
+def _named(folder: Path | str) -> Iterator[None]:
+    """Let an OSError of the block name the folder that cannot be written."""
+    try:
+        yield
+    except OSError as error:
+        why = os.strerror(error.errno) if error.errno else str(error)
+        raise OSError(error.errno, f"cannot be written: {why}", str(folder)) from error
+
+
+def log_numbers(logs: SummaryWriter, values: Mapping[str, float], iteration: int) -> None:
+    """Log losses by name. Raises OSError, which names the folder."""
+    with _named(logs.log_dir):
+        for name, value in values.items():
+            logs.add_scalar(name, value, iteration)
 
 
 def train_run(
@@ -100,7 +144,7 @@ def train_run(
             def show(done: int, total: int, losses: Mapping[str, float]) -> None:
                 assert logs is not None, "the first process shows"
                 if done % LOG_EVERY == 0 or done == total:
-                    logs.numbers(losses, done)
+                    log_numbers(logs, losses, done)
                 if done % machine.every == 0 or done == total:
                     _picture(folder, logs, state, iterations)
                 progress(done, total, losses)  # which may fail, as where its output is closed
@@ -181,9 +225,11 @@ def fit_prior(model: Pix2Shape, sources: Sources) -> None:
     model.train(learning)
 
 
-def _picture(folder: Path, logs: Logs, state: ModelState, iterations: Iterations) -> None:
+def _picture(folder: Path, logs: SummaryWriter, state: ModelState, iterations: Iterations) -> None:
     batch, numbers = iterations.batch, torch.Generator().manual_seed(0)
     noise = torch.randn(len(batch.image), state.card.settings.networks.z, generator=numbers)
     picture = training_sheet(state.network, batch, noise.to(batch.image.device))
     save_picture(picture, folder / PICTURE, overwrite=True)
-    logs.picture(picture, state.card.iteration)
+    with _named(logs.log_dir):
+        pixels, number = np.asarray(picture), state.card.iteration
+        logs.add_image("pictures", pixels, number, dataformats="HWC")

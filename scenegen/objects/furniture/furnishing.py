@@ -171,7 +171,7 @@ class Texture(NamedTuple):
     color: Array
     roughness: float
     metallic: float
-    wrap: tuple[int, int] = (REPEAT, REPEAT)
+    wrap: tuple[int, ...] = (REPEAT, REPEAT)
 
 
 class Paint(NamedTuple):

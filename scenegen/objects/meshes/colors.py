@@ -81,7 +81,7 @@ def read_triangles(
     materials: dict[int, MeshMaterial] = {}
     try:
         if suffix == ".glb":
-            data, lying = plain_glb(data, unread)
+            data = plain_glb(data, unread)
         elif suffix == ".obj":
             data = utf8(data)
             if LARGE_COLOR.search(data, 0, HEAD):
@@ -98,18 +98,14 @@ def read_triangles(
             if isinstance(mesh, trimesh.Trimesh) and len(mesh.faces):
                 placed = trimesh.transform_points(mesh.triangles.reshape(-1, 3), matrix)
                 triangles.append(placed.reshape(-1, 3, 3))
-                told, uv, made = mesh.visual, None, None
-                if told.kind == "texture":
-                    key = id(told.material)
-                    if key not in materials:
-                        materials[key] = (
-                            glb_material(told.material, lying[int(told.material.name)], unread)
-                            if suffix == ".glb"
-                            else mtl_material(told.material, getattr(resolver, "is_linear", False))
-                        )
-                    made = materials[key]
-                    uv = None if told.uv is None else made.moved(told.uv)
-                pieces.append(Piece(mesh, made, uv))
+                told, uv = (getattr(mesh.visual, name, None) for name in ("material", "uv"))
+                if told is not None and id(told) not in materials:
+                    is_linear, glb = getattr(resolver, "is_linear", False), suffix == ".glb"
+                    made = glb_material(told, unread) if glb else mtl_material(told, is_linear)
+                    materials[id(told)] = made
+                material = materials.get(id(told))
+                uv = material.moved(uv) if material and uv is not None else None
+                pieces.append(Piece(mesh, material, uv))
     except BadMeshError:
         raise
     except Exception as error:  # trimesh raises what its parsers meet

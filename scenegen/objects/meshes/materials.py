@@ -20,28 +20,16 @@ ROUGHNESS = 0.5  # where a file does not tell
 OPTION = re.compile(r"-([a-z]+)((?: +(?:[-+.\de]+|on|off|[rgbmlz]))+) +")  # of MTL, before a name
 JSON = 0x4E4F534A  # "JSON", the type of a GLB file's first part
 WRAPS = {33071: CLAMP, 33648: MIRROR}  # of samplers; others repeat
-TRANSFORM = "KHR_texture_transform"
-GLOSSY = "KHR_materials_pbrSpecularGlossiness"
-AS_ROUGH = {  # what takes the place of names of glossy materials; specular colours are looked at
+TRANSFORM, GLOSSY = "KHR_texture_transform", "KHR_materials_pbrSpecularGlossiness"
+ROUGH = {  # in place of names of glossy materials
     "diffuseTexture": "baseColorTexture", "diffuseFactor": "baseColorFactor",
     "specularGlossinessTexture": "metallicRoughnessTexture",
 }  # fmt: skip
 DARK, SHINY = 0.04, 0.3  # linear: diffuse below, specular above, where a glossy material is metal
 # Extensions of materials that are read, or leave the colour as it is; others are told.
-QUIET = {TRANSFORM, GLOSSY} | {
-    f"KHR_materials_{name}"
-    for name in ("unlit", "ior", "anisotropy", "clearcoat", "dispersion", "emissive_strength")
-}
+SAME = "unlit", "ior", "anisotropy", "clearcoat", "dispersion", "emissive_strength"
+QUIET = {TRANSFORM, GLOSSY, *(f"KHR_materials_{name}" for name in SAME)}
 Unread = dict[str, str]  # what is not read of a file, by kind, in words that follow its name
-
-
-class Lying(NamedTuple):
-    """How the picture of a material of a GLB file lies: name, transform and wrap; glossy terms."""
-
-    name: str
-    transform: dict[str, Any]
-    wrap: tuple[int, int]
-    gloss: dict[str, Any] | None
 
 
 class MeshMaterial(NamedTuple):
@@ -59,7 +47,7 @@ class MeshMaterial(NamedTuple):
     roughness: float = ROUGHNESS
     metallic: float = 0.0
     transform: dict[str, Any] | None = None
-    wrap: tuple[int, int] = (REPEAT, REPEAT)
+    wrap: tuple[int, ...] = (REPEAT, REPEAT)
 
     def moved(self, uv: Array) -> Array:
         """Return texture coordinates, (V, 2), rows counted from below, as the transform tells."""
@@ -86,7 +74,7 @@ def reduced(picture: Any) -> Any:
 
 
 def mtl_material(told: Any, is_linear: bool) -> MeshMaterial:
-    """Return trimesh's material of an OBJ or PLY file; some it makes up, without a format.
+    """Return trimesh's material of an OBJ or PLY file; pictures that it makes up have no format.
 
     Colours are linear, as Blender writes them, or else sRGB.
     """
@@ -97,64 +85,61 @@ def mtl_material(told: Any, is_linear: bool) -> MeshMaterial:
         color = np.asarray(told.kwargs["kd"], np.float64)[:3].clip(0, 1)
         return MeshMaterial(factor=color if is_linear else decoded(told.diffuse[:3] / 255))
     said = dict(OPTION.findall(image.info.get("file_path", "")))
-    scale, offset = (
-        np.broadcast_to(np.array(said.get(*x).split()[:2], float), 2)
-        for x in (("s", "1"), ("o", "0"))
-    )
+    scale, offset = (np.array((said.get(k) or d).split()[:2], float) for k, d in ("s1", "o0"))
+    scale, offset = np.broadcast_to(scale, 2), np.broadcast_to(offset, 2)
     # With rows from above, v becomes 1 - s (1 - v) - o.
     moved = {"scale": scale, "offset": [offset[0], 1 - scale[1] - offset[1]]}
     wrap = CLAMP if said.get("clamp", "").strip() == "on" else REPEAT
-    is_moved = bool(said.keys() & {"s", "o"})
-    return MeshMaterial(rgb_of(image), transform=moved if is_moved else None, wrap=(wrap, wrap))
+    transform = moved if said.keys() & {"s", "o"} else None
+    return MeshMaterial(rgb_of(image), transform=transform, wrap=(wrap, wrap))
 
 
-def glb_material(told: Any, lying: Lying, unread: Unread) -> MeshMaterial:
+def glb_material(told: Any, unread: Unread) -> MeshMaterial:
     """Return trimesh's material of a file from `plain_glb`."""
-    images = told.baseColorTexture, told.metallicRoughnessTexture
+    images, about = (told.baseColorTexture, told.metallicRoughnessTexture), json.loads(told.name)
     picture, other = (None if image is None else rgb_of(image) for image in images)
     factor = None if told.baseColorFactor is None else told.baseColorFactor[:3] / 255
-    if lying.name and picture is None:
-        words = f"names {lying.name!r}, which cannot be read; such models are plain"
+    if about["picture"] and picture is None:
+        words = f"names {about['picture']!r}, which cannot be read; such models are plain"
         unread.setdefault("picture", words)
-    means = [
-        np.ones(3) if x is None else np.asarray(x).mean((0, 1)) / 255 for x in (picture, other)
-    ]
-    rough, metal = (
+    both = picture, other
+    means = [np.ones(3) if x is None else np.asarray(x).mean((0, 1)) / 255 for x in both]
+    roughness, metallic = (
         otherwise if value is None and other is None
-        else min(max((1.0 if value is None else float(value)) * float(mean), 0.0), 1.0)
+        else float(np.clip((1.0 if value is None else value) * mean, 0.0, 1.0))
         for value, mean, otherwise in (
             (told.roughnessFactor, means[1][1], ROUGHNESS), (told.metallicFactor, means[1][2], 0.0)
         )
     )  # fmt: skip
-    if lying.gloss is not None:
+    if (gloss := about["gloss"]) is not None:
         # By default nothing is diffuse, which no writer means who tells a diffuse colour alone.
-        specular = np.array(lying.gloss.get("specularFactor", [float(other is not None)] * 3))
+        specular = np.array(gloss.get("specularFactor", [float(other is not None)] * 3))
         has_gloss = other is not None and "A" in images[1].getbands()
         share = np.asarray(images[1].getchannel("A")).mean() / 255 if has_gloss else 1.0
-        rough = 1.0 - lying.gloss.get("glossinessFactor", 1.0) * float(share)
+        roughness = 1.0 - gloss.get("glossinessFactor", 1.0) * float(share)
         diffuse = decoded(means[0]) * (1.0 if factor is None else factor)
-        metal = float(diffuse.max() < DARK and (decoded(means[1]) * specular).max() > SHINY)
-        picture, factor = (other, specular) if metal else (picture, factor)
-    return MeshMaterial(picture, factor, rough, metal, lying.transform, lying.wrap)
+        metallic = float(diffuse.max() < DARK and (decoded(means[1]) * specular).max() > SHINY)
+        picture, factor = (other, specular) if metallic else (picture, factor)
+    wrap, transform = tuple(about["wrap"]), about["transform"]
+    return MeshMaterial(picture, factor, roughness, metallic, transform, wrap)
 
 
-def plain_glb(data: bytes, unread: Unread) -> tuple[bytes, list[Lying]]:
-    """Return a GLB file for trimesh, which knows few extensions, and how its pictures lie.
+def plain_glb(data: bytes, unread: Unread) -> bytes:
+    """Return a GLB file for trimesh, which knows few extensions.
 
-    In it numbers are the names of materials, glossy ones are rough ones, textures have one source,
-    and the first set of texture coordinates is that of the picture.
+    In it names of materials tell how their pictures lie, glossy materials are rough ones, textures
+    have one source, and the first set of texture coordinates is that of the picture.
     """
     end = 20 + struct.unpack_from("<I", data, 12)[0]
-    document = json.loads(data[20:end])
-    lying, sets = [], []
+    document, sets = json.loads(data[20:end]), []
     for texture in document.get("textures", ()):
         others = [x["source"] for x in texture.pop("extensions", {}).values() if "source" in x]
         texture.setdefault("source", next(iter(others), None))
-    for number, material in enumerate(document.get("materials", ())):
+    for material in document.get("materials", ()):
         extensions = material.pop("extensions", {})
         gloss = extensions.get(GLOSSY)
         if gloss is not None:
-            rough = {AS_ROUGH[name]: value for name, value in gloss.items() if name in AS_ROUGH}
+            rough = {ROUGH[name]: value for name, value in gloss.items() if name in ROUGH}
             material["pbrMetallicRoughness"] = rough
         base = material.get("pbrMetallicRoughness", {}).get("baseColorTexture", {})
         own = base.get("extensions", {})
@@ -163,15 +148,15 @@ def plain_glb(data: bytes, unread: Unread) -> tuple[bytes, list[Lying]]:
         image = document["images"][texture["source"]] if texture.get("source") is not None else {}
         name = image.get("uri", "data:")
         name = image.get("mimeType", "a picture") if name.startswith("data:") else name
-        along_u, along_v = (WRAPS.get(sampler.get(x, 0), REPEAT) for x in ("wrapS", "wrapT"))
         transform = own.get(TRANSFORM, {})
-        lying.append(Lying(name if base else "", transform, (along_u, along_v), gloss))
         sets.append(transform.get("texCoord", base.get("texCoord", 0)))
+        told = {"picture": name if base else "", "transform": transform, "gloss": gloss}
+        told["wrap"] = [WRAPS.get(sampler.get(key, 0), REPEAT) for key in ("wrapS", "wrapT")]
+        material["name"] = json.dumps(told)
         for kind in {*extensions, *own} - QUIET:
             unread.setdefault(kind, f"has {kind}, which is not read")
         if max(material.get("emissiveFactor", (0,))) > 0:
             unread.setdefault("emission", "shines by its file, which is not read")
-        material["name"] = str(number)
     for part in (part for mesh in document.get("meshes", ()) for part in mesh["primitives"]):
         key = f"TEXCOORD_{sets[part['material']]}" if "material" in part else ""
         if key in part["attributes"]:
@@ -179,4 +164,4 @@ def plain_glb(data: bytes, unread: Unread) -> tuple[bytes, list[Lying]]:
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
     head = struct.pack("<4sIIII", b"glTF", 2, len(text) + len(data) - end + 20, len(text), JSON)
-    return head + text + data[end:], lying
+    return head + text + data[end:]

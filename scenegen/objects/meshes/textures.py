@@ -15,20 +15,13 @@ from scenegen.files.pictures import opened_picture
 from scenegen.objects.furniture.furnishing import CLAMP, MIRROR, REPEAT, Paint, Texture
 from scenegen.objects.meshes.clean import MOST_COORDINATE
 from scenegen.objects.meshes.colors import Piece, colors_of, matched, read_triangles
-from scenegen.objects.meshes.materials import (
-    OPTION,
-    ROUGHNESS,
-    MeshMaterial,
-    Unread,
-    reduced,
-)
+from scenegen.objects.meshes.materials import OPTION, ROUGHNESS, MeshMaterial, Unread, reduced
 from scenegen.objects.meshes.read import read_bytes
 from scenegen.objects.meshes.readers.text import utf8
 from scenegen.objects.solids import Array
 
 # After how many pictures one begins anew; where it does not, coordinates stay as they are.
 PERIODS = {REPEAT: 1, CLAMP: 0, MIRROR: 2}
-REPEATS = (REPEAT, REPEAT)
 
 
 class _Beside(trimesh.resolvers.Resolver):  # type: ignore[misc]
@@ -93,7 +86,7 @@ def paint_of(path: Path, up: str, vertices: Array, faces: Array, unread: Unread)
     face, theirs, ours = matched(triangles, up, vertices, faces)
     textures: list[Texture] = []
     numbers: dict[int, int] = {}  # of textures, by the pictures that pieces share
-    which, places, colors, steps = [], [], [], []
+    which, places, colors = [], [], []
     for piece in pieces:
         count, material = len(piece.mesh.faces), piece.material
         number, uv, color = -1, np.zeros((count, 3, 2)), np.zeros((count, 3))
@@ -104,18 +97,17 @@ def paint_of(path: Path, up: str, vertices: Array, faces: Array, unread: Unread)
                 numbers[id(material)] = len(textures)
                 textures.append(_texture(material))
             number, uv = numbers[id(material)], piece.uv[piece.mesh.faces]
+            period = np.array([PERIODS[wrap] for wrap in material.wrap])
+            with np.errstate(invalid="ignore"):
+                uv = uv - np.floor(uv[:, :1] / np.maximum(period, 1)) * period
         else:
             color = colors_of(piece, suffix == ".glb").mean(axis=1)
         which.append(np.full(count, number))
         places.append(uv)
         colors.append(color)
-        wrap = REPEATS if number < 0 else textures[number].wrap
-        steps.append(np.broadcast_to([PERIODS[x] for x in wrap], (count, 1, 2)))
     texture_of = np.concatenate(which)[face]
     where = np.concatenate(places)[face]
     where[~(np.abs(where) < MOST_COORDINATE).all(axis=(1, 2))] = 0.0
-    period = np.concatenate(steps)[face]
-    where = where - np.floor(where[:, :1] / np.maximum(period, 1)) * period
     where = _carried_over(where, theirs, ours)
     plain = texture_of < 0
     if plain.any():
@@ -130,8 +122,8 @@ def _is_told(piece: Piece) -> bool:
     visual, material = piece.mesh.visual, piece.material
     if material is None:
         return visual.kind in ("vertex", "face")
-    told = material.factor is not None or material.picture is not None
-    return told or "color" in visual.vertex_attributes
+    told = material.factor, material.picture, visual.vertex_attributes.get("color")
+    return any(x is not None for x in told)
 
 
 def _texture(material: MeshMaterial) -> Texture:

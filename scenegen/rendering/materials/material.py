@@ -39,7 +39,7 @@ class Material:
     metallic: float = 0.0
     specular: float = 0.5
     metres: float = 1.0
-    wrap: tuple[int, int] = (0, 0)
+    wrap: tuple[int, ...] = (0, 0)
     radiance: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def texels(self) -> Array:

@@ -26,7 +26,7 @@ Array = NDArray[Any]
 MEAN = 0.09  # radiance that the upper half of the surroundings is scaled to, that of a clear sky
 MOST_COLUMNS = 4096
 MOST_PIXELS = 2**28  # of a file
-HEAD = 2**16  # bytes in which an HDR file tells its order
+HEAD, ORDER = 2**16, re.compile(rb"-Y +\d+ +\+X +\d+\s*")  # bytes that tell that of an HDR file
 ENVIRONMENT = "an equirectangular picture in HDR or EXR"
 
 
@@ -110,26 +110,22 @@ def _radiance(place: Path) -> Array:
     if mi.variant() is None:  # bitmaps need one
         mi.set_variant("scalar_rgb")
     with place.open("rb") as file:
-        head, _, size = file.read(HEAD).partition(b"\n\n")
-    order, _, pixels = size.partition(b"\n")
-    if head.startswith(b"#?"):
-        if b"xyze" in head:
-            raise FileFormatError(place, "colours as XYZE", "RGBE, 32-bit_rle_rgbe")
-        if not re.fullmatch(rb"-Y +\d+ +\+X +\d+\s*", order):
-            found = f"pixels in the order {order[:40].decode(errors='replace')!r}"
-            raise FileFormatError(place, found, "-Y HEIGHT +X WIDTH: rows from above")
+        head, _, rest = file.read(HEAD).partition(b"\n\n")
+    order, _, pixels = rest.partition(b"\n")
+    is_radiance, found = head.startswith(b"#?"), "no picture that can be read"
+    if is_radiance and (b"xyze" in head or not ORDER.fullmatch(order)):
+        found = f"colours as XYZE, or pixels in the order {order[:40].decode(errors='replace')!r}"
+        raise FileFormatError(place, found, "RGBE, in the order -Y HEIGHT +X WIDTH")
+    if is_radiance and not pixels.startswith(b"\2\2") and b"\1\1\1" in pixels:
+        found = "perhaps run lengths of the oldest kind"
     try:
         bitmap = mi.Bitmap(str(place))
-        if bitmap.component_format() not in (mi.Struct.Type.Float16, mi.Struct.Type.Float32):
-            raise FileFormatError(place, "a low dynamic range", ENVIRONMENT)
-        return np.array(bitmap.convert(mi.Bitmap.PixelFormat.RGB, mi.Struct.Type.Float32, False))
-    except FileFormatError:
-        raise
+        if bitmap.component_format() in (mi.Struct.Type.Float16, mi.Struct.Type.Float32):
+            rgb = mi.Bitmap.PixelFormat.RGB
+            return np.array(bitmap.convert(rgb, mi.Struct.Type.Float32, False))
     except Exception as error:  # Mitsuba raises RuntimeError for whatever it meets
-        is_old = head.startswith(b"#?") and not pixels.startswith(b"\2\2") and b"\1\1\1" in pixels
-        found = "run lengths of the oldest kind" if is_old else "no picture that can be read"
-        hint = "save it again, such as with oiiotool or ImageMagick" if is_old else ""
-        raise FileFormatError(place, found, ENVIRONMENT, hint) from error
+        raise FileFormatError(place, found, ENVIRONMENT, "save it again") from error
+    raise FileFormatError(place, "a low dynamic range", ENVIRONMENT)
 
 
 def _reduced(values: Array, step: int) -> Array:

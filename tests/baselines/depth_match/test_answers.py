@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from baselines.depth_match.answers import denials, least_denials, surface_points
+from baselines.depth_match.network import denials, least_denials, surface_points
 from baselines.depth_match.training import read_pictures
 from iqtt import QuestionsFile, SplitSpec, make_split, open_questions
 

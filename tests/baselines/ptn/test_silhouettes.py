@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from baselines.ptn.rooms import RoomImages
-from baselines.ptn.silhouettes import Silhouettes
+from baselines.ptn.rooms import RoomImages, Silhouettes
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
 

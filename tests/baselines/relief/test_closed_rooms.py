@@ -14,10 +14,9 @@ from baselines.relief import depth_supervised, view_pairs
 from baselines.relief.depth_completed import Completion
 from baselines.relief.network import Card, Settings, predicted_depth, relief_network
 from baselines.relief.training import cameras_of
-from baselines.training.baseline import train
+from baselines.training.baseline import train, write_submission
 from baselines.training.data import TrainingFiles
 from baselines.training.rooms import camera_poses
-from baselines.training.submission import write_submission
 from metrics.measures.relief import empty_room
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile

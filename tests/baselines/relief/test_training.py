@@ -11,7 +11,7 @@ from pix2shape_models import edited, in_memory
 from refusals import refused
 from safetensors.torch import load_file
 
-from baselines.pix2shape.matching.relief import FOLDER
+from baselines.pix2shape.matching import FOLDER
 from baselines.relief import depth_supervised, view_pairs
 from baselines.relief.depth_completed import views_of_scenes
 from baselines.relief.network import Settings

@@ -8,13 +8,11 @@ import pytest
 import torch
 
 from baselines.resnets import cnn, siamese
-from baselines.resnets.answering import accuracy
-from baselines.resnets.card import Settings
-from baselines.training.baseline import train
+from baselines.resnets.training import Settings, accuracy
+from baselines.training.baseline import train, write_submission
 from baselines.training.checkpoint import WEIGHTS, load_weights
 from baselines.training.data import TrainingFiles
 from baselines.training.questions import question_images
-from baselines.training.submission import write_submission
 from iqtt import open_questions
 from metrics.scoring.evaluate import score
 

@@ -3,8 +3,8 @@
 import pytest
 import torch
 
-from baselines.resnets.card import Card, Settings
 from baselines.resnets.cnn import AnswerClassifier
+from baselines.resnets.training import Card, Settings
 
 
 @pytest.mark.parametrize("answers", [2, 3])

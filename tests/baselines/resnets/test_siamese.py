@@ -3,8 +3,8 @@
 import pytest
 import torch
 
-from baselines.resnets.card import Card, Settings
 from baselines.resnets.siamese import NearestAnswer, contrastive_loss
+from baselines.resnets.training import Card, Settings
 
 SMALL = Card("siamese", Settings(width=4, size=16), labels=1)
 

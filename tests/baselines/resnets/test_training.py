@@ -5,8 +5,7 @@ import pytest
 import torch
 
 from baselines.resnets import cnn, siamese
-from baselines.resnets.card import Settings
-from baselines.resnets.training import permuted
+from baselines.resnets.training import Settings, permuted
 from baselines.training.baseline import train
 from baselines.training.checkpoint import load_weights
 from baselines.training.data import TrainingFiles

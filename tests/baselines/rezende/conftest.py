@@ -24,9 +24,9 @@ def split(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="session")
 def one_box():
     """Return eight equal pictures of one box of the rasteriser, and its silhouette, (16, 16)."""
-    from baselines.rezende.images import Pictures
+    from baselines.rezende.network import icosphere
     from baselines.rezende.rasteriser import Views, rasterise
-    from baselines.rezende.sphere import icosphere
+    from baselines.rezende.training import Pictures
     from baselines.training.rotations import rotation_grid
 
     lights = np.tile([[[1.0, 2.0, 3.0]]], (8, 1, 1)), np.full((8, 1, 3), 2.5)

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from baselines.rezende.answers import mesh_distance
-from baselines.rezende.sphere import icosphere
+from baselines.rezende.network import icosphere
 
 
 def chiral():

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import torch
 
-from baselines.rezende.estimator import sampled_gradient
+from baselines.rezende.training import sampled_gradient
 
 PAIRS = 20_000
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from baselines.rezende import images
+from baselines.rezende import training
 from baselines.rezende.rasteriser import rasterise
 from iqtt import open_questions
 from scenegen.objects.basic_shapes import unit_shape
@@ -10,7 +10,7 @@ from scenegen.objects.basic_shapes import unit_shape
 
 def read_question_pictures(path, size, part=None):
     with open_questions(path, part) as questions:
-        return images.read_question_pictures(questions, size)
+        return training.read_question_pictures(questions, size)
 
 
 def cubes_mesh(cubes, turn):

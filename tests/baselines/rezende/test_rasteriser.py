@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
+from baselines.rezende.network import icosphere
 from baselines.rezende.rasteriser import Views, rasterise
-from baselines.rezende.sphere import icosphere
 from scenegen.camera import pixel_directions
 
 SIZE, FOV, DISTANCE = 48, 28.0, 4.5

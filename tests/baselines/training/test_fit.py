@@ -21,8 +21,9 @@ from baselines.training.checkpoint import (
     moments_of,
     new_state,
 )
-from baselines.training.fit import Loss, TrainingError, falling_late, fit
+from baselines.training.fit import Loss, falling_late, fit
 from baselines.training.machine import Machine
+from baselines.training.processes import TrainingError
 from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
 

@@ -15,7 +15,7 @@ from pix2shape_models import tiny
 
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, moments_of, new_state
-from baselines.training.launch import torchrun_counts
+from baselines.training.machine import torchrun_counts
 from scenegen.common.errors import SpecError
 
 ALL = {

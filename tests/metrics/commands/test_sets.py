@@ -13,7 +13,7 @@ import pytest
 from click.testing import CliRunner
 
 import cli
-from baselines.training.test_sets import refuse_test_set
+from baselines.training.data import refuse_test_set
 from metrics.scoring import known_tests
 from metrics.scoring.known_tests import KnownTest, sets
 from metrics.scoring.truth_digests import file_digests
@@ -40,7 +40,7 @@ def tiny(tmp_path, monkeypatch, run_command):
     truth, pictures, rows = file_digests(path, "rooms")
     test = KnownTest("tiny-1", "rooms", truth, rows, COMMAND, "tests", pictures)
     monkeypatch.setattr(known_tests, "KNOWN_TESTS", (test,))
-    monkeypatch.setattr("baselines.training.test_sets.KNOWN_TESTS", (test,))
+    monkeypatch.setattr("baselines.training.data.KNOWN_TESTS", (test,))
     return test
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from refusals import refused
 
-from baselines.cut_outs import write_cut_outs
+from baselines.trivial import write_room_baseline
 from metrics.scoring.evaluate import score
 from metrics.scoring.runs import ScoringError
 from metrics.submissions.validation import validate
@@ -43,7 +43,7 @@ def test_the_file_holds_images_and_cameras_and_not_how_they_were_made(handed_out
 
 def test_predictions_of_it_are_scored_with_either_name_of_the_truth(handed_out, tmp_path):
     truth, path = truth_path(handed_out), tmp_path / "p.h5"
-    write_cut_outs("picture-outline", handed_out, path)
+    write_room_baseline("picture-outline", handed_out, path)
     assert truth_beside(handed_out) == truth
     assert truth_beside(truth) is None
     by_truth, by_input = (score([path], place) for place in (truth, handed_out))

@@ -9,10 +9,10 @@ import torch
 from pix2shape_models import question_source, room_source, state_of, suited, tiny
 from refusals import refused
 
-from baselines.pix2shape.training import iterations
+from baselines.pix2shape.training import steps
 from baselines.pix2shape.training.batches import Sources
-from baselines.pix2shape.training.iterations import Iterations, check_request
 from baselines.pix2shape.training.run import learning_rate
+from baselines.pix2shape.training.steps import Iterations, check_request
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, moments_of
 from baselines.training.fit import fit
@@ -116,13 +116,13 @@ def test_requests_that_teach_nothing_are_refused(change, where, rooms_path):
 def test_the_generators_step_leaves_the_critic_alone(rooms_path, tmp_path, monkeypatch):
     config = replace(TINY, mutual_information=0.1, networks=replace(TINY.networks, z_view=2))
     state, before = state_of(config), {}
-    step = iterations.generator_step
+    step = steps.generator_step
 
     def spy(model: Any, *rest: Any) -> Any:
         before.update(bits(state))
         return step(model, *rest)
 
-    monkeypatch.setattr(iterations, "generator_step", spy)
+    monkeypatch.setattr(steps, "generator_step", spy)
     start = bits(state)
     run(state, room_source(rooms_path, config), tmp_path, 3)
     after = bits(state)

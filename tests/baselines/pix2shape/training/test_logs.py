@@ -4,7 +4,7 @@ import errno
 
 import pytest
 
-from baselines.pix2shape.training.logs import opened_logs
+from baselines.pix2shape.training.run import log_numbers, opened_logs
 
 
 def test_a_full_disk_is_one_error(tmp_path, monkeypatch, capfd):
@@ -17,7 +17,7 @@ def test_a_full_disk_is_one_error(tmp_path, monkeypatch, capfd):
         with opened_logs(tmp_path / "logs", 1) as logs:
             monkeypatch.setattr(RecordWriter, "write", full)
             for iteration in range(1, 1000):
-                logs.numbers({"reconstruction": 0.5}, iteration)
+                log_numbers(logs, {"reconstruction": 0.5}, iteration)
 
     with pytest.raises(OSError) as error:
         log()

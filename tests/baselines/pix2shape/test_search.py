@@ -8,8 +8,16 @@ import pytest
 import torch
 from pix2shape_models import in_memory
 
-from baselines.pix2shape.matching.relief import pairs_of, relief_of_row
-from baselines.pix2shape.matching.search import LARGE, SMALL, STEP, STEPS, best_relief, semi_global
+from baselines.pix2shape.matching import (
+    LARGE,
+    SMALL,
+    STEP,
+    STEPS,
+    best_relief,
+    pairs_of,
+    relief_of_row,
+    semi_global,
+)
 from baselines.pix2shape.network.empty_rooms import empty_rooms
 from scenegen.rooms.reader import RoomsFile
 

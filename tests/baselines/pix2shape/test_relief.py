@@ -8,8 +8,8 @@ import pytest
 import torch
 from pix2shape_models import in_memory
 
-from baselines.pix2shape.matching import relief as module
-from baselines.pix2shape.matching.relief import FOLDER, matched_rows, pairs_of, relief_of_rows
+from baselines.pix2shape import matching as module
+from baselines.pix2shape.matching import FOLDER, matched_rows, pairs_of, relief_of_rows
 from baselines.training.checkpoint import save_tensors
 from scenegen.common.errors import FileFormatError, SpecError
 

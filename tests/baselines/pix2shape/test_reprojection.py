@@ -5,7 +5,7 @@ import math
 import numpy as np
 import torch
 
-from baselines.pix2shape.matching.search import reprojected
+from baselines.pix2shape.matching import reprojected
 from baselines.pix2shape.network.empty_rooms import Cameras
 from scenegen.camera import Camera, pixel_directions
 
