@@ -4,14 +4,20 @@ All know where floor and walls are, as `empty-room` does.
 
 - cut-out: each object as its true mask, flat, at its true median depth. It is told the truth, and
   what it lacks is shape.
-- picture-outline: the mask of `picture.outline_mask`, lifted by one constant.
+- picture-outline: the mask of `outline_mask`, lifted by one constant.
 - outline-regression, outline-relief: that mask, lifted by what a linear regression or
   gradient-boosted trees make of features of the outline; both learn from the depth of other rooms.
 - balls: each blob of the mask in a scene's first view as a ball, drawn in all its views.
 - nearest: the relief of that training image whose picture is left over from the fitted shading of
   the walls most alike.
+
+A mask is what the shading of an empty room does not explain. Floor and walls are matte and of one
+colour each, so that the radiance of each is smooth over the picture: a polynomial of the two
+coordinates of a wall fits it. Pixels that lie off the fit show objects. The fit is robust: it
+begins with all pixels of a wall and goes on with those that lie near it.
 """
 
+import itertools
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -20,21 +26,85 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from baselines.picture import outline_mask, residual
 from metrics.measures.relief import empty_room
-from scenegen.camera import pixel_directions, pixel_size, transform_points
+from scenegen.camera import back_project, pixel_directions, pixel_size, transform_points
 from scenegen.common.threads import one_thread
 from scenegen.rooms.reader import RoomsFile, radiance_of
 
 Array = NDArray[Any]
-DepthOf = Callable[[RoomsFile, int], Array]  # planar depth (H, W) of a row
 
+ROUNDS = 12
+OFF = 1.5  # standard deviations, estimated by the median absolute deviation
+LEAST = 1.5 / 255.0  # of radiance: 8-bit pictures hold no smaller difference
+DEGREE = 2
+SMALLEST = 12  # pixels of a blob
+DepthOf = Callable[[RoomsFile, int], Array]  # planar depth (H, W) of a row
 LEARNING = ("outline-regression", "outline-relief", "nearest")
 # Scene units: between the median (0.166) and the mean (0.182) of the relief of objects in images of
 # `--preset shapes --views 0,5,35,55,80 --n 300 --seed 7 --size 64`.
 LIFT = 0.17
 MOST_IMAGES = 1500  # of training rooms, spread evenly
 CELLS = 16  # a side, of the pictures that `nearest` compares
+
+
+def outline_mask(
+    image: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+) -> Array:
+    """Return the pixels that show objects, (H, W) bool.
+
+    Args:
+        image: linear radiance, (H, W, 3).
+        world_from_camera: (4, 4).
+        room_size: of a closed room, (3,); None for the paper's room.
+    """
+    return residual(image, world_from_camera, fov_y_degrees, room_size)[1]
+
+
+def residual(
+    image: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+) -> tuple[Array, Array]:
+    """Return how far each pixel lies off the fitted shading, (H, W, 3), and the mask (H, W)."""
+    height, width = image.shape[:2]
+    depth, normal = empty_room(world_from_camera, fov_y_degrees, height, width, room_size)
+    points = transform_points(world_from_camera, back_project(depth, fov_y_degrees))
+    places = points if room_size is None else points / room_size
+    facing = normal @ world_from_camera[:3, :3].T
+    walls = np.argmax(np.abs(facing), axis=-1)
+    off, mask = np.zeros(image.shape), np.zeros(image.shape[:2], bool)
+    for axis, far in itertools.product(range(3), (False, True)):
+        wall = (walls == axis) & ((facing[..., axis] < 0) == far)
+        if np.count_nonzero(wall) < 4 * (DEGREE + 1) ** 2:
+            continue
+        a, b = (2.0 * places[wall][:, k] - 1.0 for k in range(3) if k != axis)
+        basis = np.stack(
+            [a**i * b**j for i in range(DEGREE + 1) for j in range(DEGREE + 1 - i)], axis=1
+        )
+        off[wall], mask[wall] = _off_the_fit(basis, image[wall].astype(np.float64))
+    return off, _cleaned(mask)
+
+
+def _off_the_fit(basis: Array, values: Array) -> tuple[Array, Array]:
+    """Return the residuals of colours (N, 3) from a robust fit, and which lie off it, (N,)."""
+    kept = np.ones(len(values), bool)
+    for _ in range(ROUNDS):
+        weights = np.linalg.lstsq(basis[kept], values[kept], rcond=None)[0]
+        rest = values - basis @ weights
+        distance = np.abs(rest).max(axis=1)
+        limit = max(OFF * 1.4826 * float(np.median(distance[kept])), LEAST)
+        new = distance <= limit
+        if np.array_equal(new, kept) or np.count_nonzero(new) < 2 * basis.shape[1]:
+            break
+        kept = new
+    return rest, ~kept
+
+
+def _cleaned(mask: Array) -> Array:
+    """Return a mask without single pixels, holes and small blobs."""
+    smooth = ndimage.median_filter(mask, 3)
+    filled = ndimage.binary_fill_holes(smooth)
+    blobs, count = ndimage.label(filled)
+    pixels = np.bincount(blobs.ravel(), minlength=count + 1)
+    return np.asarray(filled & (pixels[blobs] >= SMALLEST))
 
 
 def _camera(rooms: RoomsFile, row: int) -> tuple[Array, float]:

@@ -33,6 +33,9 @@ from scenegen.rooms.preview import srgb_bytes
 Array = NDArray[Any]
 FOLDS = 5  # of the choice of how strongly weights are held near 0
 STRENGTHS = (1e-3, 1e-2, 1e-1, 1.0, 10.0)
+Features = Callable[[Array], list[Array]]
+PREFIX = "hf:"
+TEST = "iqtt-test.h5"
 
 
 def write_features(
@@ -138,11 +141,6 @@ def probe_scores(learned: Array, right: Array, seen: Array) -> Array:
     ]
     weights = probes[int(np.argmax(merits))].fit(flat, is_right).coef_[0] / scale
     return np.asarray(asked @ weights)
-
-
-Features = Callable[[Array], list[Array]]
-PREFIX = "hf:"
-TEST = "iqtt-test.h5"
 
 
 def split_paths(data: str | Path) -> tuple[Path, Path]:

@@ -29,6 +29,15 @@ from iqtt import QuestionsFile, SplitSpec
 
 INPUTS = 3 + 3  # colours, and their contrast
 BACKGROUND = 0.02  # largest difference from the corner's colour, of square roots of radiance
+NOTES = (
+    "told: in training, true depth and camera distances; the field of view, and that pictures of a"
+    " question have one camera distance and the shape's centre on their axis"
+)
+POINTS = 300  # of each surface
+GRID = 4608  # rotations that are tried first
+KEPT, TURNS = 12, 24  # how many of the best are turned further, and in how many ways each
+FINER = (0.12, 0.07, 0.04, 0.02)  # radians of these turns, in each round
+MOST = 0.2  # camera distances; a point is denied by no more
 
 
 @dataclass(frozen=True)
@@ -79,18 +88,6 @@ def symmetric(maps: Tensor, k: int) -> Tensor:
         return torch.rot90(maps, k % 4, (-2, -1))
     maps = torch.rot90(maps, k % 4, (-2, -1))
     return maps.flip(-1) if k >= 4 else maps
-
-
-NOTES = (
-    "told: in training, true depth and camera distances; the field of view, and that pictures of a"
-    " question have one camera distance and the shape's centre on their axis"
-)
-
-POINTS = 300  # of each surface
-GRID = 4608  # rotations that are tried first
-KEPT, TURNS = 12, 24  # how many of the best are turned further, and in how many ways each
-FINER = (0.12, 0.07, 0.04, 0.02)  # radians of these turns, in each round
-MOST = 0.2  # camera distances; a point is denied by no more
 
 
 def answers_of(network: UNet, _card: Card, questions: QuestionsFile) -> Answers:

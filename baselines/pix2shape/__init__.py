@@ -1,7 +1,7 @@
 """The reference model: Pix2Shape (IJCV 2020) in torch, an encoder, a decoder and a renderer.
 
     network/      the networks, the surfel renderer, and the configuration of both
-    batch.py      images, and what the model is told about them; made by rooms.py and questions.py
+    images.py     images of rooms and of questions, and what the model is told about them
     weights.py    the card of weights, and the weights that come with the package
     pictures.py   pictures of training, samples, interpolations and rotations
     matching.py   relief by search, which training may take for the truth

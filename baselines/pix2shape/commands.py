@@ -38,6 +38,22 @@ DEVICE = click.option(
     show_default=True,
     help="Where to compute; auto takes a GPU if there is one.",
 )
+MINUTES = click.option(
+    "--minutes",
+    type=click.FloatRange(0, 1e6, min_open=True),
+    help="End training so many minutes from now, with a schedule of as many iterations as fit.",
+)
+STREAM = click.option(
+    "--stream",
+    metavar="NAME,...",
+    help="Instead of --data: presets of rooms, or kinds of questions, that are rendered meanwhile.",
+)
+ALLOW_TEST_SET = click.option(
+    "--allow-test-set", is_flag=True, help="Learn from a named test set, or from its scenes."
+)
+ROOMS = click.option(
+    "--data", type=InputPath(), required=True, help="Rooms whose images are encoded."
+)
 
 
 def number(*names: str, least: int, default: int, text: str, most: int = LARGEST) -> Any:
@@ -74,21 +90,6 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
             raise click.UsageError(f"--set: {name!r:.40} is given twice")
         chosen[name] = value
     return chosen
-
-
-MINUTES = click.option(
-    "--minutes",
-    type=click.FloatRange(0, 1e6, min_open=True),
-    help="End training so many minutes from now, with a schedule of as many iterations as fit.",
-)
-STREAM = click.option(
-    "--stream",
-    metavar="NAME,...",
-    help="Instead of --data: presets of rooms, or kinds of questions, that are rendered meanwhile.",
-)
-ALLOW_TEST_SET = click.option(
-    "--allow-test-set", is_flag=True, help="Learn from a named test set, or from its scenes."
-)
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape train --data rooms.h5 --out run")
@@ -333,11 +334,6 @@ def how_to_score(out: str, data: str) -> str:
 def needs_torch(who: str = "pix2shape", packages: tuple[str, ...] = PACKAGES) -> None:
     """Raise UserError where an optional package is missing."""
     needs(who, packages, "model")
-
-
-ROOMS = click.option(
-    "--data", type=InputPath(), required=True, help="Rooms whose images are encoded."
-)
 
 
 def _picture(name: str, text: str = "Picture to write.") -> Any:

@@ -36,6 +36,10 @@ UNSEEN = 0.3  # cost where the other image does not show the point
 RISE = 0.15  # cost of the largest relief beside that of none, so that doubt decides for the room
 WINDOW = 3  # pixels a side; costs are averaged over it
 SMALL, LARGE = 0.05, 0.3  # costs of a change by one step, and by more, from pixel to pixel
+WIDEST = 20.0  # degrees between two views that are matched
+BLOCK = 50  # scenes in each file of labels
+FOLDER = "labels"
+Progress = Callable[[int, int], Any]  # images done, in all
 
 
 def reprojected(
@@ -157,12 +161,6 @@ def best_relief(cost: Tensor) -> Tensor:
     curve = (below - 2 * at + above).clamp(min=1e-6)
     between = (middle + ((below - above) / (2 * curve)).clamp(-0.5, 0.5)).clamp(min=0)
     return STEP * torch.where(best == middle, between, best)[:, 0]
-
-
-WIDEST = 20.0  # degrees between two views that are matched
-BLOCK = 50  # scenes in each file of labels
-FOLDER = "labels"
-Progress = Callable[[int, int], Any]  # images done, in all
 
 
 def pairs_of(rooms: Rooms) -> list[tuple[list[int], list[int]]]:

@@ -16,10 +16,9 @@ from PIL import Image
 from torch import Tensor
 from torch.utils.data import default_collate
 
-from baselines.pix2shape.batch import Batch, as_views
+from baselines.pix2shape.images import Batch, RoomImages, as_views
 from baselines.pix2shape.network.model import Pix2Shape, Views, shaded
 from baselines.pix2shape.network.surfels import Scene, normals_from_depth
-from baselines.pix2shape.rooms import RoomImages
 from baselines.pix2shape.weights import Card
 from baselines.training.data import shared_rooms
 from baselines.training.images import Array, mapped

@@ -13,14 +13,14 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from baselines.pix2shape.images import check_background
 from baselines.pix2shape.network.config import TAUGHT_DEPTH
 from baselines.pix2shape.network.empty_rooms import Cameras
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.network.surfels import extrapolated, normals_from_depth
-from baselines.pix2shape.questions import check_background
 from baselines.pix2shape.training.losses import squared_distances
 from baselines.pix2shape.weights import open_weights
-from baselines.training.baseline import Answers, RowsDone, Views, answer_questions, predict_rooms
+from baselines.training.baseline import Answers, RowsDone, Views, submit
 from baselines.training.images import Array, check_reducible, row_batches
 from baselines.training.machine import chosen_device
 from baselines.training.questions import is_question_file
@@ -62,12 +62,13 @@ def predict_file(
         hint = "names tell what a model was told and taught; `pix2shape predict` takes any weights"
         raise SpecError("weights", f"{weights}, whose method is {card.submission}", method, hint)
     model.to(chosen_device(device))
+    predict = (
+        partial(answers_of, model, card.labels + card.earlier_labels, run)
+        if is_question_file(data)
+        else partial(views_of, model, card.earlier_depth, run)
+    )
     how: dict[str, Any] = {"overwrite": overwrite, "progress": progress}
-    if is_question_file(data):
-        answers = partial(answers_of, model, card.labels + card.earlier_labels, run)
-        answer_questions(data, out, model.config.method, model.config.networks.size, answers, **how)
-    else:
-        predict_rooms(data, out, partial(views_of, model, card.earlier_depth, run), **how)
+    submit(data, out, model.config.method, model.config.networks.size, predict, **how)
 
 
 def views_of(model: Pix2Shape, earlier_depth: bool, run: str, rooms: RoomsFile) -> Views:

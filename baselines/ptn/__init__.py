@@ -5,8 +5,7 @@
     rooms.py        batches of rooms of several views, with silhouettes from images or from ids
     questions.py    batches of polycubes
     matching.py     which of the answers shows the reference's volume
-    submission.py   what is predicted of rooms, and how questions are answered
-    training.py     what is learned; start reading here
+    training.py     what is learned and predicted; start reading here
 
 docs/baselines.md says what it is told that other baselines are not, and what it reaches.
 """

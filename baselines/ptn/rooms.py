@@ -26,6 +26,7 @@ from scenegen.rooms.reader import RoomsFile
 
 ROUNDING = {"uint8": 0.75 / 255, "float16": 2e-3, "float32": 1e-4}  # of the stored radiance
 LIGHTS = ("count", "position", "color", "ambient", "attenuation")
+SWAPPED = (2, 1, 0)  # x, y, z of the mirrored room
 
 
 class Silhouettes:
@@ -78,9 +79,6 @@ class Silhouettes:
             *(light[name][row, :count] for name in ("position", "color")),
             *(light[name][row] for name in ("ambient", "attenuation")),
         )
-
-
-SWAPPED = (2, 1, 0)  # x, y, z of the mirrored room
 
 
 def room_box(spec: Request) -> tuple[Corner, Corner]:

@@ -34,6 +34,10 @@ from scenegen.rooms.reader import RoomsFile
 WARM_UP = 200  # iterations
 SLOPE = 2.0  # weight of differences between neighbours, in the loss of shape
 WHOLE = 0.2  # of training, its end: whole images are shown; before that, windows around objects
+FILES = Path(__file__).with_name("files")
+TOLD = "told: the camera, and where the empty room's floor and walls are"
+FROM = "each view is predicted from its own image"
+FROM_FIRST = "each view is predicted from the image of the scene's first one"
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,12 +260,6 @@ def windows(maps: Sequence[Tensor], shown: Tensor, side: int, place: Tensor) -> 
         window = channels_last[images, row[:, :, None], column[:, None]]
         cut.append(window.movedim(-1, 1) if each.dim() == 4 else window)
     return cut
-
-
-FILES = Path(__file__).with_name("files")
-TOLD = "told: the camera, and where the empty room's floor and walls are"
-FROM = "each view is predicted from its own image"
-FROM_FIRST = "each view is predicted from the image of the scene's first one"
 
 
 def views_of(told_in_training: str, network: Relief, card: Card, rooms: RoomsFile) -> Views:

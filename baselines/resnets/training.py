@@ -30,6 +30,10 @@ from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import LARGEST, check
 
+VALIDATION = "iqtt-val.h5"
+AnswerLoss = Callable[[Tensor, Tensor], Tensor]
+BATCH = 32  # questions at a time
+
 
 @dataclass(frozen=True)
 class Settings(checkpoint.Settings):
@@ -67,10 +71,6 @@ class Card(checkpoint.Card):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_numbers(self, {"answers": (2, 16), "labels": (1, LARGEST)})
-
-
-VALIDATION = "iqtt-val.h5"
-AnswerLoss = Callable[[Tensor, Tensor], Tensor]
 
 
 def resnet_baseline(
@@ -167,9 +167,6 @@ def permuted(images: Tensor, right: Tensor, seed: int, iteration: int) -> tuple[
     rows = torch.arange(len(images))[:, None]
     mixed = torch.cat([images[:, :1], images[rows, 1 + order]], dim=1)
     return mixed, (order == right[:, None]).int().argmax(dim=1)
-
-
-BATCH = 32  # questions at a time
 
 
 def answers_of(

@@ -20,6 +20,9 @@ from scenegen.common.records import check
 
 Array = NDArray[Any]
 SMOOTHING = 6.0  # weight of the Laplacian; offsets that change from vertex to vertex are damped
+CHANNELS = (32, 64, 128)  # of the encoder's layers, each of which halves the image
+HIDDEN = 256
+HEAD = 64
 
 
 @cache
@@ -70,11 +73,6 @@ def smoothing() -> Array:
     linked = np.maximum(linked, linked.T)
     laplacian = np.eye(len(corners)) - linked / linked.sum(axis=1, keepdims=True)
     return np.linalg.inv(np.eye(len(corners)) + SMOOTHING * laplacian)
-
-
-CHANNELS = (32, 64, 128)  # of the encoder's layers, each of which halves the image
-HIDDEN = 256
-HEAD = 64
 
 
 @dataclass(frozen=True)

@@ -50,6 +50,10 @@ from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import check
 
 MOST_QUESTIONS = 5_000  # that are read; their 20,000 small images take 250 MB
+WINDOW = 0.16  # half the side of the window of pixels around a vertex, as a share of the picture
+LARGEST_SLOPE = 1000.0  # norm of all gradients
+# Of the head.
+STEPS, LEARNING_RATE, WEIGHT_DECAY = 300, 0.002, 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,12 +150,6 @@ def sampled_gradient(
 def with_gradient(value: Tensor, gradient: Tensor) -> Tensor:
     """Return a number whose gradient with respect to `value` is `gradient`."""
     return (value * gradient.detach()).sum()
-
-
-WINDOW = 0.16  # half the side of the window of pixels around a vertex, as a share of the picture
-LARGEST_SLOPE = 1000.0  # norm of all gradients
-# Of the head.
-STEPS, LEARNING_RATE, WEIGHT_DECAY = 300, 0.002, 0.3
 
 
 def lesson(run: Run, *, labels: int = 0, start: str | None = None) -> Lesson:

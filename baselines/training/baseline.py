@@ -35,6 +35,8 @@ from scenegen.common.records import check
 from scenegen.files.new_file import check_writable
 from scenegen.rooms.reader import RoomsFile
 
+RowsDone = Callable[[int, int], Any]  # rows done since the last call, rows in all
+
 
 @dataclass(frozen=True, eq=False)
 class Run:
@@ -111,7 +113,7 @@ class Views:
 
     predicted: Iterator[tuple[Array, Array, Array]]
     shown: Any
-    method: str
+    method: str = ""
     notes: str = ""
     run: str = ""
 
@@ -199,9 +201,6 @@ def train(
     return folder / WEIGHTS
 
 
-RowsDone = Callable[[int, int], Any]  # rows done since the last call, rows in all
-
-
 def write_submission(
     baseline: Baseline,
     data: str | Path,
@@ -225,60 +224,43 @@ def write_submission(
         raise SpecError(data, task, f"{able[0]}, which {method.name} is for")
     name = method.name if len(able) == 1 else f"{method.name}-{task}"
     network, card = load_weights(weights or bundled(baseline.files, method, name), method)
+    predict: Any = partial(tasks[task], network, card)  # type: ignore[arg-type, misc]
     how: dict[str, Any] = {"overwrite": overwrite, "progress": progress}
-    if baseline.answers is not None and task == "questions":
-        answers = partial(baseline.answers, network, card)
-        answer_questions(data, out, method.name, card.settings.size, answers, **how)
-    elif baseline.views is not None:
-        predict_rooms(data, out, partial(baseline.views, network, card), **how)
+    submit(data, out, method.name, card.settings.size, predict, **how)
 
 
 @torch.inference_mode()
-def answer_questions(
+def submit(
     data: str | Path,
     out: str | Path,
     method: str,
     size: int,
-    answers_of: Callable[[QuestionsFile], Answers],
+    predict: Callable[[Any], Any],
     *,
     overwrite: bool = False,
     progress: RowsDone = lambda done, total: None,
 ) -> None:
-    """Write answers to the questions of a file, and their scores.
+    """Write answers to questions and their scores, or depth and normals of every view of rooms.
 
     Args:
-        size: of the images that the network takes, pixels.
-        answers_of: how an open file is answered. It raises SpecError where it cannot be.
+        method: of the submission, unless `Views` have another one.
+        size: of the images of questions that the network takes, pixels.
+        predict: gives `Answers` of an open file of questions, or `Views` of one of rooms. It raises
+            SpecError where it cannot.
     """
     check_writable(Path(out), overwrite)
-    with open_test(data, size) as questions:
-        answers = answers_of(questions)
-        values = each_question(questions, size, answers.scores, answers.batch, progress=progress)
-    texts: dict[str, Any] = {"method": method, "run": answers.run, "notes": answers.notes}
-    write_answers(out, data, scores=values.double().numpy(), overwrite=overwrite, **texts)
-
-
-@torch.inference_mode()
-def predict_rooms(
-    data: str | Path,
-    out: str | Path,
-    views_of: Callable[[RoomsFile], Views],
-    *,
-    overwrite: bool = False,
-    progress: RowsDone = lambda done, total: None,
-) -> None:
-    """Write depth and normals of every view of a file of rooms.
-
-    Args:
-        views_of: what is predicted of an open file. It raises SpecError where nothing can be.
-    """
-    check_writable(Path(out), overwrite)
+    how: dict[str, Any] = {"overwrite": overwrite}
+    if is_question_file(data):
+        with open_test(data, size) as questions:
+            told = predict(questions)
+            values = each_question(questions, size, told.scores, told.batch, progress=progress)
+        how |= {"method": method, "run": told.run, "notes": told.notes}
+        write_answers(out, data, scores=values.double().numpy(), **how)
+        return
     with open_rooms(data) as rooms:
-        views = views_of(rooms)
-        texts: dict[str, Any] = {"method": views.method, "run": views.run, "notes": views.notes}
-        with RoomPredictionWriter(
-            out, data, shown=views.shown, overwrite=overwrite, **texts
-        ) as submission:
+        views = predict(rooms)
+        how |= {"method": views.method or method, "run": views.run, "notes": views.notes}
+        with RoomPredictionWriter(out, data, shown=views.shown, **how) as submission:
             for rows, depths, normals in views.predicted:
                 for row, depth, normal in zip(rows.tolist(), depths, normals, strict=True):
                     submission.add(row, depth, normal)

@@ -29,6 +29,7 @@ NETWORK = "network."
 MOMENTS = ("exp_avg", "exp_avg_sq", "step")  # of Adam
 Ranges = Mapping[str, tuple[float, float]]  # of numbers, by name
 OTHER_CARD = "these are weights of another configuration than the card's"
+NetworkT = TypeVar("NetworkT", bound=nn.Module)
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,6 @@ def check_numbers(record: Any, ranges: Ranges) -> None:
 
 
 CardT = TypeVar("CardT", bound=Card)
-NetworkT = TypeVar("NetworkT", bound=nn.Module)
 
 
 def one_adam(_card: Any, network: nn.Module) -> dict[str, Adam]:
@@ -188,7 +188,9 @@ def bundled(folder: Path, method: Method[Any, Any], name: str = "") -> Path:
     """
     path = folder / f"{name or method.name}.safetensors"
     if not path.is_file():
-        hint = f"train some with `bench train {method.name}`, and name them with --weights"
+        hint = (
+            f"`bench train {method.name}` makes some for `bench baseline {method.name} --weights`"
+        )
         raise SpecError("weights", f"none of {method.name} in this package", "a file", hint)
     return path
 

@@ -22,6 +22,7 @@ from scenegen.files.sets.shards import OpenFile
 from scenegen.rooms.reader import RoomsFile
 
 FileT = TypeVar("FileT")
+SAME = ("seed", "source", "shapes", "object_split")  # settings that make the same scenes
 
 
 class TrainingFiles:
@@ -119,9 +120,6 @@ def shared_rooms(rooms: RoomsFile) -> Opened[RoomsFile]:
 def shared_questions(questions: QuestionsFile) -> Opened[QuestionsFile]:
     """Return open questions as a file that other processes may read, too."""
     return Opened(partial(open_questions, questions.path, questions.part), questions)
-
-
-SAME = ("seed", "source", "shapes", "object_split")  # settings that make the same scenes
 
 
 def refuse_test_set(opened: OpenFile) -> None:

@@ -14,6 +14,9 @@ from baselines.training.processes import LostProcessError, TrainingError, proces
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check
 
+PRECISIONS = {"32": "32-true", "bf16": "bf16-mixed"}  # of networks; as Lightning Fabric calls them
+STARTED = "LOCAL_WORLD_SIZE"  # set by torchrun, and so by `fabric run`, which calls it
+
 
 @dataclass(frozen=True)
 class Machine:
@@ -60,9 +63,6 @@ def chosen_device(name: str, count: int = 1) -> torch.device:
 
 if TYPE_CHECKING:
     from lightning_fabric import Fabric
-
-PRECISIONS = {"32": "32-true", "bf16": "bf16-mixed"}  # of networks; as Lightning Fabric calls them
-STARTED = "LOCAL_WORLD_SIZE"  # set by torchrun, and so by `fabric run`, which calls it
 
 
 def torchrun_counts() -> tuple[int, int]:

@@ -25,6 +25,21 @@ import resource, subprocess, sys
 done = subprocess.run([sys.executable, "-c", *sys.argv[1:]], stdout=subprocess.DEVNULL)
 print(done.returncode, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1000)
 """
+MANY, LONG = "--n 600 --shard-size 2", "--n 100000 --shard-size 5000"
+RENDER = "render {} --size 32 --min-visible-pixels 3 --seed 3 --out rooms.h5 --workers 2"
+MOST_OPEN = 64  # files of a process, libraries' and the 32 shards that a reader keeps included
+GROWTH, ROOM = 1.05, 20  # by how much memory may grow: a factor, and MB
+# Read a row of each shard, twice, and print the largest number of open files.
+READER = """
+import os, sys
+from scenegen.rooms.reader import RoomsFile
+most = 0
+with RoomsFile("rooms.h5") as rooms:
+    for row in [*range(0, len(rooms), 2), *range(0, len(rooms), 2)]:
+        rooms.read("depth", row)
+        most = max(most, len(os.listdir("/proc/self/fd")))
+print(most)
+"""
 
 
 class Job(NamedTuple):
@@ -82,23 +97,6 @@ def run_job(name: str, folder: Path) -> str:
         if peak > JOBS[name].most:
             return f"{peak:.0f} MB: {command}"
     return ""
-
-
-MANY, LONG = "--n 600 --shard-size 2", "--n 100000 --shard-size 5000"
-RENDER = "render {} --size 32 --min-visible-pixels 3 --seed 3 --out rooms.h5 --workers 2"
-MOST_OPEN = 64  # files of a process, libraries' and the 32 shards that a reader keeps included
-GROWTH, ROOM = 1.05, 20  # by how much memory may grow: a factor, and MB
-# Read a row of each shard, twice, and print the largest number of open files.
-READER = """
-import os, sys
-from scenegen.rooms.reader import RoomsFile
-most = 0
-with RoomsFile("rooms.h5") as rooms:
-    for row in [*range(0, len(rooms), 2), *range(0, len(rooms), 2)]:
-        rooms.read("depth", row)
-        most = max(most, len(os.listdir("/proc/self/fd")))
-print(most)
-"""
 
 
 def growth(torture: Torture, _count: int) -> Results:

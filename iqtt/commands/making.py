@@ -181,9 +181,10 @@ def make_split(
         output.on_scheduler(scheduler, workers, partial(renderer_identity, device)) as cluster,
         progress_bar(count, "question") as bar,
     ):
-        tally = (make.make_suite if suite else make.make_split)(
+        tally = make.make_split(
             out,
             spec,
+            suite=suite,
             batch=batch,
             workers=workers,
             shard_size=shard_size,

@@ -1,7 +1,9 @@
 """The files of a split: their names, and what they hold."""
 
 import hashlib
+import json
 from collections.abc import Mapping
+from typing import Any
 
 from iqtt.files.layout import (
     FORMAT_NAME,
@@ -17,7 +19,7 @@ from iqtt.files.layout import (
 from iqtt.questions.specs import SPLITS, SplitSpec
 from iqtt.render import groups
 from scenegen.files.row_file import writer_name
-from scenegen.files.sets.plan import Bundle, Mark, Part, Plan, Sheet
+from scenegen.files.sets.plan import Mark, Part, Piece, Sheet, whole
 from scenegen.layout import TRUTH_DIGEST
 
 ANSWERS = "iqtt-test-answers.h5"
@@ -31,10 +33,14 @@ ALL_FILES = tuple(name for split in SPLITS for name in FILES[split])
 FINGERPRINTED = ("cubes", "world_from_shape", "light_position", "light_color", "distractor_kind")
 
 
-def split_plan(
-    spec: SplitSpec, renderer: Mapping[str, str], compression: str, command: str, secret: bool
-) -> Plan:
-    """Return what the files of a split hold.
+def split_files(
+    spec: SplitSpec,
+    renderer: Mapping[str, str],
+    command: str = "",
+    secret: bool = False,
+    folder: str = "",
+) -> list[Piece]:
+    """Return the files of a split, and what they hold.
 
     Seed and command would reveal the test answers. So only the file of the test answers has them,
     and with `secret` it has no seed either.
@@ -42,30 +48,46 @@ def split_plan(
     Args:
         renderer: Mitsuba's variant, and the versions that `rendering.backend.versions` gives.
         command: that made the split.
+        folder: of all files; empty for none.
     """
     public = root_attributes(spec.public(), renderer, "")
     private = root_attributes(spec.public() if secret else spec, renderer, command)
-    bundles = []
-    for split, names in FILES.items():
-        files = {
-            name: {**(private if name == ANSWERS else public), "split": split} for name in names
-        }
-        parts = [
-            split_part(spec, split, part, count, len(names) - 1)
-            for part, (_, count) in groups(spec, split).items()
-        ]
-        bundles.append(Bundle(files, parts))
-    settings = {
-        "format_version": FORMAT_VERSION,
-        "writer": writer_name(),
-        "secret-seed": "yes" if secret else "no",
-        "seed-check": _seed_check(spec),
-        **renderer,
-    }
-    return Plan(FORMAT_NAME, spec.public().to_json(), settings, compression, bundles)
+    return [
+        whole(
+            {
+                f"{folder}/{name}".lstrip("/"): {
+                    **(private if name == ANSWERS else public),
+                    "split": split,
+                }
+                for name in names
+            },
+            [
+                split_part(spec, split, part, count, len(names) - 1, folder)
+                for part, (_, count) in groups(spec, split).items()
+            ],
+        )
+        for split, names in FILES.items()
+    ]
 
 
-def split_part(spec: SplitSpec, split: str, name: str, count: int, truth: int) -> Part:
+def split_request(spec: SplitSpec, renderer: Mapping[str, str], secret: bool) -> dict[str, Any]:
+    """Return what the bytes of the files of a split depend on, as anybody may read it."""
+    public = spec.public().to_json()
+    # This tells two seeds apart. It does not help to find a seed: to try one takes longer here than
+    # to make a question from it.
+    check = hashlib.scrypt(
+        str(spec.seed).encode(), salt=public.encode(), n=2**14, r=8, p=1, dklen=16
+    )
+    return {
+        **json.loads(public), "kind": FORMAT_NAME, "format_version": FORMAT_VERSION,
+        "writer": writer_name(), "secret-seed": "yes" if secret else "no",
+        "seed-check": check.hex(), **renderer,
+    }  # fmt: skip
+
+
+def split_part(
+    spec: SplitSpec, split: str, name: str, count: int, truth: int, folder: str = ""
+) -> Part:
     """Return a part of a split: images in the first of its files, the rest in file `truth`."""
     with_answers = name != "unlabeled"
     sheets = [
@@ -77,13 +99,4 @@ def split_part(spec: SplitSpec, split: str, name: str, count: int, truth: int) -
     marks = [Mark(named("fingerprint", name), FINGERPRINTED, range(truth + 1), request)]
     if with_answers:
         marks.append(Mark(named(TRUTH_DIGEST, name), SCORED, [truth]))
-    return Part(split, name, count, sheets, marks)
-
-
-def _seed_check(spec: SplitSpec) -> str:
-    """Return what tells two seeds apart, as hex.
-
-    It does not help to find a seed: to try one takes longer here than to make a question from it.
-    """
-    salt = spec.public().to_json().encode()
-    return hashlib.scrypt(str(spec.seed).encode(), salt=salt, n=2**14, r=8, p=1, dklen=16).hex()
+    return Part(f"{folder}/{split}".lstrip("/"), name, count, sheets, marks)

@@ -1,6 +1,6 @@
 """Questions drawn, rendered and packed, all at the same time; any process can do it."""
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,12 +32,12 @@ class QuestionsWork:
     """What is done to questions; a `making.Work`.
 
     Attributes:
-        pools: what they show.
+        pools: what they show, by the folder of the split that they are for.
         batch: questions rendered at once.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
     """
 
-    pools: Pools
+    pools: Mapping[str, Pools]
     batch: int
     device: str
     compression: str
@@ -50,11 +50,12 @@ class QuestionsWork:
     def packed_rows(self, block: Block, workers: int) -> Generator[Packed, None, Tally]:
         """Render questions in order, and meanwhile pack them in threads; return their tally."""
         share_processors(workers, self.device)
-        spec = self.pools.spec
-        split, part, tally = block.part.bundle, block.part.name, Tally()
-        first, count = groups(spec, split)[part]
+        folder, _, split = block.part.of.rpartition("/")
+        pools, tally = self.pools[folder], Tally()
+        spec = pools.spec
+        first, count = groups(spec, split)[block.part.name]
         rendered = render_questions(
-            self.pools, split, first, count,
+            pools, split, first, count,
             rows=block.items, batch=self.batch, device=self.device, tally=tally,
         )  # fmt: skip
         pieces = (some[i : i + PACKED] for some in rendered for i in range(0, len(some), PACKED))

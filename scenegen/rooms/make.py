@@ -1,6 +1,7 @@
 """Make files of rooms: render a data set to one file or to shards, or merge shards to one file."""
 
-from collections.abc import Callable, Mapping
+import json
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from scenegen.files.places import as_place
 from scenegen.files.row_file import writer_name
 from scenegen.files.sets.cluster import Cluster
 from scenegen.files.sets.making import make_set
-from scenegen.files.sets.plan import Bundle, Mark, Part, Plan, Sheet
+from scenegen.files.sets.plan import Mark, Part, Sheet, whole
 from scenegen.files.sets.sets import merge_file
 from scenegen.layout import (
     FORMAT_NAME,
@@ -83,11 +84,18 @@ def make_dataset(
     place = as_place(path)
     check_writable(place, overwrite=True)
     renderer = {"variant": variant, **versions()}
-    plan = rooms_plan(place.name, spec, count, renderer, compression, command)
+    settings = {"format_version": FORMAT_VERSION, "writer": writer_name(), **renderer}
+    attributes = {
+        **settings, "format": FORMAT_NAME, "spec": spec.to_json(), "conventions": conventions(spec),
+        "creation_command": command,
+    }  # fmt: skip
+    marks = (Mark("fingerprint", ["scene"], request=spec.to_json()), Mark(TRUTH_DIGEST, SCORED))
+    file = whole({place.name: attributes}, [rooms_part(spec, count, marks)])
     work = RoomsWork(spec, batch, device, objects, compression, MEMBER_STORE.folder,
                      (ASSETS.materials, ASSETS.environment))  # fmt: skip
     make_set(
-        place.parent, plan, work, shard_size,
+        place.parent, [file], {**json.loads(spec.to_json()), **settings, "kind": FORMAT_NAME},
+        work, shard_size,
         workers=workers or useful_workers(count * views, variant, work.worthwhile),
         cluster=cluster, overwrite=overwrite, progress=progress, note=objects.problems.update,
     )  # fmt: skip
@@ -106,34 +114,6 @@ def check_batch(batch: int, size: Any, views: int = 1, images: int = 1) -> None:
     text = f"{batch}, with {views} views of a scene"
     what = "images" if images == 1 else f"rows of {images} images"
     check(max(batch, views) <= most, "batch", text, f"at most {most} {what} of this size")
-
-
-def rooms_plan(
-    name: str,
-    spec: Request,
-    count: int,
-    renderer: Mapping[str, str],
-    compression: str,
-    command: str,
-) -> Plan:
-    """Return what a file of rooms holds, or a set of shards that it shows.
-
-    Args:
-        renderer: Mitsuba's variant, and the versions that `rendering.backend.versions` gives.
-    """
-    attributes = {
-        "format": FORMAT_NAME,
-        "format_version": FORMAT_VERSION,
-        "writer": writer_name(),
-        "spec": spec.to_json(),
-        "conventions": conventions(spec),
-        "creation_command": command,
-        **renderer,
-    }
-    marks = (Mark("fingerprint", ["scene"], request=spec.to_json()), Mark(TRUTH_DIGEST, SCORED))
-    settings = {"format_version": FORMAT_VERSION, "writer": writer_name(), **renderer}
-    bundle = Bundle({name: attributes}, [rooms_part(spec, count, marks)])
-    return Plan(FORMAT_NAME, spec.to_json(), settings, compression, [bundle])
 
 
 def rooms_part(spec: Request, count: int, marks: tuple[Mark, ...] = ()) -> Part:

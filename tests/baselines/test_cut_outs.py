@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from baselines.cut_outs import LEARNING, LIFT, WITHOUT_TRAINING, blob_balls
-from baselines.picture import outline_mask
+from baselines.cut_outs import LEARNING, LIFT, WITHOUT_TRAINING, blob_balls, outline_mask
 from baselines.trivial import write_room_baseline
 from metrics.measures.relief import empty_room
 from metrics.scoring.evaluate import score

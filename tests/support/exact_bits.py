@@ -68,7 +68,7 @@ def digests_of(path: Path, without: Sequence[str] = ()) -> dict[str, str]:
 
 def all_digests(folder: Path) -> dict[str, dict[str, str]]:
     """Make the files, and return their digests by kind."""
-    from iqtt.files.make import make_suite
+    from iqtt.files.make import make_split
     from iqtt.questions.specs import SplitSpec
     from scenegen.rooms.make import make_dataset
 
@@ -96,7 +96,7 @@ def all_digests(folder: Path) -> dict[str, dict[str, str]]:
     questions = SplitSpec(
         seed=11, train=0, labeled=0, val=0, test=2, height=48, width=48, min_cube_pixels=1
     )
-    make_suite(folder / "suite", questions)
+    make_split(folder / "suite", questions, suite=True)
     for path in sorted((folder / "suite").glob("*/iqtt-test*.h5")):
         found[f"{path.parent.name}/{path.stem}"] = digests_of(path)
     return found

@@ -38,7 +38,7 @@ def in_memory(path: Path, size: int, **how: Any) -> Any:
 
 def room_source(path: Path, config: Any) -> Any:
     """Return the images of a rooms file as a model of this configuration is shown them."""
-    from baselines.pix2shape.rooms import RoomImages
+    from baselines.pix2shape.images import RoomImages
     from baselines.training.data import shared_rooms
     from scenegen import open_rooms
 
@@ -47,7 +47,7 @@ def room_source(path: Path, config: Any) -> Any:
 
 def question_source(path: Path, part: str | None, config: Any) -> Any:
     """Return the images of a question file, as `room_source`."""
-    from baselines.pix2shape.questions import QuestionImages
+    from baselines.pix2shape.images import QuestionImages
     from baselines.training.data import shared_questions
     from iqtt import open_questions
 
@@ -56,7 +56,7 @@ def question_source(path: Path, part: str | None, config: Any) -> Any:
 
 def suited(config: Any, path: Path, part: str | None = "unlabeled") -> Any:
     """Return the configuration that training on a file of questions gives a model."""
-    from baselines.pix2shape.questions import for_questions
+    from baselines.pix2shape.images import for_questions
     from iqtt import open_questions
 
     with open_questions(path, part) as questions:

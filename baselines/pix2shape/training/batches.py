@@ -15,11 +15,9 @@ from threadpoolctl import threadpool_limits
 from torch import Tensor
 from torch.utils.data import DataLoader, Dataset, default_collate
 
-from baselines.pix2shape.batch import Batch
+from baselines.pix2shape.images import Batch, QuestionImages, RoomImages
 from baselines.pix2shape.matching import matched_rows, relief_of_rows
 from baselines.pix2shape.network.config import ModelConfig
-from baselines.pix2shape.questions import QuestionImages
-from baselines.pix2shape.rooms import RoomImages
 from baselines.training.data import Opened
 from baselines.training.images import Draws
 from baselines.training.processes import LostProcessError, processes, share

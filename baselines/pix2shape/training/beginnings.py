@@ -7,11 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from baselines.pix2shape.images import QuestionImages, RoomImages, for_questions
 from baselines.pix2shape.network.config import METHOD as PAPER
 from baselines.pix2shape.network.config import TAUGHT_DEPTH, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
-from baselines.pix2shape.questions import QuestionImages, for_questions
-from baselines.pix2shape.rooms import RoomImages
 from baselines.pix2shape.training.batches import Sources, streamed_source
 from baselines.pix2shape.weights import METHOD, Card, open_weights
 from baselines.training.checkpoint import State, begun, load_checkpoint

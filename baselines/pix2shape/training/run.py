@@ -12,11 +12,11 @@ from lightning_fabric import Fabric
 from torch.utils.data import DataLoader
 from torch.utils.tensorboard import SummaryWriter
 
+from baselines.pix2shape.images import RoomImages
 from baselines.pix2shape.matching import matched_rows, relief_of_rows
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
 from baselines.pix2shape.pictures import training_sheet
-from baselines.pix2shape.rooms import RoomImages
 from baselines.pix2shape.training.batches import Sources, readers_kept
 from baselines.pix2shape.training.beginnings import ModelState, new_run, resumed_run
 from baselines.pix2shape.training.steps import Iterations, check_request

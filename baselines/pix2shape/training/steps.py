@@ -18,11 +18,10 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor, nn
 
-from baselines.pix2shape.batch import Batch, turned
+from baselines.pix2shape.images import Batch, QuestionImages, turned
 from baselines.pix2shape.network.architecture import CAMERA
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape, shaded
-from baselines.pix2shape.questions import QuestionImages
 from baselines.pix2shape.training import losses
 from baselines.pix2shape.training.batches import Sources, image_batches, question_batches
 from baselines.training.fit import Loss

@@ -7,12 +7,10 @@ worker, and is told as anywhere.
 
 import importlib
 import logging
-import os
 import secrets
-import subprocess
 import sys
 import threading
-import time
+from collections import defaultdict
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
 from concurrent.futures import CancelledError
 from contextlib import contextmanager, suppress
@@ -21,19 +19,18 @@ from functools import partial
 from typing import Any, TypeVar
 
 from scenegen.common.errors import SceneGenError
-from scenegen.common.signals import without_interrupts
 from scenegen.files.places import lacking
-from scenegen.files.pool import LostWorkerError, Pool, ended, python_command
+from scenegen.files.pool import LostWorkerError, Pool
 
 T = TypeVar("T")
 Task = TypeVar("Task")
 LOCAL = "local"
-LOGGING = "DASK_DISTRIBUTED__LOGGING__DISTRIBUTED"  # which Dask's processes read as they start
 BATCH = 200  # tasks that the scheduler is told of at once, as each message costs milliseconds
-PATIENCE = 10  # seconds in which a scheduler must answer, or workers must end
-MOMENT = 0.05  # seconds between two looks whether workers are there
-_one_at_a_time = threading.Lock()  # Mitsuba and HDF5 take one task in a process
-_pools: "dict[str, Pool]" = {}  # of this worker: at most one, by the name of its work
+PATIENCE = 10  # seconds in which a scheduler must answer
+# Of each worker of this process, by its address: it does one task at a time, and has a pool for
+# the work of some name.
+_turns = defaultdict[str, threading.Lock](threading.Lock)
+_pools: dict[str, tuple[str, Pool]] = {}
 _threads = 1  # of the worker that this is a process of
 Versions = Callable[[], Mapping[str, str]]
 
@@ -134,14 +131,16 @@ def _call(task: Any, work: _Work) -> Any:
     """Do a task on a worker, in a process that ends with it."""
     from distributed import get_worker
 
-    with _one_at_a_time:
-        if work.name not in _pools:
-            while _pools:
-                _pools.popitem()[1].close()
-            worker = get_worker()
+    worker = get_worker()
+    with _turns[worker.address]:
+        name, pool = _pools.get(worker.address, ("", None))
+        if pool is None or name != work.name:
+            if pool is not None:
+                pool.close()
             done = partial(work.done, worker.address, int(worker.state.nthreads))
-            _pools[work.name] = Pool(1, done, work.told)
-        return _pools[work.name].do(task)
+            pool = Pool(1, done, work.told)
+            _pools[worker.address] = work.name, pool
+        return pool.do(task)
 
 
 @contextmanager
@@ -154,8 +153,8 @@ def connected(
     """Connect to a scheduler.
 
     Args:
-        scheduler: its address, such as `tcp://host:8786`, or LOCAL for one that is started here
-            with `workers` processes.
+        scheduler: its address, such as `tcp://host:8786`, or LOCAL for one of this process with
+            `workers` workers.
         versions: as in `Cluster`.
         print_note: is called with a line where the scheduler has no workers yet, which are waited
             for.
@@ -176,15 +175,19 @@ def connected(
 @contextmanager
 def _client(distributed: Any, scheduler: str, workers: int) -> Iterator[Any]:
     if scheduler == LOCAL:
+        # Its workers are threads: each has a process for its tasks anyway.
+        how = {"processes": False, "threads_per_worker": 1, "memory_limit": 0}
         address = "127.0.0.1:0"
-        with without_interrupts():
-            cluster = distributed.LocalCluster(n_workers=0, dashboard_address=address)
         with (
-            cluster,
+            distributed.LocalCluster(max(1, workers), dashboard_address=address, **how) as cluster,
             distributed.Client(cluster) as client,
-            _workers_here(client, cluster.scheduler_address, max(1, workers)),
         ):
-            yield client
+            try:
+                yield client
+            finally:
+                for worker in cluster.workers.values():
+                    if worker.address in _pools:
+                        _pools[worker.address][1].kill()
         return
     try:
         client = distributed.Client(scheduler, timeout=PATIENCE)
@@ -199,43 +202,14 @@ def _client(distributed: Any, scheduler: str, workers: int) -> Iterator[Any]:
 
 
 @contextmanager
-def _workers_here(client: Any, address: str, count: int) -> Iterator[None]:
-    """Start so many workers of a scheduler, by a process that starts them again if they die.
-
-    `LocalCluster` would start them by `multiprocessing`, which imports the caller's main module.
-    """
-    words = [address, "--nworkers", str(count), "--nthreads", "1", "--no-dashboard"]
-    code = f"from distributed.cli.dask_worker import main; main({words!r})"
-    with without_interrupts():
-        starter = subprocess.Popen(python_command(code), stdin=subprocess.DEVNULL)
-    try:
-        while len(client.scheduler_info(n_workers=-1)["workers"]) < count:
-            if starter.poll() is not None:
-                what = f"Workers of Dask cannot be started here ({ended(starter.returncode)})"
-                raise SceneGenError(what, hint="use no --scheduler")
-            time.sleep(MOMENT)
-        yield
-    finally:
-        starter.terminate()
-        try:
-            starter.wait(PATIENCE)
-        except subprocess.TimeoutExpired:
-            starter.kill()
-            starter.wait()
-
-
-@contextmanager
 def _quiet() -> Iterator[None]:
     """Keep Dask's own lines from the terminal: lost workers are its business."""
     loggers = [logging.getLogger(name) for name in ("distributed", "tornado", "asyncio")]
-    levels, before = [logger.level for logger in loggers], os.environ.get(LOGGING)
-    os.environ.setdefault(LOGGING, "critical")
+    levels = [logger.level for logger in loggers]
     for logger in loggers:
         logger.setLevel(logging.CRITICAL)
     try:
         yield
     finally:
-        if before is None:
-            del os.environ[LOGGING]
         for logger, level in zip(loggers, levels, strict=True):
             logger.setLevel(level)

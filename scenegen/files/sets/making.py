@@ -10,20 +10,20 @@ import json
 import platform
 import re
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from contextlib import ExitStack, closing, contextmanager, nullcontext, suppress
+from contextlib import closing, contextmanager, nullcontext
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any, Protocol
 
 from scenegen.common.cgroup import processors
 from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.files.content import file_sha256
-from scenegen.files.new_file import check_writable, write_text, written_beside
+from scenegen.files.new_file import check_writable, write_text
 from scenegen.files.places import check_store, is_remote, listing, move, remove_folder, scratch
 from scenegen.files.pool import LostWorkerError
 from scenegen.files.sets.cluster import Cluster, threads_of_worker
-from scenegen.files.sets.plan import Block, Piece, Plan
-from scenegen.files.sets.sets import Packed, Progress, write_piece, write_views
+from scenegen.files.sets.plan import Block, Piece
+from scenegen.files.sets.sets import Packed, Progress, write_piece, write_view
 from scenegen.files.sets.shards import name_of_set
 from scenegen.files.sets.workers import in_order, in_threads
 from scenegen.files.sets.workspace import run_lock, workspace
@@ -31,12 +31,17 @@ from scenegen.files.sets.workspace import run_lock, workspace
 REQUEST = "request.json"  # what the parts answer
 COMPLETE = "complete"  # is there when all parts are
 PART = re.compile(r".+\.[0-9a-f]{16}", re.DOTALL)  # the name of a part, and of its SHA-256 so much
+IN_FOLDER = "%2F"  # stands for "/" there
 MOVED_AT_ONCE = 16  # files that a store renames, which copies them
 Note = Callable[[Any], Any]
 
 
 class Work(Protocol):
     """What a task does for a set. It is pickled, so that any process can do it."""
+
+    @property
+    def compression(self) -> str:
+        """As in `table.COMPRESSIONS`."""
 
     @property
     def block(self) -> int:
@@ -51,7 +56,8 @@ class Work(Protocol):
 
 def make_set(
     folder: Path,
-    plan: Plan,
+    wholes: Sequence[Piece],
+    request: Mapping[str, Any],
     work: Work,
     shard_size: int,
     *,
@@ -64,7 +70,9 @@ def make_set(
     """Make the files of a set, of which earlier runs of the same request may have made parts.
 
     Args:
-        folder: where the files are.
+        folder: where the files are; their names may begin with a folder in it, which is made.
+        wholes: the files that readers open.
+        request: what their bytes depend on, but for `work.compression` and sizes.
         shard_size: most items of one file; more go to shards.
         workers: processes of this machine that make rows.
         cluster: whose workers make whole pieces instead.
@@ -72,62 +80,50 @@ def make_set(
         progress: is called with the number of rows that are there since the last call; first when
             nothing speaks against the request.
 
-    Raises SpecError where the parts there answer another request, SceneGenError while another run
-    makes this set, FileExistsError where files have these names, LostWorkerError where a block
-    ended two processes, and OSError as the disk does.
+    Raises SpecError where parts there answer another request, SceneGenError while another run makes
+    this set, FileExistsError where files have these names, LostWorkerError where a block ended two
+    processes, and OSError as the disk does.
     """
-    pieces = [piece for bundle in plan.bundles for piece in bundle.pieces(shard_size)]
-    names = {name for piece in pieces for name in piece.names}
-    first = folder / plan.files[0]
+    cuts = [whole.cut(shard_size) for whole in wholes]
+    pieces = [piece for cut in cuts for piece in cut]
+    files = [name for whole in wholes for name in whole.files]
+    request = {
+        **request, "files": ", ".join(files), "compression": work.compression,
+        "n": sum(len(block.items) for whole in wholes for block in whole.blocks),
+        "shard-size": shard_size,
+    }  # fmt: skip
+    first = folder / PurePosixPath(files[0]).name
     if is_remote(folder):
         check_store(first)
     elif cluster is not None:
-        first = first.absolute()  # workers are in other folders
-    home, request = parts_folder(first), plan.request(shard_size)
-    if len(pieces) == 1 and cluster is None:  # after a kill there is nothing to go on with
-        with suppress(OSError):  # a name that is too long
-            check_request(home, request, overwrite)
-        _check_free(folder, plan.files, overwrite)
-        progress(0)
-        with ExitStack() as naming:
-            places = [folder / name for name in pieces[0].names]
-            paths = [naming.enter_context(written_beside(place, overwrite)) for place in places]
-            with _rows(pieces, work, workers, note) as rows:
-                write_piece(paths, pieces[0], rows, plan.compression, progress)
-        _remove_others(folder, plan.files, names)
-        remove_folder(home)
-        return
-    lock = first.with_name(f".{first.name}.lock")
+        folder, first = folder.absolute(), first.absolute()  # workers are in other folders
+    home, lock = parts_folder(first), first.with_name(f".{first.name}.lock")
     with nullcontext() if is_remote(folder) else run_lock(lock, first):
-        check_request(home, request, overwrite)
+        _take_over(home, request, overwrite)
         if (home / COMPLETE).exists():
             progress(sum(piece.rows for piece in pieces))
         else:
-            _check_free(folder, plan.files, overwrite)
+            for path in _there(folder, files).values():
+                check_writable(path, overwrite)
             with _kept(home, request):
                 parts = complete_parts(home, check=True)
-                missing = [piece for piece in pieces if not parts.keys() >= set(piece.names)]
+                missing = [piece for piece in pieces if not parts.keys() >= piece.files.keys()]
                 progress(sum(piece.rows for piece in pieces if piece not in missing))
                 if cluster is None:
-                    with _rows(missing, work, workers, note) as rows:
-                        for piece in missing:
-                            _make_part(home, piece, rows, plan.compression, progress)
+                    _make_parts(home, missing, work, workers, workers, progress, note)
                 else:
-                    call = partial(_make_on_worker, home, request, missing, plan, work)
-                    named, numbers = partial(_named, missing), range(len(missing))
-                    made = cluster.results(call, numbers, named, in_order=False)
-                    with closing(made):
-                        for count, ends in made:
-                            progress(count)
-                            for end in ends:
-                                note(end)
-                write_views(home, complete_parts(home), pieces, plan)
+                    _make_on_cluster(home, request, missing, work, cluster, progress, note)
+                parts = complete_parts(home)
+                for whole, cut in zip(wholes, cuts, strict=True):
+                    if cut[0].is_shard:
+                        with _part(home, whole) as paths:
+                            write_view(paths, whole, cut, parts, work.compression)
                 write_text(home / COMPLETE, "")
-        _publish(home, folder, plan.files, names, overwrite)
+        _publish(home, folder, files, {name for piece in pieces for name in piece.files}, overwrite)
 
 
 def parts_folder(first: Path) -> Path:
-    """Return the hidden folder with the parts of a set; `first` is the first file of its plan."""
+    """Return the hidden folder with the parts of a set; `first` is the first of its files."""
     return first.with_name(f".{first.name}.parts")
 
 
@@ -138,61 +134,82 @@ def complete_parts(home: Path, check: bool = False) -> dict[str, Path]:
         check: remove those whose SHA-256 is not that of their name.
     """
     paths = [path for path in listing(home) if PART.fullmatch(path.name)]
-    if not check:
-        return {path.stem: path for path in paths}
-    count, parts = processors(), {}
-    for path, digest in zip(paths, in_threads(file_sha256, paths, count, 2 * count), strict=True):
-        if path.suffix == f".{digest[:16]}":
-            parts[path.stem] = path
-        else:
-            path.unlink()
-    return parts
+    if check:
+        count, right = processors(), []
+        digests = in_threads(file_sha256, paths, count, 2 * count)
+        for path, digest in zip(paths, digests, strict=True):
+            if path.suffix == f".{digest[:16]}":
+                right.append(path)
+            else:
+                path.unlink()
+        paths = right
+    return {path.stem.replace(IN_FOLDER, "/"): path for path in paths}
 
 
-@contextmanager
-def _rows(pieces: Sequence[Piece], work: Work, workers: int, note: Note) -> Iterator[Iterator[Any]]:
-    """Give the rows of pieces, from this process or from worker processes; all are to be taken."""
+def _make_parts(
+    home: Path,
+    pieces: Sequence[Piece],
+    work: Work,
+    workers: int,
+    shares: int,
+    progress: Progress,
+    note: Note,
+) -> None:
+    """Make the files of pieces in the folder of parts, here or with worker processes.
+
+    Args:
+        shares: of this machine, of which each process has one.
+    """
     blocks = (block for piece in pieces for block in piece.blocks if block.items)
     if workers > 1:
         blocks = (part for block in blocks for part in block.cut(work.block))
-    with closing(
-        in_order(partial(work.packed_rows, workers=workers), blocks, workers, note)
-    ) as rows:
-        yield rows
+    make = partial(work.packed_rows, workers=shares)
+    with closing(in_order(make, blocks, workers, note)) as rows:
+        for piece in pieces:
+            with _part(home, piece) as paths:
+                write_piece(paths, piece, rows, work.compression, progress)
         next(rows, None)  # there are none; so worker processes end by themselves
 
 
-def _make_part(
-    home: Path,
-    piece: Piece,
-    rows: Iterator[Packed],
-    compression: str,
-    progress: Progress = lambda rows: None,
-) -> None:
-    """Make the files of a piece in the folder of parts. Errors of the disk name the set's file."""
-    with workspace(scratch(home), home.with_name(piece.names[0])) as hidden:
-        paths = [hidden / name for name in piece.names]
-        write_piece(paths, piece, rows, compression, progress)
+@contextmanager
+def _part(home: Path, piece: Piece) -> Iterator[list[Path]]:
+    """Give hidden paths for the files of a piece; they are parts when the block ends well.
+
+    They are beside the folder of parts, where the next run looks for what a killed one left. Errors
+    of the disk name the set's file.
+    """
+    folder = home.parent
+    with workspace(scratch(folder), folder / next(iter(piece.files))) as hidden:
+        paths = [hidden / name.replace("/", IN_FOLDER) for name in piece.files]
+        yield paths
         for path in paths:
             move(path, home / f"{path.name}.{file_sha256(path)[:16]}")
 
 
-def _make_on_worker(
+def _make_on_cluster(
     home: Path,
     request: Mapping[str, Any],
     pieces: Sequence[Piece],
-    plan: Plan,
     work: Work,
-    number: int,
+    cluster: Cluster,
+    progress: Progress,
+    note: Note,
+) -> None:
+    """Make the files of pieces in the folder of parts, each piece on one worker."""
+    call, numbers = partial(_make_on_worker, home, request, pieces, work), range(len(pieces))
+    with closing(cluster.results(call, numbers, partial(_named, pieces), in_order=False)) as made:
+        for count, ends in made:
+            progress(count)
+            for end in ends:
+                note(end)
+
+
+def _make_on_worker(
+    home: Path, request: Mapping[str, Any], pieces: Sequence[Piece], work: Work, number: int
 ) -> tuple[int, list[Any]]:
-    """Make one of the pieces; to be called by a worker of a cluster."""
     check_shared(home, request)
-    ends: list[Any] = []
-    blocks = [block for block in pieces[number].blocks if block.items]
-    make = partial(work.packed_rows, workers=max(1, processors() // threads_of_worker()))
-    with closing(in_order(make, blocks, 1, ends.append)) as rows:
-        _make_part(home, pieces[number], rows, plan.compression)
-        next(rows, None)
+    shares, ends = max(1, processors() // threads_of_worker()), list[Any]()
+    _make_parts(home, [pieces[number]], work, 1, shares, lambda rows: None, ends.append)
     return pieces[number].rows, ends
 
 
@@ -232,41 +249,28 @@ def _differences(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> str:
     )
 
 
-def check_request(home: Path, request: Mapping[str, Any], overwrite: bool) -> bool:
-    """Return whether parts of this request are there; remove what is of no request.
+def _take_over(home: Path, request: Mapping[str, Any], overwrite: bool) -> None:
+    """Remove what earlier runs left, unless it is of this request.
 
-    Raises SpecError where parts answer another request; with `overwrite` these are removed.
+    Raises SpecError where parts answer another request, without `overwrite`.
     """
     older = _read_request(home)
     differences = "" if older is None else _differences(older, request)
-    if differences and not overwrite:
+    if differences and not overwrite and complete_parts(home):
         where, expected = f"{home} has parts of another request", "the same options"
         hint = "repeat its options to go on, or start anew with --overwrite"
         raise SpecError(where, differences, expected, hint)
     if older is None or differences:
         remove_folder(home)
-    return older is not None and not differences
-
-
-def write_request(home: Path, request: Mapping[str, Any]) -> None:
-    """Make a folder of parts for a request, if it is not there."""
-    if not is_remote(home):
-        home.mkdir(exist_ok=True)
-    with written_beside(home / REQUEST, overwrite=True) as path:
-        path.write_text(json.dumps(request, indent=1), encoding="utf-8")
-
-
-def _check_free(folder: Path, names: Sequence[str], overwrite: bool) -> None:
-    """Raise FileExistsError where files have the names of a set or of its shards."""
-    for path in _files(folder, names):
-        check_writable(path, overwrite)
 
 
 @contextmanager
 def _kept(home: Path, request: Mapping[str, Any]) -> Iterator[None]:
     """Make the folder of parts for the block; where that raises, it goes unless it has some."""
     try:
-        write_request(home, request)
+        if not is_remote(home):
+            home.mkdir(exist_ok=True)
+        write_text(home / REQUEST, json.dumps(request, indent=1), overwrite=True)
         yield
     except LostWorkerError as error:
         kept = f"{len(complete_parts(home))} complete files are kept; the same command goes on"
@@ -280,17 +284,19 @@ def _kept(home: Path, request: Mapping[str, Any]) -> Iterator[None]:
 def _publish(
     home: Path, folder: Path, files: Sequence[str], names: set[str], overwrite: bool
 ) -> None:
-    """Give all parts their names, those that readers open last; a run that was killed goes on."""
-    parts = complete_parts(home)
-    parts |= {path.name: path for path in listing(home) if path.name in files}
-    for path in _files(folder, files):
-        if path.name in parts:
-            check_writable(path, overwrite)
-    for name in files:
-        if name in parts:
-            (folder / name).unlink(missing_ok=True)
-    _remove_others(folder, files, names)
+    """Give all parts their names, those that readers open last; a run that was killed goes on.
+
+    One file takes the place of an older one at once. Of several, all older ones go before.
+    """
+    parts, there = complete_parts(home), _there(folder, files)
+    for name in there.keys() & parts.keys():
+        check_writable(there[name], overwrite)
+    for name, path in there.items():
+        if name not in {*names, *files} or (name in files and name in parts and len(parts) > 1):
+            path.unlink(missing_ok=True)
     for chosen in (parts.keys() - set(files), sorted(parts.keys() & set(files))):
+        for name in chosen if not is_remote(folder) else ():
+            (folder / name).parent.mkdir(exist_ok=True)
         moved = in_threads(
             lambda name: move(parts[name], folder / name), chosen, MOVED_AT_ONCE, MOVED_AT_ONCE
         )
@@ -299,13 +305,12 @@ def _publish(
     remove_folder(home)
 
 
-def _remove_others(folder: Path, files: Sequence[str], names: set[str]) -> None:
-    """Remove what an older set has more: files of other names, or more shards."""
-    for path in _files(folder, files):
-        if path.name not in names and path.name not in files:
-            path.unlink(missing_ok=True)
-
-
-def _files(folder: Path, names: Sequence[str]) -> list[Path]:
-    """Return which files of these names are in a folder, and which shards of theirs."""
-    return [path for path in listing(folder) if {path.name, name_of_set(path.name)} & set(names)]
+def _there(folder: Path, files: Sequence[str]) -> dict[str, Path]:
+    """Return which of these files there are, and which shards of them, by name."""
+    there = {}
+    for parent in {PurePosixPath(name).parent for name in files}:
+        for path in listing(folder.joinpath(*parent.parts)):
+            name = (parent / path.name).as_posix()
+            if not {name, name_of_set(name)}.isdisjoint(files):
+                there[name] = path
+    return there

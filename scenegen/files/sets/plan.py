@@ -1,12 +1,12 @@
-"""What a set of files holds, as data: its tables, and how they are cut into shards.
+"""What files hold, as data: their tables, and how many rows are cut into shards.
 
-A set answers one request. Its rows go to whole files, or to shards beside a file that shows them as
-one. A task says all of that in a `Plan`, and adds only the rows.
+A task tells of its files in `Piece`s, and adds only the rows. Rows go to whole files, or to shards
+beside a file that shows them as one.
 """
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import PurePosixPath
 from typing import Any
 
 from scenegen.common.records import check
@@ -21,7 +21,7 @@ class Sheet:
 
     Attributes:
         columns: its data sets.
-        file: number of the file among those of its bundle.
+        file: number of the file among those of its piece.
         group: HDF5 group that holds the columns; empty for the root.
         attributes: of the group.
     """
@@ -44,7 +44,7 @@ class Mark:
     Attributes:
         name: of the attribute.
         columns: names of those whose values count.
-        files: numbers of the files in a bundle that have it.
+        files: numbers of the files of a piece that have it.
         request: the text that counts too, for a fingerprint; None for a digest of values alone.
     """
 
@@ -64,7 +64,7 @@ class Part:
     """Items whose rows go to the same tables, as many rows to each.
 
     Attributes:
-        bundle, name: which part it is, for the task; `Shard.part` has the name.
+        of, name: which part it is, for the task; `Shard.part` has the name.
         items: their number.
         sheets: the tables.
         marks: what follows from the rows.
@@ -72,7 +72,7 @@ class Part:
         noun: what items are, for errors.
     """
 
-    bundle: str
+    of: str
     name: str
     items: int
     sheets: Sequence[Sheet]
@@ -94,7 +94,7 @@ class Block:
         return len(self.items) * self.part.item_rows
 
     def __str__(self) -> str:
-        of_part = " ".join(filter(None, (self.part.bundle, self.part.name, self.part.noun)))
+        of_part = " ".join(filter(None, (self.part.of, self.part.name, self.part.noun)))
         return f"{of_part} {self.items[0]} to {self.items[-1]}"
 
     def cut(self, size: int) -> Iterator["Block"]:
@@ -104,90 +104,46 @@ class Block:
 
 
 @dataclass(frozen=True)
-class Bundle:
-    """Files that are filled together, such as the file of test questions and that of their answers.
+class Piece:
+    """Files that are filled together, such as those of test questions and of their answers.
 
     Attributes:
-        files: the names that readers open, with the root attributes of each file.
-        parts: what they hold.
+        files: their names, with the root attributes of each.
+        blocks: the items that they hold.
+        is_shard: whether they are shards of other files; they then hold one block.
     """
 
     files: Mapping[str, Mapping[str, Any]]
-    parts: Sequence[Part]
-
-    def whole(self) -> "Piece":
-        """Return the whole bundle as one piece."""
-        blocks = tuple(Block(part, range(part.items)) for part in self.parts)
-        return Piece(self, tuple(self.files), blocks, False)
-
-    def pieces(self, size: int) -> "list[Piece]":
-        """Return one piece where there are at most `size` items, else shards, each of one part.
-
-        Raises SpecError where there would be too many shards.
-        """
-        whole = self.whole()
-        items = sum(len(block.items) for block in whole.blocks)
-        if items <= size:
-            return [whole]
-        least = -(-items // (MOST_SHARDS - len(self.parts) + 1))
-        check(size >= least, "shard-size", size, f"at least {least} for {items:,} items")
-        shards = [shard for block in whole.blocks for shard in block.cut(size)]
-        names = [
-            tuple(shard_name(name, number, len(shards)) for name in self.files)
-            for number in range(len(shards))
-        ]
-        return [
-            Piece(self, of_shard, (shard,), True)
-            for of_shard, shard in zip(names, shards, strict=True)
-        ]
-
-
-@dataclass(frozen=True)
-class Piece:
-    """Files that one call makes: those of a bundle, or a shard of each of them.
-
-    Attributes:
-        names: of the files, one for each file of the bundle.
-        blocks: the items that they hold; of a shard one block.
-    """
-
-    bundle: Bundle
-    names: tuple[str, ...]
-    blocks: tuple[Block, ...]
-    is_shard: bool
+    blocks: Sequence[Block]
+    is_shard: bool = False
 
     @property
     def rows(self) -> int:
         """Number of rows in each of its tables, in all."""
         return sum(block.rows for block in self.blocks)
 
+    def cut(self, size: int) -> "list[Piece]":
+        """Return the files themselves where there are at most `size` items, else their shards.
 
-@dataclass(frozen=True)
-class Plan:
-    """What a set holds, and what its bytes depend on.
+        Raises SpecError where there would be too many shards.
+        """
+        items = sum(len(block.items) for block in self.blocks)
+        if items <= size:
+            return [self]
+        least = -(-items // (MOST_SHARDS - len(self.blocks) + 1))
+        check(size >= least, "shard-size", size, f"at least {least} for {items:,} items")
+        shards = [shard for block in self.blocks for shard in block.cut(size)]
+        return [
+            Piece({_of_shard(name, i, len(shards)): self.files[name] for name in self.files},
+                  [shard], is_shard=True)
+            for i, shard in enumerate(shards)
+        ]  # fmt: skip
 
-    Attributes:
-        kind: the attribute `format` of its files.
-        spec: the request as JSON, without what must stay secret.
-        settings: what else the bytes depend on.
-        compression: as in `table.COMPRESSIONS`.
-        bundles: all files.
-    """
 
-    kind: str
-    spec: str
-    settings: Mapping[str, str]
-    compression: str
-    bundles: Sequence[Bundle]
+def whole(files: Mapping[str, Mapping[str, Any]], parts: Sequence[Part]) -> Piece:
+    """Return files with all items of some parts."""
+    return Piece(files, [Block(part, range(part.items)) for part in parts])
 
-    @property
-    def files(self) -> list[str]:
-        """Return the names of all files that readers open."""
-        return [name for bundle in self.bundles for name in bundle.files]
 
-    def request(self, shard_size: int) -> dict[str, Any]:
-        """Return what the bytes of the files depend on."""
-        count = sum(part.items for bundle in self.bundles for part in bundle.parts)
-        names = {"files": ", ".join(self.files), "kind": self.kind}
-        how = {"compression": self.compression, "n": count, "shard-size": shard_size}
-        return {**json.loads(self.spec), **self.settings, **names, **how}
+def _of_shard(name: str, number: int, count: int) -> str:
+    return PurePosixPath(name).with_name(shard_name(name, number, count)).as_posix()

@@ -4,7 +4,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 import h5py
@@ -12,16 +12,11 @@ import numpy as np
 
 from scenegen.common.errors import FileFormatError
 from scenegen.files.content import CONTENT_DIGEST, SHA256, dataset_digest, seal
-from scenegen.files.row_file import new_hdf5, new_hdf5_file
+from scenegen.files.new_file import written_beside
+from scenegen.files.row_file import new_hdf5
 from scenegen.files.schema import Column, name_axes
-from scenegen.files.sets.plan import Bundle, Part, Piece, Plan, Sheet
-from scenegen.files.sets.shards import (
-    ROW_DIGESTS,
-    SHARDS,
-    OpenFile,
-    Shard,
-    opened,
-)
+from scenegen.files.sets.plan import Part, Piece, Sheet, whole
+from scenegen.files.sets.shards import ROW_DIGESTS, SHARDS, OpenFile, Shard, opened
 from scenegen.files.sets.workers import in_threads
 from scenegen.files.table import (
     PackedRows,
@@ -41,7 +36,7 @@ def write_piece(
     piece: Piece,
     rows: Iterator[Packed],
     compression: str,
-    progress: Progress = lambda rows: None,
+    progress: Progress,
 ) -> None:
     """Write the files of a piece with the next rows of `rows`.
 
@@ -50,99 +45,95 @@ def write_piece(
     """
     with ExitStack() as writing:
         files = [writing.enter_context(new_hdf5(path)) for path in paths]
-        _fill(files, piece, rows, compression, progress)
+        attributes = [dict(of_file) for of_file in piece.files.values()]
+        row_digests: list[dict[str, bytes]] = [{} for _ in files]
+        for block in piece.blocks:
+            part = block.part
+            tables = _tables(files, part, block.rows, compression, piece.is_shard)
+            while tables[0].rows < block.rows:
+                packed = next(rows)
+                extend_together(tables, packed)
+                progress(packed[0].count)
+            _add_marks(attributes, part, _digests(tables))
+            for sheet, table in zip(part.sheets, tables, strict=True):
+                row_digests[sheet.file] |= table.row_digests()
+        for file, of_file, of_rows in zip(files, attributes, row_digests, strict=True):
+            if piece.is_shard:
+                _write_row_digests(file, of_rows)
+            _seal(file, of_file)
 
 
-def _fill(
-    files: Sequence[h5py.File],
+def write_view(
+    paths: Sequence[Path],
     piece: Piece,
-    rows: Iterator[Packed],
+    shards: Sequence[Piece],
+    made: Mapping[str, Path],
     compression: str,
-    progress: Progress,
 ) -> None:
-    """Write all tables of a piece, and seal its files."""
-    attributes = [dict(of_file) for of_file in piece.bundle.files.values()]
-    row_digests: list[dict[str, bytes]] = [{} for _ in files]
-    for block in piece.blocks:
-        tables = _tables(files, block.part, block.rows, compression, piece.is_shard)
-        while tables[0].rows < block.rows:
-            packed = next(rows)
-            extend_together(tables, packed)
-            progress(packed[0].count)
-        _add_marks(attributes, block.part, _digests(tables))
-        for sheet, table in zip(block.part.sheets, tables, strict=True):
-            row_digests[sheet.file] |= table.row_digests()
-    for file, of_file, of_rows in zip(files, attributes, row_digests, strict=True):
-        if piece.is_shard:
-            _write_row_digests(file, of_rows)
-        _seal(file, of_file)
-
-
-def write_views(
-    folder: Path, parts: Mapping[str, Path], pieces: Sequence[Piece], plan: Plan
-) -> None:
-    """Write the files that show the shards of a bundle as one; they tell what whole files tell.
+    """Write files that show their shards as one; they tell what whole files tell.
 
     Args:
-        parts: the complete files, by the names that they will have.
+        piece: the whole.
+        made: the complete shards, by the names that they will have.
     """
-    for bundle in plan.bundles:
-        shards = [piece for piece in pieces if piece.is_shard and piece.bundle is bundle]
-        if shards:
-            lists = [
-                [
-                    _shard(parts[name], name, piece)
-                    for name, piece in zip(names, shards, strict=True)
-                ]
-                for names in zip(*(piece.names for piece in shards), strict=True)
-            ]
-            _write_view(folder, parts, bundle, lists, plan.compression)
-
-
-def _shard(path: Path, name: str, piece: Piece) -> Shard:
-    with opened(path) as file:
-        digest = str(file.attrs[CONTENT_DIGEST])
-    return Shard(name, piece.rows, digest, piece.blocks[0].part.name)
-
-
-def _write_view(
-    folder: Path,
-    parts: Mapping[str, Path],
-    bundle: Bundle,
-    lists: Sequence[Sequence[Shard]],
-    compression: str,
-) -> None:
-    attributes = [dict(of_file) for of_file in bundle.files.values()]
+    attributes = [dict(of_file) for of_file in piece.files.values()]
+    lists: list[list[Shard]] = [[] for _ in paths]
     with ExitStack() as writing:
-        places = [folder / name for name in bundle.files]
-        files = [writing.enter_context(new_hdf5_file(place, overwrite=True)) for place in places]
-        for part in bundle.parts:
-            if part.items:
-                of_part = [[one for one in listed if one.part == part.name] for listed in lists]
-                digests = _write_virtual_columns(files, parts, part, of_part)
-            else:
+        files = [writing.enter_context(new_hdf5(path)) for path in paths]
+        for part in (block.part for block in piece.blocks):
+            of_part = [shard for shard in shards if shard.blocks[0].part.name == part.name]
+            if not of_part:
                 digests = _digests(_tables(files, part, 0, compression))
+            else:
+                digests = {}
+                for number, file in enumerate(files):
+                    named = {[*shard.files][number]: shard.rows for shard in of_part}
+                    listed, joined = _joined(named, made, part.name)
+                    lists[number] += listed
+                    for sheet in part.sheets:
+                        if sheet.file == number:
+                            digests |= _write_virtual_columns(file, sheet, listed, joined)
             _add_marks(attributes, part, digests)
         for file, listed, of_file in zip(files, lists, attributes, strict=True):
             _write_list(file, listed)
             _seal(file, of_file)
 
 
+def _joined(
+    rows: Mapping[str, int], made: Mapping[str, Path], part: str
+) -> tuple[list[Shard], dict[str, tuple[str, Any]]]:
+    """Return the shards of a part of a file, given the rows of each, and what is known of columns.
+
+    That is by name the `column_digest` over all shards, and the type. Texts are as long as in the
+    shard where they are longest.
+    """
+    listed, hashes, types = [], dict[str, "hashlib._Hash"](), dict[str, Any]()
+    for name, count in rows.items():
+        with opened(made[name]) as file:
+            digest = str(file.attrs[CONTENT_DIGEST])
+            listed.append(Shard(PurePosixPath(name).name, count, digest, part))
+            digests = file[ROW_DIGESTS]
+            values = digests[()]
+            for i, column in enumerate(digests.attrs["names"]):
+                hashes.setdefault(column, hashlib.sha256()).update(values[:, i].tobytes())
+                dtype = file[column].dtype
+                longest = max(types.get(column, dtype), dtype, key=lambda kind: kind.itemsize)
+                types[column] = longest
+    return listed, {name: (digest.hexdigest(), types[name]) for name, digest in hashes.items()}
+
+
 def _write_virtual_columns(
-    files: Sequence[h5py.File],
-    parts: Mapping[str, Path],
-    part: Part,
-    shards: Sequence[Sequence[Shard]],
+    file: h5py.File,
+    sheet: Sheet,
+    shards: Sequence[Shard],
+    joined: Mapping[str, tuple[str, Any]],
 ) -> dict[str, str]:
-    """Write columns that show a part of all shards of each file; return their digests by name."""
-    joined = [_joined_columns([parts[s.file] for s in of_file]) for of_file in shards]
-    digests = {}
-    for sheet in part.sheets:
-        group = _group(files[sheet.file], sheet)
-        for path, column in sheet.paths.items():
-            digest, dtype = joined[sheet.file][path]
-            dataset = _virtual_dataset(group, column, path, shards[sheet.file], dtype)
-            dataset.attrs[SHA256] = digests[column.name] = digest
+    """Write columns that show those of all shards; return their digests by name."""
+    group, digests = _group(file, sheet), {}
+    for path, column in sheet.paths.items():
+        digest, dtype = joined[path]
+        dataset = _virtual_dataset(group, column, path, shards, dtype)
+        dataset.attrs[SHA256] = digests[column.name] = digest
     return digests
 
 
@@ -181,37 +172,38 @@ def merge_file(
         source: that a reader has checked.
         parts: what it holds, without marks, which are copied.
 
-    Raises as `new_hdf5_file`, and FileFormatError where a value is not the one that was
-    written to its shard. Nothing is then left.
+    Raises as `written_beside`, and FileFormatError where a value is not the one that was written to
+    its shard. Nothing is then left.
     """
-    with new_hdf5_file(out, overwrite) as file:
-        attributes = {k: v for k, v in source.file.attrs.items() if k != CONTENT_DIGEST}
-        whole = Bundle({source.path.name: attributes}, parts).whole()
-        sheets = [sheet for part in parts for sheet in part.sheets]
-        stored = {name: source.array(name) for sheet in sheets for name in sheet.paths}
+    attributes = {k: v for k, v in source.file.attrs.items() if k != CONTENT_DIGEST}
+    piece = whole({source.path.name: attributes}, parts)
+    stored = {n: source.array(n) for part in parts for sheet in part.sheets for n in sheet.paths}
 
-        def packed(task: tuple[Part, range]) -> Packed:
-            part, rows = task
-            return [_copied(stored, sheet, rows, compression) for sheet in part.sheets]
+    def packed(task: tuple[Part, slice]) -> Packed:
+        part, rows = task
+        return [
+            pack_rows(
+                {column.name: stored[path][rows] for path, column in sheet.paths.items()},
+                sheet.columns,
+                compression,
+            )
+            for sheet in part.sheets
+        ]
 
-        tasks = (
-            (block.part, range(block.rows)[first : first + COPIED_ROWS])
-            for block in whole.blocks
-            for first in range(0, block.rows, COPIED_ROWS)
-        )
-        threads = packing_threads()
+    tasks = (
+        (block.part, slice(first, min(first + COPIED_ROWS, block.rows)))
+        for block in piece.blocks
+        for first in range(0, block.rows, COPIED_ROWS)
+    )
+    threads = packing_threads()
+    with written_beside(out, overwrite) as path:
         copied = in_threads(packed, tasks, threads, 4 * threads)
-        _fill([file], whole, copied, compression, progress)
-        for name, array in stored.items():
-            if file[name].attrs[SHA256] != array.attrs[SHA256]:
-                problem = "values are not those that were written"
-                raise FileFormatError(f"{source.path}: {name}: {problem}", hint="verify says which")
-
-
-def _copied(stored: Mapping[str, Any], sheet: Sheet, rows: range, compression: str) -> PackedRows:
-    some = slice(rows.start, rows.stop)
-    values = {column.name: stored[path][some] for path, column in sheet.paths.items()}
-    return pack_rows(values, sheet.columns, compression)
+        write_piece([path], piece, copied, compression, progress)
+        with h5py.File(path) as file:
+            for name, array in stored.items():
+                if file[name].attrs[SHA256] != array.attrs[SHA256]:
+                    where = f"{source.path}: {name}: values are not those that were written"
+                    raise FileFormatError(where, hint="verify says which")
 
 
 def _tables(
@@ -261,24 +253,6 @@ def _write_row_digests(file: h5py.File, digests: Mapping[str, bytes]) -> None:
     dataset.attrs["names"] = names
     dataset.attrs["meaning"] = "SHA-256 of each row of each data set, as `sha256` is made of them"
     dataset.attrs[SHA256] = dataset_digest(values)
-
-
-def _joined_columns(shards: Sequence[Path]) -> dict[str, tuple[str, Any]]:
-    """Return the `column_digest` of each data set over all shards, and its type.
-
-    Texts are as long as in the shard where they are longest.
-    """
-    hashes: dict[str, hashlib._Hash] = {}
-    types: dict[str, Any] = {}
-    for shard in shards:
-        with opened(shard) as file:
-            digests = file[ROW_DIGESTS]
-            values = digests[()]
-            for i, name in enumerate(digests.attrs["names"]):
-                hashes.setdefault(name, hashlib.sha256()).update(values[:, i].tobytes())
-                dtype = file[name].dtype
-                types[name] = max(types.get(name, dtype), dtype, key=lambda kind: kind.itemsize)
-    return {name: (digest.hexdigest(), types[name]) for name, digest in hashes.items()}
 
 
 def _write_list(file: h5py.File, shards: Sequence[Shard]) -> None:

@@ -12,7 +12,7 @@ from pix2shape_models import made, of_questions
 
 from baselines.pix2shape import predict as module
 from baselines.pix2shape.predict import answers_of
-from baselines.training.baseline import answer_questions
+from baselines.training.baseline import submit
 from baselines.training.images import channels_first
 from iqtt.files.reader import open_questions
 from metrics.scoring.evaluate import score
@@ -36,7 +36,7 @@ def answered(answerer: Any, path: Path, out: Path, **how: Any) -> tuple[list[int
     """Return answers and scores; where only one of them is written, from `metrics`."""
     answers = partial(answers_of, answerer, 0, "")
     size = answerer.config.networks.size
-    answer_questions(path, out, "pix2shape", size, answers, overwrite=True, **how)
+    submit(path, out, "pix2shape", size, answers, overwrite=True, **how)
     with open_predictions(out) as found, h5py.File(out) as file:
         assert found.rows.tolist() == list(range(len(found)))
         return found.answers.tolist(), file["scores"][()]

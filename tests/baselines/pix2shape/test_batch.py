@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from baselines.pix2shape.batch import Batch, turned
+from baselines.pix2shape.images import Batch, turned
 from baselines.pix2shape.network.model import Surfels, Views, shaded
 from baselines.pix2shape.network.surfels import Scene
 

@@ -9,7 +9,7 @@ import torch
 from pix2shape_models import made, room_source, tiny
 from torch.utils.data import default_collate
 
-from baselines.pix2shape.batch import Batch
+from baselines.pix2shape.images import Batch
 from baselines.pix2shape.pictures import drawn
 from scenegen.common.errors import SceneGenError
 

@@ -14,7 +14,7 @@ from torch.utils.data import default_collate
 from baselines.pix2shape import predict
 from baselines.pix2shape.network.empty_rooms import empty_rooms
 from baselines.pix2shape.predict import enlarged, predict_file, views_of
-from baselines.training.baseline import predict_rooms
+from baselines.training.baseline import submit
 from metrics.submissions.reader import open_predictions
 from scenegen.camera import pixel_directions
 from scenegen.common.errors import SpecError
@@ -42,7 +42,8 @@ def decoded(model: Any, path: Path, source: int, row: int) -> tuple[np.ndarray, 
 
 
 def written_by(model: Any, path: Path, out: Path) -> None:
-    predict_rooms(path, out, partial(views_of, model, False, ""), overwrite=True)
+    predict = partial(views_of, model, False, "")
+    submit(path, out, "", 0, predict, overwrite=True)
 
 
 def test_a_model_of_rays_is_another_method_and_says_what_it_is_told(several_path, tmp_path):

@@ -5,7 +5,7 @@ import pytest
 from ptn_models import tiny, volume_of, voxel_centres
 
 from baselines.ptn.rooms import RoomImages
-from baselines.ptn.submission import seen
+from baselines.ptn.training import seen
 from metrics.measures.relief import empty_room
 from scenegen.rooms.reader import RoomsFile
 

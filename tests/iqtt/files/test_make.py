@@ -13,7 +13,7 @@ from polycubes import are_congruent
 
 from iqtt.files import make as module
 from iqtt.files import work
-from iqtt.files.make import make_split, make_suite
+from iqtt.files.make import make_split
 from iqtt.files.reader import QuestionsFile
 from iqtt.files.split import ALL_FILES
 from iqtt.files.split import ALL_FILES as FILES
@@ -24,6 +24,7 @@ from iqtt.render import Rendered, render_question
 from iqtt.shapes.splits import TooFewShapesError
 from scenegen.common.errors import PlacementError, SpecError
 from scenegen.files.content import content_digest
+from scenegen.files.sets.making import complete_parts, parts_folder
 from scenegen.rendering.backend import versions
 
 ENDS = ("little", "big")
@@ -193,7 +194,7 @@ def test_other_files_of_a_folder_are_left_alone(tmp_path, monkeypatch):
     assert (tmp_path / "notes.txt").read_text() == "mine"
 
 
-@pytest.mark.parametrize("make", [make_split, make_suite])
+@pytest.mark.parametrize("suite", [False, True])
 @pytest.mark.parametrize(
     ("path", "kind"),
     [
@@ -204,7 +205,7 @@ def test_other_files_of_a_folder_are_left_alone(tmp_path, monkeypatch):
         ("locked/split", PermissionError),
     ],
 )
-def test_places_that_cannot_be_a_folder_are_refused_first(tmp_path, monkeypatch, make, path, kind):
+def test_places_that_cannot_be_a_folder_are_refused_first(tmp_path, monkeypatch, suite, path, kind):
     monkeypatch.setattr(module, "make_pools", None)
     (tmp_path / "file").write_text("mine")
     (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
@@ -213,7 +214,7 @@ def test_places_that_cannot_be_a_folder_are_refused_first(tmp_path, monkeypatch,
     monkeypatch.setattr(os, "access", lambda place, mode: "locked" not in str(place))
     for overwrite in (False, True):
         with pytest.raises(kind):
-            make(tmp_path / path, TINY, overwrite=overwrite)
+            make_split(tmp_path / path, TINY, suite=suite, overwrite=overwrite)
     assert listing(tmp_path) == before
 
 
@@ -221,7 +222,7 @@ def test_errors_on_the_way_leave_nothing(tmp_path, monkeypatch):
     with pytest.raises(TooFewShapesError):
         make_split(tmp_path / "new", replace(TINY, cubes=(3, 3)))
     with pytest.raises(TooFewShapesError):
-        make_suite(tmp_path / "new", replace(SUITE_SPEC, cubes=(6, 6)))
+        make_split(tmp_path / "new", replace(SUITE_SPEC, cubes=(6, 6)), suite=True)
     monkeypatch.setattr("iqtt.questions.views.QUESTION_ATTEMPTS", 1)
     monkeypatch.setattr("iqtt.questions.views.VIEWS", 1)
     with pytest.raises(PlacementError):
@@ -240,11 +241,13 @@ def test_the_suite_has_a_split_of_each_kind_in_a_folder_of_its_own(tmp_path):
 
     home = tmp_path / "suite"
     with pytest.raises(StopError):
-        make_suite(home, SUITE_SPEC, progress=stop, compression="none")
-    first = {path: path.stat().st_mtime_ns for path in (home / next(iter(SUITE))).iterdir()}
+        make_split(home, SUITE_SPEC, progress=stop, compression="none", suite=True)
+    parts = complete_parts(parts_folder(home / ALL_FILES[0]))
+    first = {home / name: path.stat().st_mtime_ns for name, path in parts.items()}
+    assert next(iter(SUITE)) in {path.parent.name for path in first}
     with pytest.raises(SpecError):
-        make_suite(home, replace(SUITE_SPEC, seed=9), compression="none")
-    tally = make_suite(home, SUITE_SPEC, compression="none")
+        make_split(home, replace(SUITE_SPEC, seed=9), compression="none", suite=True)
+    tally = make_split(home, SUITE_SPEC, compression="none", suite=True)
     assert tally.proposed > 4 * 6 * 3
     assert {path: path.stat().st_mtime_ns for path in first} == first
     assert sorted(os.listdir(home)) == sorted(SUITE)
@@ -257,7 +260,7 @@ def test_the_suite_has_a_split_of_each_kind_in_a_folder_of_its_own(tmp_path):
             assert questions.read("questions", 0).shape == (1 + answers, 16, 16, 3)
             assert questions.compression() == "none"
     with pytest.raises(FileExistsError):
-        make_suite(home, SUITE_SPEC, compression="none")
+        make_split(home, SUITE_SPEC, compression="none", suite=True)
 
 
 TABLES = [  # split, part, first question; the test split's truth lies in a file of its own

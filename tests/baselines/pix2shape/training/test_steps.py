@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import torch
 
-from baselines.pix2shape.batch import Batch
+from baselines.pix2shape.images import Batch
 from baselines.pix2shape.network.architecture import NetworkSpec
 from baselines.pix2shape.network.config import LOSSES, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape, Views
