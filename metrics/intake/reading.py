@@ -106,8 +106,8 @@ def geometry_reader(
     keys: Keys,
     normals: str | None = None,
     masks: str | None = None,
-    confidence: str | None = None,
     look: Callable[[str, Array, Array], None] = lambda where, stored, known: None,
+    confidence: str | None = None,
 ) -> tuple[GeometryReader, str]:
     """Return what reads the geometry of each row from files, and in words how rows have them.
 
