@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.common.heap import return_free_memory
 from scenegen.description.scene_arrays import SceneArrays
 from scenegen.description.specs import Request
 from scenegen.files.sets.plan import Block
@@ -175,6 +176,7 @@ def render_items(
                 yield ready
         if ready := complete():
             yield ready
+        return_free_memory()
 
 
 def _shown(

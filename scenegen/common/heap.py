@@ -1,0 +1,25 @@
+"""Memory that the C library keeps after it was freed."""
+
+import ctypes
+import functools
+import sys
+from collections.abc import Callable
+
+
+def return_free_memory() -> None:
+    """Give memory that is free back to the system; with glibc alone, as others do so themselves.
+
+    Buffers of many sizes leave gaps in glibc's heap, which it keeps. A worker of closed rooms with
+    pictures so grew from 1.0 to 1.6 GB in 4,700 rooms. After 100 and 200 rooms it used 0.57 GB.
+    """
+    trim = _trim()
+    if trim is not None:
+        trim(0)
+
+
+@functools.cache
+def _trim() -> Callable[[int], int] | None:
+    if sys.platform != "linux":
+        return None
+    found: Callable[[int], int] | None = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    return found
