@@ -8,7 +8,6 @@ and in proportion in others. Fog is the same over the image, as fog by distance 
 Images are sRGB, (H, W, 3), from 0 to 1; what exceeds that is cut off.
 """
 
-import io
 import os
 import shutil
 from collections.abc import Callable, Sequence
@@ -26,6 +25,7 @@ from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.files.content import SHA256, dataset_digest, seal
 from scenegen.files.input_file import is_virtual
 from scenegen.files.new_file import written_beside
+from scenegen.files.pictures import after_jpeg
 from scenegen.layout import CORRUPTION
 
 Array = NDArray[Any]
@@ -132,11 +132,7 @@ def _pixelate(image: Array, kept: float, _: Rng) -> Array:
 
 
 def _jpeg(image: Array, quality: int, _: Rng) -> Array:
-    from PIL import Image
-
-    stored = io.BytesIO()
-    Image.fromarray(_bytes(image)).save(stored, "jpeg", quality=quality)
-    return np.asarray(Image.open(stored)) / 255.0
+    return after_jpeg(_bytes(image), quality) / 255.0
 
 
 def _quantize(image: Array, bits: int, _: Rng) -> Array:

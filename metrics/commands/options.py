@@ -12,3 +12,8 @@ SEED = click.option(
     show_default=True,
     help="Seed of the bootstrap.",
 )
+# Of `measures.alignment`, which loads numpy: what may be fitted to the truth of each image.
+FITS = (
+    *("median_scale", "scale", "scale_l1", "scale_shift", "scale_shift_l1"),
+    "disparity_scale_shift",
+)

@@ -2,12 +2,11 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 import click
 
-from metrics.commands.options import MARKDOWN, SEED
-from metrics.measures.alignment import Alignment
+from metrics.commands.options import FITS, MARKDOWN, SEED
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import OVERWRITE
 from scenegen.command_line.output import line_width, print_line
@@ -15,7 +14,7 @@ from scenegen.command_line.paths import InputPath, OutputPath
 
 ALIGN = click.option(
     "--align",
-    type=click.Choice([name for name in get_args(Alignment) if name != "none"]),
+    type=click.Choice(FITS),
     help="Score depth and points of all methods after this alignment to the truth of each image"
     " [default: the loosest one that a method declares].",
 )

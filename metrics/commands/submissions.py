@@ -1,12 +1,11 @@
 """The `bench` commands on submissions: check, score and show them, and tell their format."""
 
 from pathlib import Path
-from typing import Any, cast, get_args
+from typing import Any, cast
 
 import click
 
-from metrics.commands.options import MARKDOWN, SEED
-from metrics.measures.alignment import Alignment
+from metrics.commands.options import FITS, MARKDOWN, SEED
 from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
 from scenegen.command_line.output import line_width, on_scheduler, print_line, progress_bar
@@ -87,7 +86,7 @@ TRUTH = click.option(
 )
 @click.option(
     "--align",
-    type=click.Choice([name for name in get_args(Alignment) if name != "none"]),
+    type=click.Choice(FITS),
     help="Score images after this alignment to the truth of each, as loose as the declared one or"
     " looser [default: the declared one].",
 )

@@ -1,5 +1,6 @@
 """Pictures: those of others are read, and those of the rows of a file are chosen and written."""
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -24,6 +25,16 @@ READ = (".png", ".jpg", ".jpeg", ".tif", ".tiff", ".webp", ".bmp", ".ppm", ".pgm
 ORIENTATION = 0x0112  # of EXIF
 SWAPPED = (5, 6, 7, 8)  # its values that swap the sides
 PHOTOMETRIC = 262  # tag of TIFF files, 0 where 0 is white
+
+
+def after_jpeg(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
+    """Return an image (H, W, 3) as JPEG of a quality, 1 to 95, leaves it."""
+    from PIL import Image
+
+    stored = io.BytesIO()
+    Image.fromarray(image).save(stored, "jpeg", quality=quality)
+    with Image.open(stored) as picture:
+        return np.asarray(picture)
 
 
 @contextmanager

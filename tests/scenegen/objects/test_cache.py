@@ -14,7 +14,6 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from scenegen.objects import cache
 from scenegen.objects.cache import DiskCache
 
 NAMES = ("points", "text")
@@ -90,12 +89,11 @@ def test_a_folder_that_takes_nothing_costs_one_warning(place, tmp_path, monkeypa
     assert [path.name for path in (tmp_path / "cache").iterdir()] == ["old.arrays"]
 
 
-def test_a_folder_that_is_too_large_loses_its_oldest_entries(tmp_path, monkeypatch):
+def test_a_folder_that_is_too_large_loses_its_oldest_entries(tmp_path):
     DiskCache(tmp_path).write("0", ARRAYS)
     size = (tmp_path / "0.arrays").stat().st_size
     (tmp_path / "mine.txt").write_text("mine")
-    monkeypatch.setattr(cache, "MOST_BYTES", 4 * size)
-    disk = DiskCache(tmp_path)
+    disk = DiskCache(tmp_path, 4 * size)
     for number in range(8):
         disk.write(f"{number}", ARRAYS)
         os.utime(tmp_path / f"{number}.arrays", (number, number))

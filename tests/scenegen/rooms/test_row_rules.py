@@ -35,4 +35,4 @@ def test_with_shadows_no_pixel_is_darker_than_ambient_light(radiance, count):
         ambient=np.full((1, 3), 0.1),
         object_count=np.array([1]),
     )
-    assert len(list(_image_problems(spec, room, None, batch))) == count
+    assert len(list(_image_problems(spec, room, None, batch, False))) == count
