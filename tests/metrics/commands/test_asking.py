@@ -1,8 +1,10 @@
 """`bench ask`: Inspect asks a server, keeps what came, and asks again what failed."""
 
 import base64
+import gc
 import json
 import threading
+import warnings
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
@@ -22,6 +24,15 @@ from inspect_ai.log import EvalSampleLimit, ProvenanceData, read_eval_log, write
 
 pytestmark = pytest.mark.filterwarnings("default")  # of what Inspect imports
 KEY = "sk-secret-of-this-test"
+
+
+@pytest.fixture(autouse=True)
+def _streams_of_inspect():
+    """Collect here the streams that Inspect leaves open, or another test is told of them."""
+    yield
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ResourceWarning)
+        gc.collect()
 
 
 def completion(text):
