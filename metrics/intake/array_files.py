@@ -77,7 +77,7 @@ def _npy(path: Path, _name: str | None, _vectors: bool) -> Array:
 
 
 def _npz(path: Path, name: str | None, vectors: bool) -> Array:
-    with np.load(path, allow_pickle=False) as arrays:
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as arrays:
         names = arrays.files
         usual = ("points", "normal") if vectors else ("depth", "disparity", "pred", "arr_0")
         only = names[0] if len(names) == 1 else next(filter(names.__contains__, usual), "")
