@@ -39,7 +39,6 @@ class Corruption(NamedTuple):
 
     change: Callable[[Array, Any, Rng], Array]
     levels: Sequence[Any]
-    gloss: str
 
 
 def _noise(image: Array, deviation: float, rng: Rng) -> Array:
@@ -144,13 +143,13 @@ def _bytes(image: Array) -> NDArray[np.uint8]:
 
 
 CORRUPTIONS = {
-    "noise": Corruption(_noise, (0.08, 0.12, 0.18, 0.26, 0.38), "Gaussian noise"),
-    "shot": Corruption(_shot, (60, 25, 12, 5, 3), "shot noise of few photons"),
-    "impulse": Corruption(_impulse, (0.03, 0.06, 0.09, 0.17, 0.27), "salt and pepper"),
-    "blur": Corruption(_blur, (3, 4, 6, 8, 10), "out of focus"),
-    "motion": Corruption(_motion, (10, 15, 18, 22, 26), "motion blur in one direction"),
-    "fog": Corruption(_fog, (1.5, 2.0, 2.5, 2.75, 3.0), "fog of uneven thickness"),
-    "brightness": Corruption(_brightness, (0.1, 0.2, 0.3, 0.4, 0.5), "brighter"),
+    "noise": Corruption(_noise, (0.08, 0.12, 0.18, 0.26, 0.38)),
+    "shot": Corruption(_shot, (60, 25, 12, 5, 3)),
+    "impulse": Corruption(_impulse, (0.03, 0.06, 0.09, 0.17, 0.27)),
+    "blur": Corruption(_blur, (3, 4, 6, 8, 10)),
+    "motion": Corruption(_motion, (10, 15, 18, 22, 26)),
+    "fog": Corruption(_fog, (1.5, 2.0, 2.5, 2.75, 3.0)),
+    "brightness": Corruption(_brightness, (0.1, 0.2, 0.3, 0.4, 0.5)),
     "dark": Corruption(
         _dark,
         (
@@ -160,12 +159,11 @@ CORRUPTIONS = {
             (0.3, 50, 0.026),
             (0.2, 30, 0.038),
         ),
-        "little light, and the noise of the sensor",
     ),
-    "contrast": Corruption(_contrast, (0.4, 0.3, 0.2, 0.1, 0.05), "less contrast"),
-    "pixelate": Corruption(_pixelate, (0.6, 0.5, 0.4, 0.3, 0.25), "fewer pixels"),
-    "jpeg": Corruption(_jpeg, (25, 18, 15, 10, 7), "JPEG of low quality"),
-    "quantize": Corruption(_quantize, (5, 4, 3, 2, 1), "fewer bits of each colour"),
+    "contrast": Corruption(_contrast, (0.4, 0.3, 0.2, 0.1, 0.05)),
+    "pixelate": Corruption(_pixelate, (0.6, 0.5, 0.4, 0.3, 0.25)),
+    "jpeg": Corruption(_jpeg, (25, 18, 15, 10, 7)),
+    "quantize": Corruption(_quantize, (5, 4, 3, 2, 1)),
 }
 
 

@@ -1,4 +1,4 @@
-"""What each metric sees: the truth of interiors, spoilt in twelve ways of growing size.
+"""What each metric sees: ground truth of interiors, degraded in twelve ways of growing size.
 
 Writes `docs/data/what-each-metric-sees.csv` and `docs/images/what-each-metric-sees.png`, and prints
 where a metric is not monotone in what it is for.

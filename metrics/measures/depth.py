@@ -125,20 +125,14 @@ def silog(pair: DepthPair) -> float:
     return float(100.0 * np.sqrt(np.square(difference).mean()))
 
 
-def delta(pair: DepthPair, power: int) -> float:
-    """Return the fraction of pixels with max(p / t, t / p) < 1.25^power, in [0, 1].
+def delta(pair: DepthPair, limit: float) -> float:
+    """Return the fraction of pixels with max(p / t, t / p) < limit, in [0, 1].
 
     Pixels with p <= 0 never count. Sources: Ladicky et al. 2014; Eigen et al. 2014,
-    "Threshold", with powers 1, 2 and 3.
+    "Threshold", with the limits 1.25, 1.25^2 and 1.25^3.
     """
-    p, t, limit = pair.predicted, pair.true, DELTA_BASE**power
-    return float(np.count_nonzero((p < limit * t) & (t < limit * p)) / len(p))
-
-
-def delta_near(pair: DepthPair) -> float:
-    """Return the fraction of pixels with max(p / t, t / p) < NEAR, in [0, 1], as `delta`."""
     p, t = pair.predicted, pair.true
-    return float(np.count_nonzero((p < NEAR * t) & (t < NEAR * p)) / len(p))
+    return float(np.count_nonzero((p < limit * t) & (t < limit * p)) / len(p))
 
 
 def within_eighth(pair: DepthPair, alignment: Alignment) -> float:
@@ -148,8 +142,7 @@ def within_eighth(pair: DepthPair, alignment: Alignment) -> float:
     """
     cap = 1e4 if alignment == "disparity_scale_shift" else None
     p = np.maximum(alignments.align(pair.predicted, pair.true, alignment, cap), 1e-4)
-    limit = DELTA_BASE**0.125
-    return float(np.count_nonzero((p < limit * pair.true) & (pair.true < limit * p)) / len(p))
+    return delta(replace(pair, predicted=p), DELTA_BASE**0.125)
 
 
 def scale_log2(pair: DepthPair) -> float:
@@ -173,8 +166,8 @@ def depth_scores(
     squared = mse_depth(fitted)
     named = {"mse_depth": squared, "rmse": float(np.sqrt(squared))}
     named |= {score.__name__: score(fitted) for score in (abs_rel, silog)}
-    named |= {f"delta_{power}": delta(fitted, power) for power in (1, 2, 3)}
-    named["delta_1.03"] = delta_near(fitted)
+    named |= {f"delta_{power}": delta(fitted, DELTA_BASE**power) for power in (1, 2, 3)}
+    named["delta_1.03"] = delta(fitted, NEAR)
     if alignment == "none":
         return named | {score.__name__: score(pair) for score in (sq_rel, rmse_log, log10, irmse)}
     return {f"{name}_after_{alignment}": value for name, value in named.items()}

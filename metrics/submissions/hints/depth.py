@@ -24,7 +24,7 @@ MOST_CONDITION = 1e6  # of the equations for the slopes
 ALONG_RAY = "looks like distance along the ray, not planar depth"
 PICTURES = (255.0, 65535.0)  # largest values of pictures of 8 and 16 bits
 UNITS = {1000.0: "millimetres for metres", 100.0: "centimetres for metres"}
-# Factors that are told only where they fit within EXACT.
+# Factors that a hint names only where they fit within EXACT.
 FACTORS = {3.2808: "feet for metres", 39.37: "inches for metres", 0.5: "half", 2.0: "twice"}
 EXACT = 0.03
 USUAL_FOCAL = 300.0  # pixels: a network trained at this focal length is often scaled by it

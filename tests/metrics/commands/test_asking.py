@@ -28,7 +28,7 @@ KEY = "sk-secret-of-this-test"
 
 @pytest.fixture(autouse=True)
 def _streams_of_inspect():
-    """Collect here the streams that Inspect leaves open, or another test is told of them."""
+    """Collect the streams that Inspect leaves open here, or another test fails on them."""
     yield
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ResourceWarning)

@@ -218,7 +218,7 @@ def random_pair(seed):
 
 def test_delta_limits_are_strict_and_symmetric():
     pair = compare_depth([1.25, 1.0, 1.24, 1.0, 1.5625, 1.9], [1.0, 1.25, 1.0, 1.24, 1.0, 1.0])
-    assert [delta(pair, power) for power in (1, 2, 3)] == [2 / 6, 4 / 6, 6 / 6]
+    assert [delta(pair, 1.25**power) for power in (1, 2, 3)] == [2 / 6, 4 / 6, 6 / 6]
 
 
 @pytest.mark.parametrize("alignment", ALIGNMENTS)
