@@ -1,4 +1,4 @@
-"""The commands behind the tables of docs/results.md and docs/results-rooms.md.
+"""The commands behind the tables of docs/results.md and docs/data/rooms.csv.
 
     python -m benchmarks.results [--help]
 
@@ -181,7 +181,7 @@ def studies(seeds: int) -> Commands:
 # What is made, and where docs/ shows it.
 TABLES = {
     "questions": questions,  # results.md, "Questions"
-    "rooms": rooms,  # results-rooms.md
+    "rooms": rooms,  # results.md, "Rooms", and data/rooms.csv
     "studies": studies,  # results.md, "Ablations"
 }
 
