@@ -173,4 +173,4 @@ def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path, check_refus
 def test_show_needs_answers_to_show_them(run, split, tmp_path, check_refusal):
     shutil.copy(split / "iqtt-test.h5", tmp_path)
     result = run("show", "iqtt-test.h5", "--mark-correct")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("no answers",))
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("iqtt-test.h5",))

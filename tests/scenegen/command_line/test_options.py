@@ -60,7 +60,7 @@ def test_other_texts_are_refused(kind, text):
     assert kind.expected in caught.value.message
 
 
-@pytest.mark.parametrize("more, given", [({"is_flag": True}, True), ({"type": int}, 3)])
+@pytest.mark.parametrize(("more", "given"), [({"is_flag": True}, True), ({"type": int}, 3)])
 def test_a_former_name_is_read_and_not_shown(more, given):
     option = Renamed(["--new", "chosen"], former="--old", **more)
     command = click.Command("make", params=[option])
