@@ -10,7 +10,7 @@ from page_blocks import ROOT, blocks, missing_lines, run_block
 
 from metrics.submissions.reader import open_predictions
 
-RUN_ELSEWHERE = {"tutorial.md", "vlm.md", "your-model.md"}
+RUN_ELSEWHERE = {"tutorial.md", "vlm.md", "evaluate.md"}
 CLUSTER = {"cluster.md"}  # needs a scheduler and its workers
 README = "../README.md"
 # What the README's first command makes, with smaller images.
@@ -77,34 +77,21 @@ def test_a_wrong_number_is_noticed():
         assert missing_lines(line, wrong) == [line.rstrip("\n")]
 
 
-BLOCKS = blocks("your-model.md")
+BLOCKS = blocks("evaluate.md")
 DOORS = ("bench import --depth", "bench run my_model.py", "metrics.evaluate(")
 SCORE_ANSWERS = "bench score answers.h5 --truth iqtt-split/iqtt-test-answers.h5"
-BATCHES = {
-    "class Rooms(Dataset)": "torch.Size([16, 3, 32, 32]) torch.Size([16, 32, 32])\n" * 4,
-    "def batches": "(16, 32, 32, 3) float32 (16, 32, 32)\n" * 4,
-    "load_dataset": "(16, 32, 32, 3) (16, 32, 32)\n" * 4,
-}
-
-
 def shorter(code):
-    return code.replace("--n 32 --size 64", "--n 8 --size 32").replace("TOLD = 180", "TOLD = 1")
+    return code.replace("--n 32 --size 64", "--n 8 --size 32")
 
 
 def test_the_programs_read_every_row_and_what_they_write_can_be_scored(tmp_path):
     """One test, so that one worker runs the page, once; with fewer and smaller rooms to score."""
-    pytest.importorskip("datasets")
     printed = {
         code: run_block(language, title, shorter(code), tmp_path)
         for language, title, code in BLOCKS
     }
-    for words, lines in BATCHES.items():
-        assert [text for code, text in printed.items() if words in code] == [lines]
     (scored,) = [text for code, text in printed.items() if "bench validate" in code]
     assert scored.startswith("mine.h5: valid\nmine on rooms.h5: 8 images, 8 scenes ")
-    ((code, reached),) = [pair for pair in printed.items() if "RoomStream" in pair[0]]
-    assert len(code.splitlines()) <= 35
-    assert 0 <= float(reached) < 1
     (training,) = [text for code, text in printed.items() if "metrics.evaluate(" in code]
     first, second, last = (line.split() for line in training.splitlines())
     assert float(second[2]) < float(first[2])  # half the shift has half the error

@@ -278,7 +278,7 @@ def run(
     MoGe; or a Python file. That holds infer(image, intrinsics=None), which returns a dict with one
     of the keys below; for questions infer(reference, answers), which returns an index or scores. It
     may be a class, what load() returns, or a Baseline of MoGe's evaluation, whose load gets what
-    stands after --. docs/your-model.md has examples.
+    stands after --. docs/evaluate.md has examples.
 
     \b
     depth_metric, points_metric: in metres, in scene units of open rooms
