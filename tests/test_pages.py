@@ -11,7 +11,7 @@ from page_blocks import ROOT, blocks, missing_lines, run_block
 from metrics.submissions.reader import open_predictions
 
 RUN_ELSEWHERE = {"tutorial.md", "vlm.md", "evaluate.md"}
-CLUSTER = {"cluster.md"}  # needs a scheduler and its workers
+CLUSTER = {"scale.md"}  # needs a scheduler and its workers
 README = "../README.md"
 # What the README's first command makes, with smaller images.
 BEFORE = {README: "scenegen render --n 4 --size 32 --out rooms.h5"}
