@@ -12,9 +12,6 @@ from metrics.submissions.reader import open_predictions
 
 RUN_ELSEWHERE = {"tutorial.md", "vlm.md", "evaluate.md"}
 CLUSTER = {"scale.md"}  # needs a scheduler and its workers
-README = "../README.md"
-# What the README's first command makes, with smaller images.
-BEFORE = {README: "scenegen render --n 4 --size 32 --out rooms.h5"}
 
 
 def runnable(page):
@@ -22,7 +19,7 @@ def runnable(page):
 
 
 PAGES = [path.name for path in sorted((ROOT / "docs").glob("*.md"))]
-RUN_HERE = [p for p in (*PAGES, README) if runnable(p) and p not in RUN_ELSEWHERE | CLUSTER]
+RUN_HERE = [page for page in PAGES if runnable(page) and page not in RUN_ELSEWHERE | CLUSTER]
 
 
 @pytest.mark.parametrize("page", RUN_HERE)
@@ -30,8 +27,6 @@ def test_the_blocks_run(page, tmp_path):
     if page == "sharing.md":
         pytest.importorskip("datasets")
     home = f"export HOME={tmp_path}\n"  # blocks that write to it write here
-    if page in BEFORE:
-        run_block("bash", "", BEFORE[page], tmp_path)
     for language, title, code in runnable(page):
         run_block(language, title, home + code if language == "bash" else code, tmp_path)
 
@@ -80,6 +75,8 @@ def test_a_wrong_number_is_noticed():
 BLOCKS = blocks("evaluate.md")
 DOORS = ("bench import --depth", "bench run my_model.py", "metrics.evaluate(")
 SCORE_ANSWERS = "bench score answers.h5 --truth iqtt-split/iqtt-test-answers.h5"
+
+
 def shorter(code):
     return code.replace("--n 32 --size 64", "--n 8 --size 32")
 
