@@ -18,7 +18,7 @@ demo: $(VENV)/.runtime
 	$(BIN)/scenegen preview demo/objects.h5 --out demo/objects.png --overwrite
 	$(BIN)/iqtt make-split --out demo/iqtt --overwrite
 	$(BIN)/iqtt audit demo/iqtt --json demo/audit.json --overwrite
-	$(BIN)/iqtt show demo/iqtt/iqtt-test.h5 --answers --out demo/questions.png --overwrite
+	$(BIN)/iqtt show demo/iqtt/iqtt-test.h5 --mark-correct --out demo/questions.png --overwrite
 	$(BIN)/scenegen render --n 64 --seed 1 --out demo/train.h5 --overwrite
 	$(BIN)/bench baseline constant --train demo/train.h5 --data demo/rooms.h5 --out demo/constant.h5 --overwrite
 	$(BIN)/bench baseline mean-depth --train demo/train.h5 --data demo/rooms.h5 --out demo/mean-depth.h5 --overwrite

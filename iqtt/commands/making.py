@@ -13,7 +13,7 @@ import click
 from iqtt.questions.kinds import DISTRACTORS, QUESTION_KINDS
 from scenegen.command_line import groups, options, output
 from scenegen.command_line.groups import EXAMPLE
-from scenegen.command_line.options import Color, Range
+from scenegen.command_line.options import Color, Range, Renamed
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import (
     InputPath,
@@ -23,13 +23,13 @@ from scenegen.command_line.paths import (
 )
 
 KNOWN_SEED = (
-    "note: anyone who knows the seed can recreate the test answers. For a private test set, run"
+    "note: anyone who knows the seed can recreate the answer key. For a private test set, run"
     " `openssl rand -hex 32 > secret.txt` and pass --secret-seed secret.txt."
 )
 
 
 def _with_answers(path: Path) -> list[Path]:
-    """Return where the questions and the answers lie that belong to one file of either."""
+    """Return the paths of the questions and of the answer key, given one of the two."""
     questions = path.stem.removesuffix("-answers")
     return [path.with_name(f"{stem}{path.suffix}") for stem in (questions, f"{questions}-answers")]
 
@@ -45,91 +45,101 @@ option = partial(click.option, show_default=True)
     "--out",
     type=OutputFolder(),
     default="iqtt-split",
-    help="Folder for the four files, or a URL such as s3://bucket/iqtt.",
+    help="Output folder for the four files, or a URL such as s3://bucket/iqtt.",
 )
 @option(
     "--preset",
     type=click.Choice(["small", "v2", "paper", "suite"]),
     default="small",
-    help="Numbers of questions. small: 1,000 for training (100 with answers), 200 for validation,"
-    " 200 for testing; v2: as in the released data, in float32; paper: as in the paper; suite: a"
-    " folder for each kind of questions, 5,000 (1,000), 500 and 2,000 in each.",
+    help="Numbers of questions. small: 1,000 for training (100 of them labelled), 200 for"
+    " validation, 200 for testing; v2: as in the released data, in float32; paper: as in the paper;"
+    " suite: one folder per distractor type, each with 5,000 for training (1,000 labelled), 500 and"
+    " 2,000.",
 )
-@option("--train", type=int, help="Number of training questions, with and without answers.")
+@option("--train", type=int, help="Number of training questions, labelled and unlabelled.")
 @option(
     "--labeled",
     type=int,
-    help="How many training questions have answers [default: the preset's share].",
+    help="Number of labelled training questions [default: the fraction of the preset].",
 )
 @option("--val", type=int, help="Number of validation questions.")
-@option("--test", type=int, help="Number of test questions; their answers are in a separate file.")
+@option("--test", type=int, help="Number of test questions. Their answer key is a separate file.")
 @options.SEED
 @option(
     "--secret-seed",
     type=InputPath(),
     metavar="FILE",
-    help="File whose content is the seed, for a private test set. No file that is written holds the"
-    " seed.",
+    help="File with the seed of a private test set. The seed is stored in no output file.",
 )
 @option("--cubes", type=Range(int), default="8-11", help="Number of cubes of a shape.")
 @option(
     "--shapes",
     type=click.Choice(["chain", "tree"]),
     default="chain",
-    help="chain: self-avoiding chains of cubes; tree: shapes that may branch.",
+    help="chain: self-avoiding chains of cubes; tree: branching shapes as well.",
 )
 @option(
     "--distractors",
     type=click.Choice(DISTRACTORS),
     default="mixed",
-    help="Wrong options. "
+    help="Distractor type: what the wrong options show. "
     + "".join(f"{name}: {kind.meaning}; " for name, kind in QUESTION_KINDS.items())
-    + "mixed: each question one of these.",
+    + "mixed: one of these types per question.",
 )
-@option("--answers", type=int, default=3, help="Number of answers, 3 or 2; one of them is right.")
+@option(
+    "--options",
+    "answers",
+    cls=Renamed,
+    former="--answers",
+    type=int,
+    default=3,
+    help="Number of options per question, 3 or 2. One option is correct.",
+)
 @option(
     "--min-angle",
     "min_angle_degrees",
     type=float,
     default=30,
-    help="Smallest rotation between the reference's view and an answer's, and between two views of"
-    " one shape, in degrees.",
+    help="Minimum rotation, in degrees, between the views of the reference and of each option, and"
+    " between two views of the same shape.",
 )
 @option(
     "--min-sight-angle",
     "min_sight_angle_degrees",
     type=float,
-    help="Smallest angle between the lines of sight of these views, in degrees: nearer views, and"
-    " views from behind, have outlines that are alike [default: 40; 0 with v2 and paper].",
+    help="Minimum angle, in degrees, between the viewing directions of these views. Close or"
+    " opposite"
+    " viewing directions give similar silhouettes [default: 40; 0 with v2 and paper].",
 )
 @option(
     "--min-cube-pixels",
     type=int,
-    help="Smallest number of pixels that show a cube [default: 30 at 128x128 and radius 3.5].",
+    help="Minimum number of visible pixels of each cube [default: 30 at 128x128 and radius 3.5].",
 )
-@option("--max-radius", type=float, help="Largest radius of a shape, in cube edges [default: 3.5].")
+@option("--max-radius", type=float, help="Maximum radius of a shape, in cube edges [default: 3.5].")
 @options.SIZE
 @option("--background", type=Color(), default="white", help="Background colour.")
 @option("--lights", type=Range(int), default="2", help="Number of lights.")
 @option(
     "--image-dtype",
     type=click.Choice(["uint8", "float16", "float32"]),
-    help="Type of stored radiance [default: uint8; float32 with --preset v2].",
+    help="Data type of the stored radiance [default: uint8; float32 with --preset v2].",
 )
-@option("--with-depth", is_flag=True, help="Store planar depth as well.")
+@option("--with-depth", is_flag=True, help="Also store planar depth.")
 @options.COMPRESSION
 @option(
     "--batch",
     type=click.IntRange(1, 4096),
     default=64,
-    help="Questions that a process renders at once.",
+    help="Number of questions that a process renders at once.",
 )
 @options.WORKERS
 @option(
     "--shard-size",
     type=int,
     default=10_000,
-    help="Most questions of one file; more go to files beside it, which it shows as one.",
+    help="Maximum number of questions per file. Larger parts are split into shards that read as one"
+    " file.",
 )
 @options.SCHEDULER
 @options.DEVICE
@@ -148,11 +158,12 @@ def make_split(
     secret_seed: str | None,
     **settings: Any,
 ) -> None:
-    """Make a split of mental-rotation questions for training, validation and testing.
+    """Make mental-rotation questions for training, validation and testing.
 
-    A question has a reference and answers, one of which shows the same shape. Every cube of a shape
-    shows in every picture. No shape, nor its mirror image, is in two of training, validation and
-    test, whatever the settings. Where a run with shards was ended, the same command goes on.
+    Each question has a reference and options. One option shows the shape of the reference. All
+    cubes of a shape are visible in every image. No shape and no mirror image of a shape is shared
+    between training, validation and test. Re-run the same command to resume an interrupted run with
+    shards.
     """
     from iqtt.files import make
     from iqtt.files.split import ALL_FILES
@@ -171,7 +182,8 @@ def make_split(
         settings["seed"] = specs.secret_seed(secret_seed)
     for name in ("distractors", "answers") if suite else ():
         if context.get_parameter_source(name) is not given:
-            raise SpecError(f"--{name}", "--preset suite as well", "only one of the two")
+            flag = {"answers": "options"}.get(name, name)
+            raise SpecError(f"--{flag}", "--preset suite as well", "only one of the two")
     chosen = {name: value for name, value in settings.items() if value is not None}
     spec = specs.preset_spec(preset, height=size[0], width=size[1], **chosen)
     splits = len(specs.SUITE) if suite else 1
@@ -213,10 +225,10 @@ def make_split(
 
 @click.command(epilog=f"{EXAMPLE}iqtt merge iqtt-split/iqtt-train.h5 --out iqtt-train.h5")
 @click.argument("file", type=QUESTIONS)
-@click.option("--out", type=NewHdf5(), required=True, help="File to write.")
+@click.option("--out", type=NewHdf5(), required=True, help="Output file.")
 @options.OVERWRITE
 def merge(file: str, out: str, overwrite: bool) -> None:
-    """Make one file of questions that were written to several."""
+    """Merge the shards of a file of questions into one file."""
     from iqtt.files.make import merge_questions
     from iqtt.files.reader import open_tables
 

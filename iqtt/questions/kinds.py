@@ -26,11 +26,11 @@ class QuestionKind:
 
 QUESTION_KINDS = {  # `mixed` draws from them in this order
     "other": QuestionKind("different shapes"),
-    "near": QuestionKind("one cube moved"),
+    "near": QuestionKind("the same shape with one cube moved"),
     # With two options a `mirror` question would be a `mirror-pair` question.
-    "mirror": QuestionKind("a mirror image and a near shape", options=(3,)),
-    "matched": QuestionKind("different shapes with like silhouettes"),
-    "mirror-pair": QuestionKind("two views of the mirror image"),
+    "mirror": QuestionKind("the mirror image and a shape with one cube moved", options=(3,)),
+    "matched": QuestionKind("different shapes with similar silhouettes"),
+    "mirror-pair": QuestionKind("the mirror image only"),
 }
 DISTRACTORS = (*QUESTION_KINDS, "mixed")  # what `--distractors` takes
 

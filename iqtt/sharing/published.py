@@ -89,7 +89,7 @@ def check_withheld(opened: OpenFile, is_test: bool) -> None:
         leaks += ["the command that made it"] if COMMAND in file.attrs else []
         leaks += _beside_images(file) if is_test else []
     if leaks:
-        expected = "a file that does not tell the test answers, or --with-answers"
+        expected = "a file that does not reveal the answer key, or --with-answer-key"
         raise SpecError(path, and_more(leaks), expected)
 
 

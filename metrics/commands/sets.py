@@ -1,4 +1,4 @@
-"""`bench sets`: the named test sets, and making them."""
+"""`bench sets`: the named benchmarks, and making them."""
 
 import shlex
 import sys
@@ -16,7 +16,7 @@ from scenegen.command_line.paths import OutputFolder
 @click.group("sets", invoke_without_command=True, epilog=EXAMPLE + "bench sets make rooms-1")
 @click.pass_context
 def sets_command(context: click.Context) -> None:
-    """List the named test sets, or make one."""
+    """List the named benchmarks, or make one."""
     if context.invoked_subcommand is None:
         _list()
 
@@ -37,13 +37,14 @@ def _list() -> None:
 
 @sets_command.command("make", epilog=EXAMPLE + "bench sets make rooms-1 --out sets")
 @click.argument("name")
-@click.option("--out", type=OutputFolder(), default="sets", show_default=True, help="Folder.")
+@click.option(
+    "--out", type=OutputFolder(), default="sets", show_default=True, help="Output folder."
+)
 @WORKERS
 def make(name: str, out: str, workers: int) -> None:
-    """Make a test set, and check that its truth is the published one.
+    """Make a named benchmark, and check that its ground truth equals the published one.
 
-    Files that are there already are kept and checked. Where a run was ended, the same command goes
-    on.
+    Existing files are kept and checked. Re-run the same command to resume an interrupted run.
     """
     from metrics.scoring import known_tests
     from scenegen.common.names import check_choice

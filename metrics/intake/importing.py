@@ -45,7 +45,8 @@ def import_rooms(
     """
     with open_data(truth) as rooms:
         if not isinstance(rooms, Images):
-            raise SpecError(rooms.path, "questions", "rooms, or measured truth", "see --answers")
+            expected = "rooms, or measured ground truth"
+            raise SpecError(rooms.path, "questions", expected, "see --responses")
         names, keys = _names(rooms), partial(_keys, rooms)
         read, how = geometry_reader(reading, pattern, names, keys, normals, confidence=confidence)
         default: Alignment = "scale_shift" if reading.kind == "disparity" else "none"

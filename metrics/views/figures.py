@@ -119,7 +119,7 @@ def draw_groups(
     keys = [key for key in groups[0] if all(name in group.get(key, {}) for group in groups)]
     if not keys:
         place = f"{files[0].method}: {name} by {by}"
-        raise FigureError(place, "no groups that all files have", "another --by or --score")
+        raise FigureError(place, "no groups that all files have", "another --by or --metric")
     keys.sort(key=_by_number)
     floors = [_group_floor(files[0], by, key, name) for key in keys]
     with _figure(path, overwrite, width, 0.62 * width) as axes:

@@ -34,7 +34,7 @@ SKILL = "skill: 0 = baseline, 1 = perfect, negative = worse than the baseline"
 ITSELF = "baseline itself"
 NO_BASELINE = (
     "no skill: no baseline is known of questions with these settings. `iqtt floors {} --out"
-    " floors.json` measures it, and `bench score --floors floors.json` uses it"
+    " floors.json` measures it, and `bench score --baselines floors.json` uses it"
 )
 BY_KIND = "by kind of question"
 GROUP_TITLES = {

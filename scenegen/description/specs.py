@@ -108,23 +108,25 @@ class RoomSpec:
     listing: str = setting("")
     views: tuple[float, ...] = setting(
         (0.0,),
-        "Views of each scene, in degrees about the vertical axis from the first view, such as"
-        " 0,5,35,55,80",
+        "Views of each scene: degrees of rotation about the vertical axis from the first view,"
+        " such as 0,5,35,55,80",
     )
     spp: int = setting(
         1, "Colour samples per pixel; with --shading path, 64 by default", limits=(1, 1024)
     )
     image_dtype: str = setting("uint8", choices=IMAGE_DTYPES)
     min_visible_pixels: int = setting(
-        FROM_SIZE, "Fewest pixels that show an object, in every view", shown="0.3%"
+        FROM_SIZE,
+        "Minimum number of visible pixels of each object in every view",
+        shown="0.3% of the image",
     )
     fov_degrees: float = setting(28.0)
     fov_spread_degrees: float = setting(0.0, later=True)
     truth: tuple[str, ...] = setting(
         (),
-        "More truth to store: some of amodal,coordinates,flow,albedo. That is masks of whole"
-        " objects and their visible fractions, object coordinates (NOCS), optical flow to the next"
-        " view with occlusion, reflectance of each pixel",
+        "Additional ground truth to store, comma-separated. amodal: masks of whole objects and"
+        " their visible fractions; coordinates: object coordinates (NOCS); flow: optical flow to"
+        " the next view, with occlusion; albedo: reflectance of each pixel",
         later=True, option="with", shown="none",
     )  # fmt: skip
 
@@ -197,52 +199,52 @@ class DatasetSpec(RoomSpec):
 
     object_radius: tuple[float, float] = setting(
         (0.11, 0.22),
-        "Bounding radius of objects in scene units; with several views the default is a quarter"
-        " smaller",
+        "Bounding radius of objects in scene units. With several views, the default is 25% smaller",
         limits=(0.005, 0.5),
     )
     pose: str = setting(
         "resting",
-        "Whether objects lie as they would stay, or are turned at random",
+        "resting: objects lie in a stable position on the ground; any: random orientation",
         choices=("resting", "any"),
     )
     lights: tuple[int, int] = setting((1, 3), "Number of lights in a scene", limits=(0, MAX_LIGHTS))
     shading: str = setting(
         "paper",
-        "The paper's shading equation, or path tracing, with shadows and indirect light; slower",
+        "paper: the paper's shading equation; path: path tracing with shadows and indirect light,"
+        " slower",
         choices=("paper", "path"),
     )
-    shadows: bool = setting(False, "Whether objects cast shadows", option="shadows/--no-shadows")
-    allow_cropped: bool = setting(False, "Let the image's border cut objects")
-    camera_radius: float = setting(1.5, "Distance of cameras from the target, scene units")
+    shadows: bool = setting(False, "Cast shadows of objects", option="shadows/--no-shadows")
+    allow_cropped: bool = setting(False, "Allow objects that the image border crops")
+    camera_radius: float = setting(1.5, "Distance of the cameras from the target, in scene units")
     camera_target: Vector3 = setting((0.3, 0.3, 0.3))
-    light_radius: float = setting(2.5, "Distance of lights from the target, scene units")
+    light_radius: float = setting(2.5, "Distance of the lights from the target, in scene units")
     light_level: float = setting(
         0.95,
-        "Radiance of a white surface at the target that faces all lights",
+        "Radiance of a white surface at the target that faces every light",
         limits=(0.0, 100.0),
     )
     ambient: Vector3 = setting((0.1, 0.1, 0.1), "Ambient light L_a")
     attenuation: tuple[float, float] = setting(
         (0.5, 0.5),
-        "k_l,k_q: how light falls off with distance and its square",
+        "Linear and quadratic attenuation of light with distance, k_l,k_q",
         shown="0.5,0.5",
     )
     light_saturation: float = setting(
-        0.7, "How coloured lights are, from 0 (white) to 1", limits=(0.0, 1.0)
+        0.7, "Colour saturation of the lights, from 0 (white) to 1", limits=(0.0, 1.0)
     )
     reflectance: Vector3 = setting((0.8, 0.8, 0.8))
-    room_reflectance: Vector3 = setting((0.8, 0.8, 0.8), "Reflectance of floor and walls")
+    room_reflectance: Vector3 = setting((0.8, 0.8, 0.8), "Reflectance of ground and walls")
     random_reflectance: bool = setting(
         False,
-        "Whether each object gets a random colour or all the same",
+        "Random reflectance for each object, or the same for all objects",
         option="random-reflectance/--same-reflectance",
     )
     specular: tuple[float, float] = setting(
-        (0.0, 0.0), "Phong's coefficient k_s of objects", limits=(0.0, 10.0)
+        (0.0, 0.0), "Phong coefficient k_s of the objects", limits=(0.0, 10.0)
     )
     shininess: tuple[float, float] = setting(
-        (1.0, 1.0), "Phong's exponent of objects", limits=(1.0, 10_000.0)
+        (1.0, 1.0), "Phong exponent of the objects", limits=(1.0, 10_000.0)
     )
     own_reflectance: bool = setting(False, later=True)
 
@@ -307,18 +309,18 @@ class InteriorSpec(RoomSpec):
     )  # fmt: skip
     hours: tuple[float, float] = setting(
         (7.0, 21.0),
-        "Hours of the day of interiors; it is night after 18",
+        "Hours of the day in interiors. Outside is dark after 18",
         limits=(0.0, 24.0),
         later=True,
     )
     denoise: bool = setting(
         False,
-        "Whether images of interiors are denoised",
-        later=True, option="denoise/--no-denoise", shown="if the extra `denoise` is there",
+        "Denoise the images of interiors",
+        later=True, option="denoise/--no-denoise", shown="if the extra `denoise` is installed",
     )  # fmt: skip
     sensor_noise: float = setting(
         0.0,
-        "Noise of the camera of interiors, as a share of white",
+        "Standard deviation of the sensor noise in interiors, relative to white",
         limits=(0.0, 1.0),
         later=True,
     )
