@@ -141,7 +141,6 @@ def test_the_page_runs(tmp_path):
     printed = [
         run_block(language, title, smaller(code), tmp_path)
         for language, title, code in blocks("vlm.md")
-        if language != "json"
     ]
     rows = dict(line.split()[:2] for line in printed[1].splitlines() if len(line.split()) == 2)
     assert float(rows["circular_accuracy"]) == 0.0
