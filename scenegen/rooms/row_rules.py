@@ -45,6 +45,7 @@ _FURTHER_RULES = {
     "coordinates": "they follow from depth and poses",
     "flow": "flow and occlusion follow from depth and cameras",
     "albedo": "reflectance of the object ids",
+    "layers": "in order, begin with depth and object ids, and enter and leave objects in turn",
 }
 
 
