@@ -9,7 +9,6 @@ on every machine (`common.rotations`).
 """
 
 from dataclasses import dataclass
-from functools import reduce
 from typing import Any
 
 import numpy as np
@@ -163,28 +162,27 @@ def mesh_crossings(corners: Array, height: int, width: int, fov_y_degrees: float
     right and above.
     """
     size = pixel_size(height, fov_y_degrees)
-    near = -corners[..., 2]
-    margin = NEAR * np.abs(corners).max(initial=0.0)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        across = corners[..., 0] / (near * size) + width / 2 - 0.5
-        down = height / 2 - 0.5 - corners[..., 1] / (near * size)
-    whole = (near > margin).all(axis=1)
-    seen = (near > 0).any(axis=1)
+    points = np.ascontiguousarray(corners.transpose(1, 2, 0))  # corner, axis, triangle
+    near = -points[:, 2]
+    nearest, farthest = _ends(near)
+    whole = nearest > NEAR * np.abs(points).max(initial=0.0)
+    seen = farthest > 0
 
     def span(values: Array, most: int) -> tuple[Array, Array]:
-        low, high = values.min(axis=1), values.max(axis=1)
+        low, high = _ends(values)
         low = np.where(whole, np.clip(np.ceil(low - 1e-6), 0, most), 0)
         high = np.where(whole, np.clip(np.floor(high + 1e-6), -1, most - 1), most - 1)
         return low.astype(np.int64), np.where(seen, high - low + 1, 0).clip(0).astype(np.int64)
 
-    with np.errstate(invalid="ignore"):
-        (left, columns), (top, rows) = span(across, width), span(down, height)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left, columns = span(points[:, 0] / (near * size) + (width / 2 - 0.5), width)
+        top, rows = span((height / 2 - 0.5) - points[:, 1] / (near * size), height)
     area = columns * rows
     ends = np.cumsum(area)
     cuts = np.searchsorted(ends, np.arange(CANDIDATES, ends[-1] if len(ends) else 0, CANDIDATES))
     found = []
-    for some in np.split(np.arange(len(corners)), np.unique(cuts)):
-        some = some[area[some] > 0]
+    for chunk in np.split(np.arange(len(corners)), np.unique(cuts)):
+        some = chunk[area[chunk] > 0]
         face = np.repeat(some, area[some])
         place = np.arange(len(face)) - np.repeat(np.cumsum(area[some]) - area[some], area[some])
         row, column = np.divmod(place, columns[face])
@@ -192,7 +190,7 @@ def mesh_crossings(corners: Array, height: int, width: int, fov_y_degrees: float
         pixel = row * width + column
         x = (column + 0.5 - width / 2) * size
         y = ((height / 2 - 0.5) - row) * size
-        a, b, c = (corners[some, k].T for k in range(3))
+        a, b, c = points[..., some]
         planes = [_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b)]
         place = np.repeat(np.arange(len(some)), area[some])
         sides = [x * n[0][place] + y * n[1][place] - n[2][place] for n in planes]
@@ -208,18 +206,22 @@ def mesh_crossings(corners: Array, height: int, width: int, fov_y_degrees: float
         with np.errstate(divide="ignore", invalid="ignore"):
             depth = volume / total
         # Rounding must not move a hit on a triangle seen edge-on beyond its corners.
-        depth = np.clip(depth, near[face].min(axis=1), near[face].max(axis=1))
+        depth = np.clip(depth, nearest[face], farthest[face])
         ahead = depth > 0
         kind = np.where(all_positive[inside], LEAVES, ENTERS)
         found.append((pixel[ahead], depth[ahead], kind[ahead]))
     return Crossings(*(np.concatenate(part) for part in zip(*found, strict=True)))
 
 
+def _ends(values: Array) -> tuple[Array, Array]:
+    """Return the least and the largest of three rows, (3, n)."""
+    a, b, c = values
+    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+
 def _edge_plane(a: Array, b: Array) -> Array:
     """Return a x b, (3, n), computed from the ends in an order of their own: exactly -(b x a)."""
-    less = (a[0] < b[0]) | (
-        (a[0] == b[0]) & ((a[1] < b[1]) | ((a[1] == b[1]) & (a[2] < b[2])))
-    )
+    less = (a[0] < b[0]) | ((a[0] == b[0]) & ((a[1] < b[1]) | ((a[1] == b[1]) & (a[2] < b[2]))))
     plane = np.array(cross(np.where(less, a, b), np.where(less, b, a)))
     return np.where(less, plane, -plane)
 
@@ -231,18 +233,14 @@ def _surface_crossings(
 
     `local`, (3, 4), maps directions and the origin of the camera to the frame of the unit shape.
     """
-    directions = pixel_directions(height, width, fov_y_degrees).reshape(-1, 3)
-    along = product(directions, local[:, :3].T)
-    start = np.broadcast_to(local[:, 3], along.shape)
-    squared, middle = (
-        along[:, 0] * other[:, 0] + along[:, 1] * other[:, 1] + along[:, 2] * other[:, 2]
-        for other in (along, start)
-    )
-    middle = -middle / squared
-    nearest = start + middle[:, None] * along
-    pixel = np.flatnonzero(reduce(np.add, (nearest * nearest).T) < 1.0002)
-    roots = surface_roots(surface, nearest[pixel], along[pixel])
-    roots = np.sort(np.stack(roots, axis=1), axis=1) + middle[pixel, None]
+    x, y, z = _rays(local[:, :3], height, width, fov_y_degrees)
+    start = local[:, 3].tolist()
+    middle = -(x * start[0] + y * start[1] + z * start[2]) / (x * x + y * y + z * z)
+    nearest = [at + middle * along for at, along in zip(start, (x, y, z), strict=True)]
+    inside = nearest[0] ** 2 + nearest[1] ** 2 + nearest[2] ** 2 < 1.0002
+    pixel, middle = np.flatnonzero(inside), middle[inside]
+    c, d = (np.stack([axis[inside] for axis in axes], axis=1) for axes in (nearest, (x, y, z)))
+    roots = np.sort(np.stack(surface_roots(surface, c, d), axis=1), axis=1) + middle[:, None]
     kind = np.broadcast_to(np.resize([ENTERS, LEAVES], roots.shape[1]), roots.shape)
     there = np.isfinite(roots) & (roots > 0)
     return Crossings(np.broadcast_to(pixel[:, None], roots.shape)[there], roots[there], kind[there])
@@ -262,28 +260,45 @@ def _room_crossings(
         first = order[np.diff(found.pixel[order], prepend=-1) > 0]
         return Crossings(found.pixel[first], found.depth[first], np.full(len(first), OPEN))
     camera = batch.world_from_camera[image]
-    directions = pixel_directions(height, width, fov_y_degrees).reshape(-1, 3)
-    rays = product(directions, camera[:3, :3].T)
+    rays, start = _rays(camera[:3, :3], height, width, fov_y_degrees), camera[:3, 3].tolist()
     with np.errstate(divide="ignore", invalid="ignore"):
-        depth = np.where(rays < 0, -camera[:3, 3] / rays, np.inf).min(axis=1)
-        meets = np.isfinite(depth) & (camera[:3, 3] + depth[:, None] * rays <= 1).all(axis=1)
+        walls = [np.where(d < 0, -o / d, np.inf) for o, d in zip(start, rays, strict=True)]
+        depth = np.minimum(np.minimum(*walls[:2]), walls[2])
+        within = [o + depth * d <= 1 for o, d in zip(start, rays, strict=True)]
+    meets = np.isfinite(depth) & within[0] & within[1] & within[2]
     pixel = np.flatnonzero(meets)
-    return Crossings(pixel, depth[pixel], np.full(len(pixel), OPEN))
+    return Crossings(pixel, depth[meets], np.full(len(pixel), OPEN))
+
+
+def _rays(linear: Array, height: int, width: int, fov_y_degrees: float) -> list[Array]:
+    """Return the components of the rays of pixels, (H, W) each, after a linear map (3, 3)."""
+    x, y, z = np.moveaxis(pixel_directions(height, width, fov_y_degrees), -1, 0)
+    return [a * x[:1] + b * y[:, :1] + c * z[:1, :1] for a, b, c in linear.tolist()]
 
 
 def stacked(parts: list[Crossings], ids: Array, height: int, width: int) -> Layers:
     """Return crossings of several objects, ids (n,) of all, as the first MOST_LAYERS layers."""
     pixel, depth, kind = (
-        np.concatenate([getattr(part, name) for part in parts]) for name in ("pixel", "depth", "kind")
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in ("pixel", "depth", "kind")
     )
     depth = depth.astype(np.float32)
-    order = np.lexsort((ids == 0, kind == ENTERS, depth, pixel))
-    pixel, depth, kind, ids = (values[order].astype(values.dtype) for values in (pixel, depth, kind, ids))
+    # In the order of pixel and depth, whose bits order as it does. At one depth a ray leaves first.
+    last = np.where(ids == 0, 2, kind != LEAVES)
+    key = (pixel << 33) | (depth.view(np.int32).astype(np.int64) << 2) | last
+    order = np.argsort(key, kind="stable")
+    pixel, depth, kind, ids = (
+        values[order].astype(values.dtype) for values in (pixel, depth, kind, ids)
+    )
     new = np.diff(pixel, prepend=-1) > 0
     rank = np.arange(len(pixel)) - np.flatnonzero(new)[np.cumsum(new) - 1]
     kept = rank < MOST_LAYERS
     shape = (MOST_LAYERS, height * width)
-    layers = [np.full(shape, np.nan, np.float32), np.full(shape, -1, np.int8), np.zeros(shape, np.int8)]
+    layers = [
+        np.full(shape, np.nan, np.float32),
+        np.full(shape, -1, np.int8),
+        np.zeros(shape, np.int8),
+    ]
     for layer, values in zip(layers, (depth, ids, kind), strict=True):
         layer[rank[kept], pixel[kept]] = values[kept]
     return Layers(*(layer.reshape(MOST_LAYERS, height, width) for layer in layers))
@@ -307,11 +322,13 @@ def _begin_with(layers: Layers, depth: Array, object_id: Array) -> None:
         )[:MOST_LAYERS]
         along += [(np.float32(np.nan), -1, OPEN)] * (MOST_LAYERS - len(along))
         layers.depth[at], layers.object_id[at], layers.entering[at] = zip(*along, strict=True)
-    np.fmax.accumulate(layers.depth, axis=0, out=layers.depth)
-    layers.depth[layers.object_id < 0] = np.nan
+    late = np.nonzero(layers.depth[0] > layers.depth[1])
+    layers.depth[:, *late] = np.maximum.accumulate(layers.depth[:, *late], axis=0)
 
 
-def _from(along: list[tuple[Any, int, int]], depth: Any, object_id: int) -> list[tuple[Any, int, int]]:
+def _from(
+    along: list[tuple[Any, int, int]], depth: Any, object_id: int
+) -> list[tuple[Any, int, int]]:
     """Return the layers of one ray as they are if it first meets this object at this depth."""
     if object_id < 0:
         return []

@@ -1,7 +1,7 @@
 """Further truth, which `--with` adds to the rows of a file: made here, and checked here.
 
-Masks of whole objects are rendered, and layers are cast. All else follows from depth, cameras, poses and reflectance
-(`scenegen.derived`), and is stored so that readers need no code of ours.
+Masks of whole objects are rendered, and layers are cast. All else follows from depth, cameras,
+poses and reflectance (`scenegen.derived`), and is stored so that readers need no code of ours.
 """
 
 from collections.abc import Iterable, Mapping
@@ -77,7 +77,10 @@ def further_truth(
             [albedo(v.object_id, r).astype(np.float32) for v, r in zip(views, rho, strict=True)]
         )
     if "layers" in truth:
-        stored = [stored_layers(batch, i, v.depth, v.object_id) for v, i in zip(views, images, strict=True)]
+        stored = [
+            stored_layers(batch, i, v.depth, v.object_id)
+            for v, i in zip(views, images, strict=True)
+        ]
         made |= {name: np.stack([one[name] for one in stored]) for name in stored[0]}
     return made
 
@@ -146,9 +149,10 @@ def truth_problems(
         scene: its description.
     """
     truth = spec.truth
-    if "amodal" in truth:
-        for problem in _amodal_problems(stored, view, len(scene.objects)):
-            yield "amodal", problem
+    for name, check in (("amodal", _amodal_problems), ("layers", _layer_problems)):
+        if name in truth:
+            for problem in check(stored, view, len(scene.objects)):
+                yield name, problem
     if "coordinates" in truth:
         expected = coordinates(view, stored["object/world_from_object"])
         if not np.allclose(
@@ -165,21 +169,24 @@ def truth_problems(
             yield "flow", "flow is not that of depth and cameras"
         if (stored["flow_occluded"] != occluded).mean() > EDGE_SHARE:
             yield "flow", "occlusion is not that of depth and cameras"
-    if "layers" in truth:
-        for problem in _layer_problems(stored, view, len(scene.objects)):
-            yield "layers", problem
-    if "albedo" in truth and spec.interior:
+    if "albedo" in truth:
+        for problem in _albedo_problems(spec, stored, view):
+            yield "albedo", problem
+
+
+def _albedo_problems(spec: Request, stored: Mapping[str, Array], view: Any) -> Iterable[str]:
+    if spec.interior:
         values, hit = stored["albedo"], view.object_id >= 0
         if not ((values[hit] >= 0) & (values[hit] <= 1)).all():
-            yield "albedo", "albedo is not from 0 to 1"
-    elif "albedo" in truth:
+            yield "albedo is not from 0 to 1"
+    else:
         rho = albedo(view.object_id, stored["material/reflectance"]).astype(np.float32)
         own = (view.object_id > 0) & spec.own_reflectance
         if not np.array_equal(stored["albedo"][~own], rho[~own], equal_nan=True):
-            yield "albedo", "albedo is not the reflectance of the object ids"
+            yield "albedo is not the reflectance of the object ids"
         shares = stored["albedo"][own] / np.maximum(rho[own], 1e-12)
         if not ((shares >= 0) & (shares <= 1 + 1e-5)).all():
-            yield "albedo", "albedo of an object exceeds its reflectance"
+            yield "albedo of an object exceeds its reflectance"
 
 
 def _layer_problems(stored: Mapping[str, Array], view: Any, count: int) -> Iterable[str]:
