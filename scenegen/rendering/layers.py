@@ -287,21 +287,19 @@ def stacked(parts: list[Crossings], ids: Array, height: int, width: int) -> Laye
     last = np.where(ids == 0, 2, kind != LEAVES)
     key = (pixel << 33) | (depth.view(np.int32).astype(np.int64) << 2) | last
     order = np.argsort(key, kind="stable")
-    pixel, depth, kind, ids = (
-        values[order].astype(values.dtype) for values in (pixel, depth, kind, ids)
-    )
+    pixel = pixel[order]
     new = np.diff(pixel, prepend=-1) > 0
     rank = np.arange(len(pixel)) - np.flatnonzero(new)[np.cumsum(new) - 1]
     kept = rank < MOST_LAYERS
-    shape = (MOST_LAYERS, height * width)
-    layers = [
-        np.full(shape, np.nan, np.float32),
-        np.full(shape, -1, np.int8),
-        np.zeros(shape, np.int8),
-    ]
-    for layer, values in zip(layers, (depth, ids, kind), strict=True):
-        layer[rank[kept], pixel[kept]] = values[kept]
-    return Layers(*(layer.reshape(MOST_LAYERS, height, width) for layer in layers))
+
+    def image(values: Array, nothing: float, dtype: type) -> Array:
+        layers = np.full((MOST_LAYERS, height * width), nothing, dtype)
+        layers[rank[kept], pixel[kept]] = values[order][kept]
+        return layers.reshape(MOST_LAYERS, height, width)
+
+    return Layers(
+        image(depth, np.nan, np.float32), image(ids, -1, np.int8), image(kind, 0, np.int8)
+    )
 
 
 def _begin_with(layers: Layers, depth: Array, object_id: Array) -> None:
@@ -322,8 +320,8 @@ def _begin_with(layers: Layers, depth: Array, object_id: Array) -> None:
         )[:MOST_LAYERS]
         along += [(np.float32(np.nan), -1, OPEN)] * (MOST_LAYERS - len(along))
         layers.depth[at], layers.object_id[at], layers.entering[at] = zip(*along, strict=True)
-    late = np.nonzero(layers.depth[0] > layers.depth[1])
-    layers.depth[:, *late] = np.maximum.accumulate(layers.depth[:, *late], axis=0)
+    late = layers.depth[0] > layers.depth[1]
+    layers.depth[:, late] = np.maximum.accumulate(layers.depth[:, late], axis=0)
 
 
 def _from(
