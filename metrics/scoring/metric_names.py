@@ -63,36 +63,36 @@ BASELINES = {
         " normal.",
     ),
     LEANING: Baseline(
-        "leaning cut-out", "a cut-out that leans half as much as the wall behind it",
+        "leaning cut-out", "cut-out slanted half as much as the wall behind it",
         "cut-outs that lean half as much as the walls behind them, in closed rooms alone.",
     ),
     LIFTED: Baseline(
-        "lifted masks", "true masks, moved before the empty room by one fitted distance",
+        "lifted masks", "ground-truth masks at one fitted distance from the empty room",
         "the true masks of objects, moved before the empty room by one distance that is fitted to"
         " the truth of each image.",
     ),
     FLAT: Baseline(
-        "constant", "one depth for all pixels, fitted as predictions are",
+        "constant", "one fitted depth per image",
         f"one depth for all pixels,{_BLIND}",
     ),
     RAMP: Baseline(
-        "ramp", "depth that falls to the lower edge, fitted as predictions are",
+        "ramp", "depth that falls linearly to the bottom edge, fitted",
         f"depth that falls evenly to the lower edge,{_BLIND}",
     ),
     BALLS: Baseline(
-        "balls", "a ball for each object of the first view",
+        "balls", "a sphere proxy per object of the first view",
         "balls in place of the first view's objects.", needs="first_view",
     ),
     BLOCKS: Baseline(
-        "blocks", "a block for each object of the first view",
+        "blocks", "a box proxy per object of the first view",
         "blocks in place of the first view's objects.", needs="first_view",
     ),
     HALF: Baseline(
-        "half resolution", "the true depth at half the resolution, enlarged again",
+        "half resolution", "ground-truth depth, downsampled and upsampled by 2",
         "the true depth, halved by means of 2 x 2 pixels and doubled again, bilinear.",
     ),
     OTHER_SCENE: Baseline(
-        "shuffled", "this prediction against another scene",
+        "shuffled", "this prediction scored on another scene",
         "the same prediction with the relief of another scene, seen in the same view.",
         of_truth=False,
     ),
@@ -101,7 +101,7 @@ BASELINES = {
         "a confidence that says nothing.", of_truth=False,
     ),
     EDGE_DISTANCE: Baseline(
-        "edge distance", "distance to the nearest edge of the image's brightness as confidence",
+        "edge distance", "distance to the nearest brightness edge as confidence",
         "the distance from the nearest edge of brightness as confidence.", of_truth=False,
     ),
 }  # fmt: skip
