@@ -10,7 +10,7 @@ from page_blocks import ROOT, blocks, missing_lines, run_block
 
 from metrics.submissions.reader import open_predictions
 
-RUN_ELSEWHERE = {"tutorial.md", "vlm.md", "your-model.md"}
+RUN_ELSEWHERE = {"training-data.md", "tutorial.md", "vlm.md", "your-model.md"}
 CLUSTER = {"scale.md"}  # needs a scheduler and its workers
 README = "../README.md"
 # What the README's first command makes, with smaller images.
@@ -115,6 +115,22 @@ def test_the_programs_read_every_row_and_what_they_write_can_be_scored(tmp_path)
     with open_predictions(tmp_path / "letters.h5") as found:
         assert found.answers.tolist() == [0, 1, 2] * 3
     assert "9 questions" in run_block("bash", "", SCORE_ANSWERS, tmp_path)
+
+
+LOADED = {  # what the blocks of training-data.md print, by words of theirs
+    "RoomStream(": "torch.Size([16, 3, 64, 64]) torch.Size([16, 64, 64]) True\n" * 4,
+    "DataLoader(rooms": "torch.Size([16, 32, 32, 3]) torch.Size([16, 32, 32])\n" * 4,
+    "np.array_split(": "(16, 32, 32, 3) (16, 32, 32)\n" * 4,
+    "load_dataset(": "(16, 32, 32, 3) (16, 32, 32)\n" * 4,
+}
+
+
+def test_loaders_and_streams_give_every_row(tmp_path):
+    pytest.importorskip("datasets")
+    blocks_of_page = blocks("training-data.md")
+    printed = {code: run_block(lang, title, code, tmp_path) for lang, title, code in blocks_of_page}
+    for words, lines in LOADED.items():
+        assert [text for code, text in printed.items() if words in code] == [lines]
 
 
 @pytest.mark.slow

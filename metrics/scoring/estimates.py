@@ -230,8 +230,8 @@ def skills(
     column_of = {name: floor_column(items, scene, name, shown) for name in SKILLED if name in items}
     names = [name for name, column in column_of.items() if column is not None]
     of_objects = [name for name in OBJECT_SCORES if name in items]
-    shown = any(np.isfinite(items[name]).any() for name in of_objects)
-    if weights is None and of_objects and not shown:
+    seen = any(np.isfinite(items[name]).any() for name in of_objects)
+    if weights is None and of_objects and not seen:
         return {}
     skill_of: dict[str, Skill] = {}
     pairs = {name: np.stack([items[name], items[str(column_of[name])]]) for name in names}

@@ -35,7 +35,7 @@ def try_file(path: str | Path) -> None:
     That its content is right is not said. Raises FileFormatError where HDF5 crashes, does not end
     in time, or takes more memory than honest files need.
     """
-    if not os.path.isfile(path) or _identity(path) in _ACCEPTED or not _is_hdf5(path):
+    if not os.path.isfile(path) or _identity(path) in _ACCEPTED or not is_hdf5(path):
         return
     identity = _identity(path)
     limit = SECONDS + os.path.getsize(path) / BYTES_A_SECOND
@@ -103,7 +103,7 @@ def _identity(path: str | Path) -> _Identity:
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
-def _is_hdf5(path: str | Path) -> bool:
+def is_hdf5(path: str | Path) -> bool:
     """Return whether the signature is at 0, 512, 1024, 2048, ...: other bytes may come first."""
     place = 0
     with open(path, "rb") as file:

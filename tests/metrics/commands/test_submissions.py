@@ -49,6 +49,7 @@ def test_a_baseline_goes_all_the_way(truths, folder):
     )
     assert (compared.exit_code, "better" in compared.stdout) == (0, True), compared.output
     assert "better in" in (folder / "c.html").read_text()
+    assert bench("compare", "empty-room.h5", "oracle.h5", *truth).stdout == compared.stdout
     for form, word in (("markdown", "| "), ("html", "<table"), ("latex", "\\toprule")):
         ranked = bench("leaderboard", "empty-room.json", "oracle.json", "--format", form)
         assert (ranked.exit_code, word in ranked.stdout) == (0, True), ranked.output
