@@ -54,11 +54,11 @@ _BLIND = (
 )
 BASELINES = {
     EMPTY_ROOM: Baseline(
-        "empty room", "room without objects", "the empty room, drawn from the true camera.",
+        "empty room", "no objects", "the empty room, drawn from the true camera.",
         needs="no_view",
     ),
     CUT_OUT: Baseline(
-        "cut-out", "each object flat at its true median depth",
+        "cut-out", "flat objects at their true depth",
         "flat cut-outs, each at its object's median depth; of normals, each object's mean true"
         " normal.",
     ),
@@ -67,7 +67,7 @@ BASELINES = {
         "cut-outs that lean half as much as the walls behind them, in closed rooms alone.",
     ),
     LIFTED: Baseline(
-        "lifted masks", "ground-truth masks at one fitted distance from the empty room",
+        "lifted masks", "true masks at one fitted distance",
         "the true masks of objects, moved before the empty room by one distance that is fitted to"
         " the truth of each image.",
     ),
@@ -92,7 +92,7 @@ BASELINES = {
         "the true depth, halved by means of 2 x 2 pixels and doubled again, bilinear.",
     ),
     OTHER_SCENE: Baseline(
-        "shuffled", "this prediction scored on another scene",
+        "shuffled", "another scene",
         "the same prediction with the relief of another scene, seen in the same view.",
         of_truth=False,
     ),

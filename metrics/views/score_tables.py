@@ -102,9 +102,9 @@ def main_table(scores: ScoreFile) -> Table:
     No skill is shown where depth seems to have another unit.
     """
     rows: list[Sequence[str]] = []
-    skills = {} if unit_warning(scores) else scores.skills
+    head = MAIN_HEAD[:-2] if unit_warning(scores) else MAIN_HEAD
     for name in main_names(scores):
-        score, skill = scores.metrics[name], skills.get(name)
+        score, skill = scores.metrics[name], scores.skills.get(name)
         value, interval = interval_cells(score)
         value += "" if score.std is None else f" ± {number(score.std, (score.low, score.high))}"
         up = "up" if metric(name).higher_is_better else "down"
@@ -113,7 +113,7 @@ def main_table(scores: ScoreFile) -> Table:
             rows.append((*row, "-", ""))
         else:
             rows.append((*row, *(("0", ITSELF) if skill.is_floor else interval_cells(skill))))
-    return make_table("", MAIN_HEAD, rows)
+    return make_table("", head, [row[: len(head)] for row in rows])
 
 
 def baseline_name(scores: ScoreFile, name: str) -> str:
@@ -181,7 +181,7 @@ def group_tables(scores: ScoreFile) -> Iterator[Table]:
             continue
         held = {name for group in groups.values() for name in group}
         names = [name for name in HEADLINE[scores.kind] if name in held] or in_order(held)
-        with_skills = grouping == "by_distractor"
+        with_skills = grouping == "by_distractor" and bool(scores.question_floors)
         rows: list[Sequence[Cell | str]] = []
         for key in by_number(groups):
             group = groups[key]
@@ -310,7 +310,7 @@ def unit_warning(scores: ScoreFile) -> list[str]:
     times = 2.0**middle
     unit = next((text for factor, text in UNITS.items() if 0.5 < times / factor < 2.0), "")
     guess = f", possibly {unit}" if unit else ""
-    found = f"predicted depth is {times:,.3g} times the ground truth{guess}"
+    found = f"depth is {float(f'{times:.3g}'):,g} times the ground truth{guess}"
     return [f"unit mismatch suspected, so no skill is shown: {found}"]
 
 
@@ -373,8 +373,7 @@ def _alignment_note(scores: ScoreFile) -> list[str]:
     by_alignment = list(_by_alignment(scores))
     firsts = [(name, shown[0]) for name, shown in by_alignment if name in NOTED_ALIGNMENTS]
     values = " | ".join(f"{name} {interval_cells(first)[0]}" for name, first in firsts if first)
-    rule = "compare methods after the same alignment only"
-    return [f"abs_rel by alignment: {values}; {rule}"] * (len(by_alignment) > 1)
+    return [f"abs_rel by alignment: {values}"] * (len(by_alignment) > 1)
 
 
 def _not_scored(scores: ScoreFile) -> str:
