@@ -148,13 +148,13 @@ def test_what_only_a_forest_sees():
     probes = run_probes(replace(evidence, statistics=statistics))
     found = {(p.statistic, p.sees) for p in probes if p.is_shortcut and p.rule == "learned"}
     pixels = {("low-resolution pixels", WITHOUT), ("small patterns of pixels", WITHOUT)}
-    certain = {("answers' cubes", WITHOUT), ("rotations and order of cubes", FRAMES)}
+    certain = {("cubes of the options", WITHOUT), ("rotations and order of cubes", FRAMES)}
     certain |= {("low-resolution pixels", WITHOUT)}
     assert certain <= found <= certain | pixels
     assert {p.statistic for p in probes if p.is_shortcut and p.rule != "learned"} == {
         "spread of cubes"
     }
-    (outlines,) = (p for p in probes if p.statistic == "outlines, by trees")
+    (outlines,) = (p for p in probes if p.statistic == "silhouettes, by trees")
     assert (outlines.accuracy > 0.8, outlines.sees) == (True, OUTLINE)
 
 
@@ -181,7 +181,7 @@ def test_few_questions_or_none():
     assert {p.n for p in run_probes(fair(0, 6)) if p.sees != MIRRORED} == {6}
     untold = fair(0, cubes={name: np.full((300, 3), np.nan) for name in SHAPE_STATISTICS})
     found = {p.statistic for p in run_probes(untold)}
-    assert not found & {*SHAPE_STATISTICS, "answers' cubes"}
+    assert not found & {*SHAPE_STATISTICS, "cubes of the options"}
 
 
 @pytest.mark.parametrize(
