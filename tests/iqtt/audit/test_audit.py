@@ -98,13 +98,13 @@ ALL, VIEWS = slice(None), "truth/world_from_shape"
 DAMAGES: list[tuple[str, Edit, str]] = [
     (VAL, changed("answers", ALL, lambda a: (a + 1) % 3), "one correct option"),
     (TEST, changed("answers", ALL, lambda a: (a + 1) % 3), "one correct option"),
-    (VAL, second_right_answer, "one right answer, answers differ, ..."),
-    (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one right answer, ..."),
+    (VAL, second_right_answer, "one correct option, options differ, ..."),
+    (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one correct option, ..."),
     (VAL, changed("truth/cubes", 3, in_pieces), "shapes, ..."),
     (VAL, changed("truth/shape_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
     (VAL, changed("truth/class_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
-    (VAL, at_the_border, "framing, cast again"),
-    (VAL, changed("questions", ALL, another_background), "framing, cast again, ..."),
+    (VAL, at_the_border, "framing, ray-cast images"),
+    (VAL, changed("questions", ALL, another_background), "framing, ray-cast images, ..."),
     *(
         (
             VAL,
@@ -114,7 +114,7 @@ DAMAGES: list[tuple[str, Edit, str]] = [
         for by in (-1.0, 1.001, np.nan)
     ),
     (VAL, changed("truth/light_color", 3, scaled(2, 1.05)), "ray-cast images"),
-    (VAL, changed("questions", 3, lambda images: images[[0, 2, 1, 3]]), "cast again, ..."),
+    (VAL, changed("questions", 3, lambda images: images[[0, 2, 1, 3]]), "ray-cast images, ..."),
 ]
 
 
@@ -382,12 +382,12 @@ CASES = [
     (GOOD, set()),
     ({**GOOD, "key": 1}, {"wrong key"}),
     ({**GOOD, "key": 2}, {"wrong key"}),
-    ({**GOOD, "answers": GOOD["answers"][1:] * 2}, {"no right answer", "equal pictures"}),
+    ({**GOOD, "answers": GOOD["answers"][1:] * 2}, {"no correct option", "equal images"}),
     (
         {"reference": view(FLAT), "answers": [view(FLAT, OTHER), view(mirrored(FLAT), TILTED)]},
-        {"more than one right answer"},
+        {"more than one correct option"},
     ),
-    ({**GOOD, "answers": [view(L, OTHER), view(L[:4], OTHER)]}, {"unlike cube counts"}),
+    ({**GOOD, "answers": [view(L, OTHER), view(L[:4], OTHER)]}, {"different cube counts"}),
     ({**GOOD, "answers": [view(L, OTHER), view([*L[:4], [5, 5, 5]])]}, {"more than one piece"}),
     (
         {**GOOD, "reference": view(L, np.eye(3).tolist())},
