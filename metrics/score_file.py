@@ -2,7 +2,7 @@
 
 A file holds the scores of each item and where they come from. All other numbers follow from these
 and are computed by `ScoreFile` when they are asked for; the file's `summary` repeats some for
-people, and is not read. docs/scores.md describes the format. Numbers that are written here read
+people, and is not read. docs/score-file.md describes the format. Numbers that are written here read
 back to the same bits.
 """
 
@@ -382,7 +382,7 @@ def _known_metric(place: str, name: str, task: str) -> Metric:
     except UnknownMetricError:
         score = None
     if score is None or task not in score.tasks:
-        raise refusal(place, f"no score of task {task!r}", "a name listed in docs/scores.md")
+        raise refusal(place, f"no score of task {task!r}", "a name listed in docs/data/metrics.csv")
     return score
 
 

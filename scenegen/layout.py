@@ -1,8 +1,10 @@
 """The HDF5 layout of a file of rooms, as a table: name, axes, type, unit, frame and meaning.
 
-`python -m scenegen.layout` prints it as the tables of `docs/rooms-file.md`.
+`python -m scenegen.layout > docs/data/rooms-columns.csv` writes it for `docs/rooms-file.md`.
 """
 
+import csv
+import io
 import re
 from collections.abc import Iterable
 from dataclasses import replace
@@ -72,6 +74,7 @@ SCORED = (
 FIXED = {"channel": 3, "offset": 2, "xyz": 3, "matrix_row": 4, "matrix_column": 4, "coefficient": 2,
          "setting": 5}  # fmt: skip
 MATRIX = ("matrix_row", "matrix_column")
+HEAD = ("dataset", "row", "type", "unit", "frame", "meaning")  # of tables of columns
 
 
 def _column(
@@ -220,17 +223,29 @@ def columns(spec: Request) -> list[Column]:
     ]
 
 
-def markdown_table(fields: Iterable[Column] = FIELDS) -> str:
+def markdown_table(fields: Iterable[Column]) -> str:
     """Return the layout as a Markdown table."""
-    rows = [("dataset", "row", "type", "unit", "frame", "meaning")]
-    for field in fields:
-        row = ", ".join(str(FIXED.get(axis, axis)) for axis in field.axes or ())
-        dtype = {"image": "`--image-dtype`", "text": "UTF-8 string"}.get(field.dtype, field.dtype)
-        rows.append((f"`{field.name}`", f"({row})", dtype, field.unit, field.frame, field.meaning))
-    return "\n".join(piped(rows))
+    rows = [(f"`{name}`", *row) for name, *row in map(_row, fields)]
+    return "\n".join(piped([HEAD, *rows]))
+
+
+def csv_table() -> str:
+    """Return all columns as CSV, with the files that have them."""
+    groups = {"all": FIELDS, "interiors": INTERIOR}
+    groups |= {f"--with {name}": columns for name, columns in FURTHER.items()}
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow((*HEAD, "files"))
+    for files, columns in groups.items():
+        table.writerows((*_row(column), files) for column in columns)
+    return text.getvalue()
+
+
+def _row(field: Column) -> tuple[str, ...]:
+    shape = ", ".join(str(FIXED.get(axis, axis)) for axis in field.axes or ())
+    dtype = {"image": "`--image-dtype`", "text": "UTF-8 string"}.get(field.dtype, field.dtype)
+    return field.name, f"({shape})", dtype, field.unit, field.frame, field.meaning
 
 
 if __name__ == "__main__":
-    print(markdown_table())
-    print("\nWith `--with`:\n")
-    print(markdown_table(column for some in FURTHER.values() for column in some))
+    print(csv_table(), end="")

@@ -295,7 +295,7 @@ def run(
     keys below. For questions, it defines infer(reference, answers), which returns the index of an
     option or one score per option. infer may also be a method of a class or of the object that
     load() returns. A class of MoGe's evaluation works as well; OPTIONS after -- are passed to its
-    load(). docs/your-model.md has examples.
+    load(). docs/evaluate.md has examples.
 
     \b
     points_metric, depth_metric: metres; scene units in box rooms

@@ -26,7 +26,7 @@ from typing import IO, Any
 SIZE = 8  # bytes of a message's length, before it
 END = b""  # the message after the last request
 EXPECTED = "infer(image, intrinsics=None), or load() or one class that gives an object with it"
-EXAMPLE = "see docs/your-model.md"
+EXAMPLE = "see docs/evaluate.md"
 
 
 class UnusableError(Exception):
