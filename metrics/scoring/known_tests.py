@@ -61,7 +61,8 @@ _ROOMS = {  # purpose, rows, command
         "furnished rooms, for networks that were trained on photographs",
         400,
         "scenegen render --preset interiors --n 100 --views 0,10,20,30 --seed 1000 --size 512"
-        " --object-split test --spp 16 --denoise",
+        # Shards, as an interrupted command keeps those that are complete.
+        " --object-split test --spp 16 --denoise --shard-size 10",
     ),
 }
 # Digests of truth and pictures. `bench sets make NAME` prints those of the files that it makes.
