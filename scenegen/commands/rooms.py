@@ -57,7 +57,7 @@ def preview(
         rows = pick_rows(len(rooms), items, number, seed)
         sheet = contact_sheet([rooms[i] for i in rows])
     save_picture(sheet, out, overwrite)
-    print_line(f"{out}: {len(rows)} of {file}'s rooms")
+    print_line(f"{out}: {len(rows)} images of {file}")
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen info rooms.h5")
@@ -182,6 +182,7 @@ def _check_images(path: Path, spec: "Request") -> None:
 )
 @OVERWRITE
 @MESHES
+@ASSETS
 @DEVICE
 def export(
     file: str,
@@ -196,6 +197,8 @@ def export(
     rows_per_file: int,
     overwrite: bool,
     device: str,
+    materials: str | None,
+    environment: str | None,
     **meshes: Any,
 ) -> None:
     """Export images of a file with their ground truth to the formats of other tools.
@@ -205,6 +208,9 @@ def export(
     """
     if every and items is not None:
         raise click.UsageError("--all and --items exclude each other: use one of them")
+    from scenegen.rendering.pictures.places import ASSETS as PLACES
+
+    PLACES.use(materials, environment)
     folder = out or f"{Path(file).stem}-{form}"
     how = {"curve": curve, "bits": int(bits), "exposure": exposure}
     how |= {} if depth_unit is None else {"depth_unit": depth_unit}
@@ -269,7 +275,7 @@ def _export_folder(
     from scenegen.rooms.reader import RoomsFile
 
     with RoomsFile(file) as rooms:
-        objects = file_objects(rooms.spec, **meshes) if form == "bop" else None
+        objects = file_objects(rooms.spec, **meshes) if form in ("bop", "glb") else None
         count = len(rooms if items is None else items)
         with progress_bar(count, "image") as bar:
             export_folder(

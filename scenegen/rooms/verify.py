@@ -91,11 +91,11 @@ def verify_file(
     rules = row_rules(rooms)
     scenes = {"scene": digests.get("scene", "")}
     same = fingerprint(rooms.spec.to_json(), scenes) == rooms.fingerprint
-    layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
+    layout = f"{len(rooms)} images, format {rooms.attributes['format_version']}"
     return [
         listed_check("layout", layout, rooms.problems()),
         content_check("content", rooms.opened, digests),
-        *(listed_check(x, f"{rules[x]} ({len(rooms)} rows)", broken[x]) for x in rules),
+        *(listed_check(x, f"{rules[x]} ({len(rooms)} images)", broken[x]) for x in rules),
         Check("fingerprint", same, rooms.fingerprint if same else "does not match"),
         *_some_again(rooms, items, device, made_of),
     ]
@@ -111,11 +111,11 @@ def verify_withheld(
     step = max(1, BLOCK_PIXELS // (rooms.spec.height * rooms.spec.width))
     digests, _ = read_all(rooms, step, lambda block, row: (), progress)
     wrong = content_problems(rooms.opened, digests, whole=False)
-    layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
-    truth = f"withheld, so nothing else is checked; {truth_path(rooms.path).name} has it"
+    layout = f"{len(rooms)} images, format {rooms.attributes['format_version']}"
+    truth = f"held out in {truth_path(rooms.path).name}, so nothing else is checked"
     return [
         listed_check("layout", layout, rooms.problems(whole=False)),
-        listed_check("content", "every value as written, by SHA-256", wrong),
+        listed_check("content", "all values match their SHA-256", wrong),
         Check("truth", True, truth),
     ]
 
@@ -139,7 +139,7 @@ def _sampled_again(rooms: RoomsFile, rows: Sequence[int], objects: Objects) -> C
             same = False
         if not same:
             wrong.append(f"row {row}")
-    detail = ", ".join(wrong) + " cannot be drawn again" if wrong else f"{len(rows)} rows"
+    detail = ", ".join(wrong) + " differ" if wrong else f"{len(rows)} images, from the seed"
     return Check("drawn again from the seed", not wrong, detail)
 
 
@@ -185,8 +185,8 @@ def _rendered_again(rooms: RoomsFile, rows: Sequence[int], device: str, objects:
         if differs:
             wrong.append(f"row {row} ({', '.join(differs)})")
     within = f"within tolerances (depth {DEPTH_TOLERANCE:g}, ids equal but at edges)"
-    what = f"{off} of {len(rows)} rows {within}" if off else "bit for bit"
-    detail = "differ: " + ", ".join(wrong) if wrong else f"{len(rows)} rows, {what}"
+    what = f"{off} of {len(rows)} images {within}" if off else "bit for bit"
+    detail = "differ: " + ", ".join(wrong) if wrong else f"{len(rows)} images, {what}"
     remark = f" (the file's {'; '.join(others)})" if others else ""
     return Check("rendered again", not wrong, detail + remark)
 

@@ -59,5 +59,8 @@ FOLDER_FORMATS = _by_name(
         ("nerfstudio", "nerfstudio"), ("colmap", "COLMAP"), ("bop", "BOP"),
         ("coco", "COCO"), ("moge", "MoGe"),
     )
-)  # fmt: skip
+) | _by_name((
+    Format("glb", "a glTF 2.0 file per scene, with its materials, cameras and lights",
+           f"{HERE}.glb:write"),
+))  # fmt: skip
 FORMATS = ROW_FORMATS | DATA_FORMATS | FOLDER_FORMATS
