@@ -93,13 +93,14 @@ class RoomPredictionWriter:
         *,
         disparity: ArrayLike | None = None,
         points: ArrayLike | None = None,
+        layers: ArrayLike | None = None,
         fov_y_degrees: float | None = None,
         confidence: ArrayLike | None = None,
     ) -> None:
         """Write the prediction for one row of the truth; rows may come in any order.
 
-        One of depth, disparity and points is given, the same for all rows; arrays may be tensors
-        of torch.
+        One of depth, disparity, points and layers is given, the same for all rows; arrays may be
+        tensors of torch.
 
         Args:
             row: of the truth file.
@@ -109,6 +110,8 @@ class RoomPredictionWriter:
             disparity: (H, W) floats: 1 / planar depth, up to a scale above 0 and a shift.
             points: (H, W, 3) floats: camera frame (x right, y up, z towards the viewer), scene
                 units.
+            layers: (H, W, L) floats: planar depth of all surfaces along each ray, in order; NaN
+                behind the last one.
             fov_y_degrees: vertical field of view that the method estimates. For all rows or none.
             confidence: (H, W) floats: larger where the method is surer of its depth; only their
                 order within the image counts. For all rows or none.
@@ -125,6 +128,7 @@ class RoomPredictionWriter:
             surface = np.isfinite(self._truth.read("depth", row)[:height, :width])
         sizes = dict(zip(("y", "x"), ((size,) for size in surface.shape), strict=True))
         images = {"depth": depth, "disparity": disparity, "points": points}
+        images["layers"] = layers
         images |= {"normal": normal, "confidence": confidence}
         values = {}
         for column in layout.COLUMNS["rooms"]:
