@@ -4,7 +4,7 @@ Layers are planar depths of the surfaces along N rays, in order, (L, N); NaN beh
 Spans are where rays enter and leave solids, (S, N) each; both infinite behind the last one.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -32,17 +32,18 @@ def entered_spans(depth: Array, entering: Array) -> Spans:
         depth: of all layers, (L, N).
         entering: 1 where the ray enters an object, -1 where it leaves, else 0, (L, N).
     """
-    inside = np.cumsum(entering, axis=0, dtype=np.int64) > 0
+    entered = np.flatnonzero((entering != 0).any(axis=0))
+    inside = np.cumsum(entering[:, entered], axis=0, dtype=np.int8) > 0
     # What is not left within the layers ends at the last one.
     inside[-1] = False
     before = np.concatenate([np.zeros_like(inside[:1]), inside[:-1]])
     most = int((inside & ~before).sum(axis=0).max(initial=1))
-    known = np.fmax.accumulate(depth, axis=0)
+    known = np.fmax.accumulate(depth[:, entered], axis=0)
 
     def at(mask: Array) -> Array:
         values = np.full((max(most, 1), depth.shape[1]), np.inf)
         number = np.cumsum(mask, axis=0) - 1
-        values[number[mask], np.nonzero(mask)[1]] = known[mask]
+        values[number[mask], entered[np.nonzero(mask)[1]]] = known[mask]
         return values
 
     return at(inside & ~before), at(before & ~inside)
@@ -69,8 +70,11 @@ def solid_iou(predicted: Spans, true: Spans, stretch: Array) -> float:
 
     `stretch`, (N,), is the length of each ray's direction, whose planar depth is 1.
     """
-    both = float(overlap(predicted, true) @ stretch)
-    either = float((length(predicted) + length(true)) @ stretch) - both
+    enters = np.isfinite(true[1][0])
+    enters |= np.isfinite(predicted[1]).any(axis=0)
+    (a, b), stretch = ((x[:, enters], y[:, enters]) for x, y in (predicted, true)), stretch[enters]
+    both = float((overlap(a, b) * stretch).sum())
+    either = float(((length(a) + length(b)) * stretch).sum()) - both
     return both / either if either > 0.0 else np.nan
 
 
@@ -92,7 +96,8 @@ def layer_recalls(predicted: Array, true: Array, of_objects: Array) -> dict[str,
     Layers with the same number are compared. `of_objects` tells which are surfaces of objects,
     (L, N); the others do not count.
     """
-    rows = max(len(true), len(predicted))
+    rows = max(int(of_objects.any(axis=1).sum()), *HIDDEN)
+    predicted, true, of_objects = predicted[:rows], true[:rows], of_objects[:rows]
     padded = [
         np.pad(x, ((0, rows - len(x)), (0, 0)), constant_values=np.nan) for x in (predicted, true)
     ]
@@ -109,19 +114,41 @@ def _share(found: Array, counted: Array) -> float:
     return float(found[counted].mean()) if counted.any() else np.nan
 
 
+def round_bodies(object_id: Array) -> Array:
+    """Return the thickness of bodies that are round over the masks of ids above 0, pixels, (H, W).
+
+    That is 2 sqrt(e (2 r - e)), where e is the distance of a pixel from the border of its mask, and
+    r the largest one in the mask.
+    """
+    from scipy.ndimage import distance_transform_edt, find_objects
+
+    thickness = np.zeros(object_id.shape)
+    for k, place in enumerate(find_objects(np.maximum(object_id, 0)), start=1):
+        if place is not None:
+            own = object_id[place] == k
+            inner = distance_transform_edt(np.pad(own, 1))[1:-1, 1:-1]
+            body = 2.0 * np.sqrt(inner * (2.0 * inner.max() - inner))
+            thickness[place] = np.where(own, body, thickness[place])
+    return thickness
+
+
 def shortcuts(
-    front: Array, object_id: Array, score: Callable[[Spans], float], thickness: Array, size: Array
-) -> tuple[float, float, float]:
+    front: Array,
+    object_id: Array,
+    score: Callable[[Spans], float],
+    thickness: Array,
+    units: Sequence[Array],
+) -> list[float]:
     """Return the `solid_iou` of guesses that know each object's mask and front, and no shape.
 
-    They are one thickness, a thickness by size, and the mirrored front.
+    They are thicknesses proportional to each of the units, (N,), and the mirrored front.
 
     Args:
         front: true depth of the first layer, (N,).
         object_id: whose it is; above 0 for objects, (N,).
         score: of spans.
         thickness: true length of the first span in planar depth, (N,); NaN where there is none.
-        size: of the object in the image, as a length at its depth, (N,).
+        units: what a thickness may be proportional to, (N,) each.
     """
     objects = object_id > 0
     mirror = np.full(len(front), np.nan)
@@ -139,7 +166,7 @@ def shortcuts(
         return max(score(_slab(front, objects, f * unit)) for f in np.quantile(factors, SHARES))
 
     mirrored = score(_slab(front, objects, mirror))
-    return best(np.ones_like(front)), best(size), mirrored
+    return [*map(best, units), mirrored]
 
 
 def _slab(front: Array, objects: Array, thickness: Array) -> Spans:

@@ -1,7 +1,7 @@
 """Scores of layers of one image: predicted surfaces along its rays against all true ones."""
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from metrics.measures import solids
 from metrics.measures.alignment import scale_and_shift
 from metrics.measures.surfaces.chamfer_hausdorff import chamfer, nearest_distances
-from metrics.scoring.metric_names import CONSTANT, MIRRORED, SIZED, metric
+from metrics.scoring.metric_names import CONSTANT, INFLATED, MIRRORED, SIZED, metric
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import refuse_pixels
@@ -31,12 +31,14 @@ class TrueLayers:
         scored: these pixels, (H, W).
         rays: their directions in the camera frame, (N, 3); z is -1.
         pixel: side of a pixel at depth 1.
+        round: as `solids.round_bodies`, (N,).
         depth, object_id, entering: (L, N), as stored.
     """
 
     scored: NDArray[np.bool_]
     rays: Array
     pixel: float
+    round: Array
     depth: Array
     object_id: NDArray[np.int8]
     entering: NDArray[np.int8]
@@ -60,19 +62,28 @@ class TrueLayers:
 
     def iou(self, predicted: solids.Spans) -> float:
         """Return `solid_iou` of spans."""
-        return solids.solid_iou(predicted, self.spans, np.linalg.norm(self.rays, axis=1))
+        return solids.solid_iou(predicted, self.spans, self.stretch)
+
+    @cached_property
+    def stretch(self) -> Array:
+        """Lengths of the rays' directions, (N,)."""
+        return np.asarray(np.sqrt(np.square(self.rays).sum(axis=1)))
 
     def floors(self) -> dict[str, float]:
         """Return what guesses score that know masks and fronts, by name."""
-        names = [f"{begins}solid_iou" for begins in (CONSTANT, SIZED, MIRRORED)]
+        names = [f"{begins}solid_iou" for begins in (CONSTANT, SIZED, INFLATED, MIRRORED)]
         if not self.shows_solids:
             return dict.fromkeys(names, np.nan)
-        front, ids = self.depth[0], self.object_id[0]
+        at = (self.object_id[0] > 0) | np.isfinite(self.spans[1][0])
+        front, ids, stretch = self.depth[0, at], self.object_id[0, at], self.stretch[at]
+        spans = self.spans[0][:, at], self.spans[1][:, at]
         with np.errstate(invalid="ignore"):
-            thickness = (self.visible[1] - self.visible[0])[0]
+            thickness = (self.visible[1] - self.visible[0])[0, at]
         pixels = np.bincount(ids[ids > 0], minlength=128)[np.maximum(ids, 0)]
-        size = np.sqrt(np.maximum(pixels, 1)) * self.pixel * front
-        scores = solids.shortcuts(front, ids, self.iou, thickness, size)
+        units = [np.ones_like(front), np.sqrt(pixels) * self.pixel * front]
+        units.append(self.round[at] * self.pixel * front)
+        score = partial(solids.solid_iou, true=spans, stretch=stretch)
+        scores = solids.shortcuts(front, ids, score, thickness, units)
         return dict(zip(names, scores, strict=True))
 
 
@@ -84,7 +95,8 @@ def read_true_layers(truth: RoomsFile, row: int, view: TrueView) -> TrueLayers:
     scored = view.mask & ~((ids > 0) & (entering == 0)).any(axis=0)
     layers = depth[:, scored].astype(np.float64), ids[:, scored], entering[:, scored]
     rays = pixel_directions(*scored.shape, view.fov_y_degrees)[scored]
-    return TrueLayers(scored, rays, pixel_size(len(scored), view.fov_y_degrees), *layers)
+    pixel, bodies = pixel_size(len(scored), view.fov_y_degrees), solids.round_bodies(view.object_id)
+    return TrueLayers(scored, rays, pixel, bodies[scored], *layers)
 
 
 def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float]:
@@ -95,6 +107,7 @@ def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float
     """
     refuse_pixels(PredictionError, "predicted layers", "layers", predicted.geometry, truth.scored)
     layers = predicted.geometry[truth.scored].T
+    layers = layers[: max(2, np.isfinite(layers).any(axis=1).sum())]
     of_objects = truth.object_id > 0
     seen = np.isfinite(layers[0]) & of_objects[0]
     scale, shift = scale_and_shift(layers[0, seen], truth.depth[0, seen], predicted.alignment)
@@ -126,7 +139,5 @@ def worst_of_layers(truth: TrueLayers) -> dict[str, float]:
 def _points(truth: TrueLayers, depth: Array) -> Array:
     """Return the points of layers (K, N) that are finite, of every second, third, ... ray."""
     some = np.s_[:: max(1, -(-len(truth.rays) // MOST_RAYS))]
-    there = np.isfinite(depth[:, some])
-    return np.asarray(
-        (truth.rays[None, some] * np.where(there, depth[:, some], 0.0)[..., None])[there]
-    )
+    layer, ray = np.nonzero(np.isfinite(depth[:, some]))
+    return np.asarray(truth.rays[some][ray] * depth[:, some][layer, ray, None])

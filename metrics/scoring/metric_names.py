@@ -50,7 +50,8 @@ EMPTY_ROOM, CUT_OUT, LEANING = "empty_room_", "cut_out_", "leaning_"
 BALLS, BLOCKS, FLAT, RAMP = "balls_", "blocks_", "flat_", "ramp_"
 OTHER_SCENE, HALF, LIFTED = "other_scene_", "half_resolution_", "lifted_"
 RANDOM_ORDER, EDGE_DISTANCE = "random_order_", "edge_distance_"
-CONSTANT, SIZED, MIRRORED = "constant_thickness_", "size_thickness_", "mirrored_front_"
+CONSTANT, SIZED = "constant_thickness_", "size_thickness_"
+INFLATED, MIRRORED = "inflated_mask_", "mirrored_front_"
 _GIVEN = " behind the true front, in the true mask, by the factor that is best for the image."
 _BLIND = (
     " without the image, fitted as predictions are; by least squares in place of L1, and by scale"
@@ -98,6 +99,10 @@ BASELINES = {
     SIZED: Baseline(
         "thickness by size", "true masks and fronts, thickness by the size of the mask",
         f"a thickness proportional to the square root of the mask's area{_GIVEN}",
+    ),
+    INFLATED: Baseline(
+        "inflated masks", "true masks and fronts, as thick as round bodies",
+        f"bodies that are round over the masks, as thick as 2 sqrt(e (2 r - e)){_GIVEN}",
     ),
     MIRRORED: Baseline(
         "mirrored front", "true masks and fronts, mirrored",
@@ -464,7 +469,7 @@ TABLE: Sequence[Metric] = (
            "length of the rays that is inside objects in prediction and ground truth, divided by"
            " that inside either.",
            headline={"rooms": 7, "interiors": 7}, printed=7,
-           baselines=(CONSTANT, SIZED, MIRRORED), **_LAYERS),
+           baselines=(CONSTANT, SIZED, INFLATED, MIRRORED), **_LAYERS),
     _error("back_depth_error", "Back depth error",
            "mean absolute error of the depth at which rays leave the first visible solid.",
            headline={"rooms": 8, "interiors": 8}, printed=8, **_LAYERS),

@@ -311,7 +311,7 @@ class LayerScorer:
             name: np.array([[run[name] for run in runs] for runs in images]).T
             for name in images[0][0]
         }
-        none = {name: np.zeros((len(self._files), 0)) for name in OBJECT_SCORES}
+        none: dict[str, Array] = {name: np.zeros((len(self._files), 0)) for name in OBJECT_SCORES}
         none |= dict.fromkeys(OBJECT_COLUMNS, np.zeros(0, np.int64))
         of_truth = {name: np.array([row[name] for row in floors]) for name in floors[0]}
         return ScoredRows(scores, of_truth, none, bad, digests)
