@@ -168,7 +168,7 @@ def baseline(
     method = name
     if name in REFERENCE:
         used = predict_to(out, weights, data, method=name, overwrite=overwrite)
-        method += f", weights {used},"
+        method += f", weights {used}"
     elif name == "chance":
         from baselines.trivial import write_chance
 
@@ -198,7 +198,8 @@ def baseline(
                 from baselines.trivial import write_room_baseline
 
                 write_room_baseline(name, data, out, train=train, **how)
-    print_line(f"{out}: {method} on {data}; {how_to_score(out, data)}")
+    print_line(f"{out}: {method}, on {data}")
+    print_line(how_to_score(out, data))
 
 
 def _check_options(
@@ -329,7 +330,8 @@ def train_baseline(
         weights = train(home, files, out, made, machine, resume=resume, progress=remember, **how)
     reached = f" ({text})" if text else ""
     use = f"bench baseline {name} --weights {shlex.quote(str(weights))} --data ..."
-    print_line(f"{weights}: {name} trained on {files.where}{reached}; now `{use}`")
+    print_line(f"{weights}: {name} trained on {files.where}{reached}")
+    print_line(f"now: {use}")
 
 
 def _baseline(name: str) -> "Baseline":

@@ -218,9 +218,8 @@ def train(
         raise
     if weights is not None:  # None in all processes but the first
         named = shlex.quote(str(weights))
-        print_line(
-            f"{weights}: trained on {files.where}; now `pix2shape predict --weights {named} ...`"
-        )
+        print_line(f"{weights}: trained on {files.where}")
+        print_line(f"now: pix2shape predict --weights {named} --data ...")
 
 
 def training_data(paths: tuple[str, ...], stream: str | None, allow_test_set: bool) -> Any:
@@ -299,7 +298,8 @@ def predict(
     All views of a room are predicted from its first view and the cameras.
     """
     weights = predict_to(out, weights, data, run=run, device=device, overwrite=overwrite)
-    print_line(f"{out}: {weights} on {data}; {how_to_score(out, data)}")
+    print_line(f"{out}: {weights} on {data}")
+    print_line(how_to_score(out, data))
 
 
 def predict_to(
@@ -334,8 +334,8 @@ def shown_rows() -> Iterator[Callable[[int, int], None]]:
 
 
 def how_to_score(out: str, data: str) -> str:
-    """Return what is said after a submission was written."""
-    return f"score it with `{shlex.join(['bench', 'score', out, '--truth', data])}`"
+    """Return the next command, which is printed after predictions."""
+    return f"now: {shlex.join(['bench', 'score', out, '--truth', data])}"
 
 
 def needs_torch(who: str = "pix2shape", packages: tuple[str, ...] = PACKAGES) -> None:

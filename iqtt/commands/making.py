@@ -216,8 +216,8 @@ def make_split(
         f" {count / seconds:.0f} questions/s"
     )
     print_line(
-        f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} proposed views"
-        f" hid a cube and were refused"
+        f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} sampled views"
+        " hid a cube and were rejected"
     )
     if spec.test and secret_seed is None:
         click.echo(KNOWN_SEED, err=True)

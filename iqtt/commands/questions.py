@@ -224,7 +224,9 @@ def floors(
         for floor, tried in zip(measured.floors, probes, strict=True):
             best = sorted(tried, key=lambda probe: -probe.accuracy)[:3]
             shown = "; ".join(f"{p.statistic}, {p.rule} {p.accuracy:.3f}" for p in best)
-            print_line(f"{floor.kind}: {floor.accuracy:.3f}, {floor.probe} (best: {shown})")
+            print_line(
+                f"{floor.kind}: {floor.accuracy:.3f}, {floor.probe}; best classifiers: {shown}"
+            )
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt verify iqtt-split --items 20")

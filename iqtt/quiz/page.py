@@ -35,7 +35,7 @@ PAGE = """<!doctype html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="robots" content="noindex">
 <meta http-equiv="Content-Security-Policy" content="{policy}">
-<title>Which one is it, turned? A quiz about shapes</title>
+<title>Which shape is the same, rotated? A quiz</title>
 <link rel="icon" href="data:,">
 <style>{style}</style>
 </head>

@@ -28,11 +28,12 @@ def _list() -> None:
         print_line(f"{name}: {files[0].purpose}")
         print_line(f"  {files[0].command}")
         for test in files:
-            print_line(f"  {test.digest}  {test.rows:,} rows, {test.file}")
-    print_line("made by older versions, whose bits were others:")
+            items = "questions" if test.task == "iqtt" else "images"
+            print_line(f"  {test.digest}  {test.rows:,} {items}, {test.file}")
+    print_line("superseded, made by older versions with different content:")
     for test in known_tests.KNOWN_TESTS:
         if test.superseded:
-            print_line(f"  {test.digest}  {test.rows:,} rows, {test.name}")
+            print_line(f"  {test.digest}  {test.rows:,} items, {test.name}")
 
 
 @sets_command.command("make", epilog=EXAMPLE + "bench sets make rooms-1 --out sets")
@@ -50,7 +51,7 @@ def make(name: str, out: str, workers: int) -> None:
     from scenegen.common.names import check_choice
 
     sets = known_tests.sets()
-    check_choice("set", name, sets)
+    check_choice("benchmark", name, sets)
     folder, files = Path(out), sets[name]
     if not all((folder / test.file).exists() for test in files):
         folder.mkdir(parents=True, exist_ok=True)
@@ -59,9 +60,9 @@ def make(name: str, out: str, workers: int) -> None:
         _run(words)
     wrong = [test.file for test in files if not _is_published(folder, test)]
     if wrong:
-        print_line(f"{name}: not the published set: {', '.join(wrong)}")
+        print_line(f"{name}: differs from the published benchmark: {', '.join(wrong)}")
         sys.exit(1)
-    print_line(f"{name}: the published set")
+    print_line(f"{name}: equals the published benchmark")
 
 
 def _run(words: list[str]) -> Any:
@@ -83,14 +84,15 @@ def _is_published(folder: Path, test: Any) -> bool:
     from metrics.scoring.truth_digests import file_digests
 
     truth, pictures, rows = file_digests(folder / test.file, test.task)
-    found = {"rows": rows, "truth": truth, "pictures": pictures}
-    published = {"rows": test.rows, "truth": test.digest, "pictures": test.pictures}
+    found = {"items": rows, "truth hash": truth, "image hash": pictures}
+    published = {"items": test.rows, "truth hash": test.digest, "image hash": test.pictures}
     if not test.pictures:  # path-traced: `scenegen verify` compares them within a tolerance
-        del found["pictures"], published["pictures"]
+        del found["image hash"], published["image hash"]
     print_line(f"{folder / test.file}:")
     for name, value in found.items():
         same = value == published[name]
-        print_line(f"  {name} {value}, {'as published' if same else f'not {published[name]}'}")
+        outcome = "as published" if same else f"published {published[name]}"
+        print_line(f"  {name} {value}, {outcome}")
     return found == published
 
 

@@ -131,9 +131,10 @@ def score(
     from metrics.score_file import write_scores
     from metrics.scoring.evaluate import open_runs, score_runs
     from metrics.scoring.runs import Settings, scorer_versions
+    from metrics.submissions.hints.depth import SCALE
     from metrics.submissions.validation import hints
     from metrics.views.report import html_report, read_beside
-    from metrics.views.score_tables import text_report, write_csv
+    from metrics.views.score_tables import text_report, unit_warning, write_csv
     from scenegen.files.new_file import check_writable, write_text
 
     paths = (json_path, csv_path, html_path, figure_path)
@@ -157,7 +158,10 @@ def score(
             options = Settings(**settings, cluster=cluster, protocol=protocol)
             scores = score_runs(runs, options, bar.update)
         for file in runs.files:
-            for hint in hints(file, runs.truth):
+            found = hints(file, runs.truth)
+            if unit_warning(scores):  # which the report begins with
+                found = [hint for hint in found if not hint.found.startswith(SCALE)]
+            for hint in found:
                 print_line(f"hint: {file.path}: {hint}", err=True)
         if json_path:
             write_scores(scores, json_path, overwrite)

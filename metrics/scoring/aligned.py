@@ -102,9 +102,9 @@ def again(alignment: Alignment) -> str:
 
 
 def left_out(files: Sequence[ScoreFile], shown: Sequence[str]) -> list[str]:
-    """Return in a sentence which headline scores of files, as scored, `aligned` cannot compare."""
+    """Return which main metrics of files, as scored, `aligned` cannot compare."""
     lost = [n for n in files[0].headline if n not in shown and any(n in f.items for f in files)]
     if not lost or len({file.alignment for file in files}) < 2:
         return []
     advice = again(common_alignment(_declared(files)))
-    return [f"not compared: {', '.join(lost)}, as the files have other alignments: {advice}"]
+    return [f"not compared: {', '.join(lost)}, because the declared alignments differ; {advice}"]

@@ -56,45 +56,45 @@ _BLIND = (
 )
 BASELINES = {
     EMPTY_ROOM: Baseline(
-        "empty room", "room without objects", "the empty room, drawn from the true camera.",
+        "empty room", "no objects", "the empty room, drawn from the true camera.",
         needs="no_view",
     ),
     CUT_OUT: Baseline(
-        "cut-out", "each object flat at its true median depth",
+        "cut-out", "flat objects at their true depth",
         "flat cut-outs, each at its object's median depth; of normals, each object's mean true"
         " normal.",
     ),
     LEANING: Baseline(
-        "leaning cut-out", "a cut-out that leans half as much as the wall behind it",
+        "leaning cut-out", "cut-out slanted half as much as the wall behind it",
         "cut-outs slanted half as much as the walls behind them, in closed rooms only.",
     ),
     LIFTED: Baseline(
-        "lifted masks", "true masks, moved before the empty room by one fitted distance",
+        "lifted masks", "true masks at one fitted distance",
         "the true masks of objects, moved in front of the empty room by one distance that is fitted"
         " to the ground truth of each image.",
     ),
     FLAT: Baseline(
-        "constant", "one depth for all pixels, fitted as predictions are",
+        "constant", "one fitted depth per image",
         f"one depth for all pixels,{_BLIND}",
     ),
     RAMP: Baseline(
-        "ramp", "depth that falls to the lower edge, fitted as predictions are",
+        "ramp", "depth that falls linearly to the bottom edge, fitted",
         f"depth that falls evenly to the lower image border,{_BLIND}",
     ),
     BALLS: Baseline(
-        "balls", "a ball for each object of the first view",
+        "balls", "a sphere proxy per object of the first view",
         "sphere proxies of the first view's objects.", needs="first_view",
     ),
     BLOCKS: Baseline(
-        "blocks", "a block for each object of the first view",
+        "blocks", "a box proxy per object of the first view",
         "box proxies of the first view's objects.", needs="first_view",
     ),
     HALF: Baseline(
-        "half resolution", "the true depth at half the resolution, enlarged again",
+        "half resolution", "ground-truth depth, downsampled and upsampled by 2",
         "the true depth, averaged over 2 x 2 pixels and enlarged bilinearly.",
     ),
     OTHER_SCENE: Baseline(
-        "shuffled", "this prediction against another scene",
+        "shuffled", "another scene",
         "the same prediction against the relief of another scene in the same view.",
         of_truth=False,
     ),
@@ -103,7 +103,7 @@ BASELINES = {
         "a confidence in random order.", of_truth=False,
     ),
     EDGE_DISTANCE: Baseline(
-        "edge distance", "distance to the nearest edge of the image's brightness as confidence",
+        "edge distance", "distance to the nearest brightness edge as confidence",
         "the distance from the nearest brightness edge as confidence.", of_truth=False,
     ),
 }  # fmt: skip

@@ -163,7 +163,7 @@ def draw_sparsification(path: Target, curves: Array, width: float = COLUMN) -> N
     with _figure(path, False, width, 0.7 * width) as axes:
         for curve, name, (color, _) in zip(curves, names, LOOKS[1:], strict=False):
             axes.plot(100.0 * REMOVED, curve, color=color, label=name)
-        axes.set(xlabel="pixels left out (%), the least sure first", ylabel="AbsRel of the rest")
+        axes.set(xlabel="removed pixels (%), least confident first", ylabel="AbsRel of the rest")
         axes.set_ylim(bottom=0.0)
         _legend(axes)
 
@@ -283,7 +283,7 @@ def _common(files: Sequence[ScoreFile], name: str) -> str:
     """Return the score that is drawn. Raises FigureError."""
     tasks = {file.task for file in files}
     if len(tasks) > 1:
-        raise FigureError(files[-1].place, "scores of rooms and of questions", "one kind")
+        raise FigureError(files[-1].place, "scores of rooms and of questions", "files of one task")
     names = [name] if name else HEADLINE[files[0].kind]
     for candidate in names:
         if all(candidate in file.metrics for file in files):
@@ -292,7 +292,7 @@ def _common(files: Sequence[ScoreFile], name: str) -> str:
     asked = name or names[0]
     hint = did_you_mean(asked, lacking.metrics)
     raise FigureError(
-        lacking.place, f"no score {asked}", "one that `bench score --all` prints", hint
+        lacking.place, f"no metric {asked}", "one that `bench score --all` prints", hint
     )
 
 
@@ -340,10 +340,10 @@ def _legend(axes: Any) -> None:
 
 def _words(by: str, task: str) -> str:
     if by == "angle":
-        what = "degrees from the first view" if task == "rooms" else "degrees of rotation"
+        what = "angle to the first view (degrees)" if task == "rooms" else "rotation (degrees)"
     else:
-        what = {"kind": "shape" if task == "rooms" else "kind of question"}.get(by, "")
-        what = what or "share of the picture, percent"
+        what = {"kind": "shape" if task == "rooms" else "distractor type"}.get(by, "")
+        what = what or "area in the image (percent)"
     return what
 
 

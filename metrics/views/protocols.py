@@ -21,11 +21,10 @@ def protocols_report(
     left_out = [p.name for p in PROTOCOLS if p.name not in {file.protocol for file in scores}]
     notes = [
         f"[low, high]: {INTERVAL} over {scores[0].unit}; 1 unit is 1 m",
-        "numbers of two protocols are not comparable; bench score --protocol NAME --json keeps one",
+        "values of two protocols are not comparable; bench score --protocol NAME --json stores one",
     ]
     if left_out:
-        why = "they suit neither these images nor what is predicted"
-        notes.append(f"left out, as {why}: {', '.join(left_out)}")
+        notes.append(f"protocols that do not apply to these images: {', '.join(left_out)}")
     form = to_markdown if as_markdown else to_text
     first = scores[0]
     title = f"{plain(first.method)} on {plain(first.meta.truth_path)}: {size_of(first)}"
@@ -44,7 +43,7 @@ def protocols_table(scores: Sequence[ScoreFile]) -> Table:
         # Its baseline beside the first score; that of the others is in the tables of one protocol.
         scored.insert(1, baseline_cell(file, names[0]))
         rows.append([protocol.name, file.alignment, limits, share, *scored])
-    head = ("protocol", "alignment", "metres", "pixels", names[0], "its baseline", *names[1:])
+    head = ("protocol", "alignment", "metres", "pixels", names[0], "baseline", *names[1:])
     return make_table("", head, rows)
 
 

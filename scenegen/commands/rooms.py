@@ -57,7 +57,7 @@ def preview(
         rows = pick_rows(len(rooms), items, number, seed)
         sheet = contact_sheet([rooms[i] for i in rows])
     save_picture(sheet, out, overwrite)
-    print_line(f"{out}: {len(rows)} of {file}'s rooms")
+    print_line(f"{out}: {len(rows)} images of {file}")
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen info rooms.h5")

@@ -32,7 +32,7 @@ IMAGE_DTYPES = ("uint8", "float16", "float32")
 BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES + FURNITURE_NAMES}
 FOLDERS = ("shapenet-v1", "shapenet-v2", "folder")
 SPLITS = ("all", "train", "val", "test")
-TRUTHS = ("amodal", "coordinates", "flow", "albedo")
+TRUTHS = ("amodal", "coordinates", "flow", "albedo", "layers")
 MAX_CLASSES = 4000  # their names are an attribute, of which HDF5 allows 64 kB
 MAX_LIGHTS = 16
 MAX_PIXELS = 4096 * 4096
@@ -134,7 +134,8 @@ class RoomSpec:
         (),
         "Additional ground truth to store, comma-separated. amodal: masks of whole objects and"
         " their visible fractions; coordinates: object coordinates (NOCS); flow: optical flow to"
-        " the next view, with occlusion; albedo: reflectance of each pixel",
+        " the next view, with occlusion; albedo: reflectance of each pixel; layers: all surfaces"
+        " along each ray, up to 16",
         later=True, option="with", shown="none",
     )  # fmt: skip
 

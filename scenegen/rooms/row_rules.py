@@ -32,19 +32,21 @@ OUTSIDE = 0.25  # metres beyond the inner walls to which windows reach
 LOBE_TOLERANCE = 4e-7  # relative rounding of a highlight for each unit of its exponent
 PIXELS = ("image", "depth", "normal", "object_id")
 _RULES = {
-    "description": "the scene's JSON can be read and agrees with the arrays",
-    "depth": "finite and positive where something is hit, NaN elsewhere",
-    "normal": "unit and facing the viewer where something is hit, zero elsewhere",
-    "object_id": "from -1 to the object count; every object shows enough pixels",
-    "image": "finite, not negative, and the shading equation of the other values",
+    "description": "the JSON of the scene is readable and agrees with the arrays",
+    "depth": "finite and positive on surfaces, NaN elsewhere",
+    "normal": "unit length and facing the viewer on surfaces, zero elsewhere",
+    "object_id": "from -1 to the object count; every object has enough visible pixels",
+    "image": "finite, not negative, and equal to the shading equation",
 }
 
 
 _FURTHER_RULES = {
-    "amodal": "masks hold what shows, stay in bounding spheres and give the visible fractions",
-    "coordinates": "they follow from depth and poses",
-    "flow": "flow and occlusion follow from depth and cameras",
+    "amodal": "masks contain the visible pixels, stay in bounding spheres and give the visible"
+    " fractions",
+    "coordinates": "agree with depth and poses",
+    "flow": "flow and occlusion agree with depth and cameras",
     "albedo": "reflectance of the object ids",
+    "layers": "in order, begin with depth and object ids, and enter and leave objects in turn",
 }
 
 

@@ -276,22 +276,23 @@ def _notes(
     for file, label in zip(files, labels, strict=True):
         if not file.comparable:
             why = "; ".join(map(plain, file.warnings))
-            yield f"{label} says that it is not comparable{': ' if why else ''}{why}"
+            yield f"{label}: {why or 'not comparable'}"
         if file.runs > 1:
             yield (
-                f"{label}: means over {file.runs} training runs; the tests ask whether these runs"
-                " differ, not whether other runs would"
+                f"{label}: mean of {file.runs} training runs; the tests hold for these runs, not"
+                " for"
+                " training in general"
             )
         if file.declared is not None:
             yield f"{label} declares {file.declared}, and is scored after {file.alignment}"
         for submission in file.meta.submissions:
             if seen.setdefault(submission.sha256, label) != label:
-                yield f"{label} and {seen[submission.sha256]} were scored from the same submission"
+                yield f"{label} and {seen[submission.sha256]} are scores of the same predictions"
     if not all(file.comparable for file in files):
-        unit = "questions" if files[0].task == "iqtt" else "rows"
-        yield f"compared over the {items} {unit} that all of the files score"
+        unit = "questions" if files[0].task == "iqtt" else "images"
+        yield f"compared over the {items} {unit} that all files score"
     if files[0].task != "iqtt" and least_p_value(clusters) > ALPHA:
         yield (
-            f"{clusters} {files[0].unit} cannot show any difference: the least possible p-value is"
-            f" {least_p_value(clusters):.3g}"
+            f"no verdict is possible with {clusters} {files[0].unit}: the smallest possible p-value"
+            f" is {least_p_value(clusters):.3g}"
         )

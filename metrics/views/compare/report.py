@@ -33,7 +33,7 @@ def text_report(
     as_markdown: bool = False,
     width: int | None = None,
 ) -> str:
-    """Return the skills of all methods, then a table of differences in each score; and a legend.
+    """Return the skills of all methods, a table of differences in each metric, and notes.
 
     Sentences are wrapped to lines of `width` characters, where it is given.
     """
@@ -75,7 +75,7 @@ def to_json(comparison: Comparison) -> str:
 
 
 def difference_tables(comparison: Comparison) -> Iterator[Table]:
-    """Yield for each score the methods' differences from the reference, with the paired tests."""
+    """Yield for each metric the differences from the reference, with the paired tests."""
     for name in dict.fromkeys(d.metric for d in comparison.differences):
         differences = [d for d in comparison.differences if d.metric == name]
         first = differences[0]
@@ -110,7 +110,7 @@ def _probability(p: float) -> str:
 
 
 def _title(comparison: Comparison) -> str:
-    """Return with what methods are compared, and over how many items of which truth."""
+    """Return the reference, and how many items of which ground truth are compared."""
     size = f"{comparison.items:,} questions"
     if comparison.task == "rooms":
         size = f"{comparison.items:,} images of {comparison.clusters:,} scenes"
@@ -120,11 +120,10 @@ def _title(comparison: Comparison) -> str:
         size += groups * (comparison.clusters < comparison.items)
     test = known_test(comparison.truth_digest)
     truth = test.name if test else comparison.truth_digest[:12]
-    title = f"Against {comparison.reference}, over {size} (truth {truth})"
+    title = f"Compared with {comparison.reference}: {size}, ground truth {truth}"
     if comparison.task == "iqtt":
         return title
-    how = "as predicted" if comparison.alignment == "none" else f"after {comparison.alignment}"
-    return f"{title}, all methods scored {how}"
+    return f"{title}   alignment: {comparison.alignment}"
 
 
 def _units(comparison: Comparison) -> tuple[str, str]:
@@ -136,27 +135,28 @@ def _units(comparison: Comparison) -> tuple[str, str]:
 def _warnings(comparison: Comparison) -> list[str]:
     items, _ = _units(comparison)
     few = [] if items == "questions" else too_few_warning(comparison.clusters, items)
-    return ["not comparable, compared all the same"] * (not comparison.comparable) + few
+    return ["some scores are not comparable, see below"] * (not comparison.comparable) + few
 
 
 def _notes(comparison: Comparison, files: Sequence[ScoreFile]) -> list[str]:
-    """Return in sentences what the columns say, and what else has to be known."""
+    """Return what the columns mean, and notes on the files."""
     tests = {d.test for d in comparison.differences}
     items, apart = _units(comparison)
     if len(tests) > 1:
-        test = "exact McNemar test; sign flips for means over several runs"
+        test = "exact McNemar test, or sign flips for means over several runs"
     elif tests == {SIGN_FLIP}:
-        test = f"sign flips of the differences of each {apart[:-1]}"
+        test = f"sign flips per {apart[:-1]}"
     else:
         test = "exact McNemar test"
     return [
         *skill_notes(files[0]),
-        f"difference: method - reference, paired, with its {CONFIDENCE:.0%} bootstrap CI over"
-        f" {apart}, not corrected",
-        f"better/worse/same: {items}. p: {test}, two-sided; Holm: corrected for"
-        f" {len(comparison.differences)} comparisons; verdicts at {ALPHA:.0%}",
-        f"min. detectable: what this test set would show in {POWER:.0%} of cases after the"
-        " correction, as the differences spread here; none: no difference, or none can be told",
+        f"difference: method - reference, paired, with its uncorrected {CONFIDENCE:.0%} bootstrap"
+        " CI"
+        f" over {apart}",
+        f"better/worse/same: number of {items}; p: {test}, two-sided; Holm: corrected for"
+        f" {len(comparison.differences)} comparisons; verdict: at {ALPHA:.0%}",
+        f"min. detectable: smallest difference that this test set detects with {POWER:.0%} power"
+        " after the correction",
         *unread_notes(files),
         *comparison.notes,
     ]

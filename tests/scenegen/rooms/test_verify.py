@@ -54,7 +54,7 @@ def test_a_good_file_passes(verdict, request, which):
     path = request.getfixturevalue(which)
     code, checks, output = verdict(path)
     assert (code, set(checks.values()), set(checks)) == (0, {"ok"}, ALL)
-    assert output.splitlines()[-1] == f"{path}: verified"
+    assert output.splitlines()[0] == f"{path}: verified"
     assert "bit for bit" in output
 
 

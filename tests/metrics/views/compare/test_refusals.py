@@ -76,7 +76,7 @@ def test_scores_of_an_older_format_compare_where_their_definition_is_the_same():
 def test_files_that_are_not_comparable_need_leave():
     part = without(rooms("b", shift=0.1), [0, 1])
     for files in ([A, part], [part, A]):
-        with refused(ComparisonError, "b.json", "only 4 of 6 rows", hint="--allow-incomparable"):
+        with refused(ComparisonError, "b.json", "only 4 of 6 images", hint="--allow-incomparable"):
             compare(files, ["chamfer"])
         found = compare(files, ["chamfer"], allow_incomparable=True)
         assert (found.items, found.clusters, found.comparable) == (4, 2, False)
