@@ -116,6 +116,12 @@ def read_as(
 @click.option("--depth", "pattern", metavar="FILES",
               help="Predictions: a folder, a quoted pattern such as 'out/*.png', or one NPY or NPZ"
               " file with all images. Formats: PNG, TIFF, EXR, PFM, NPY and NPZ.")
+@click.option("--layers", metavar="FILES",
+              help="Predictions of hidden surfaces, too: NPY or NPZ files with depths (h, w, L) or"
+              " points (h, w, L, 3), nearest first, NaN behind the last layer.")
+@click.option("--meshes", metavar="FILES",
+              help="Predictions of whole objects: a GLB, PLY or OBJ file per image, in the frame of"
+              " the camera. They are cast along the rays of the pixels.")
 @reading_options(*DEPTH_KINDS, "points")
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
               help="Alignment that the predictions need: what the method cannot determine [default:"
@@ -149,7 +155,8 @@ def import_(
     pattern: str | None, alignment: Any, missing: Any, normals: str | None, shown: Any,
     answers: str | None, people: str | None, truth: str, out: str, method: str | None,
     run_name: str, notes: str, overwrite: bool, expanded: tuple[str, ...],
-    confidence: str | None, confidence_is: str, **numbers: Any,
+    confidence: str | None, confidence_is: str, layers: str | None, meshes: str | None,
+    **numbers: Any,
 ) -> None:
     """Import predictions from files.
 
@@ -162,8 +169,9 @@ def import_(
     if expanded:
         found = f"{expanded[0]} beside the options, as where a shell expands a pattern"
         raise click.UsageError(f"found {found}; put patterns in quotes, such as 'out/*.png'")
-    if sum(source is not None for source in (pattern, answers, people)) != 1:
-        raise click.UsageError("give --depth for rooms, or --responses or --quiz for questions")
+    if sum(source is not None for source in (pattern, layers, meshes, answers, people)) != 1:
+        ways = "--depth, --layers or --meshes for rooms"
+        raise click.UsageError(f"give {ways}, or --responses or --quiz for questions")
     if people is not None:
         from metrics.intake.answers.quiz_answers import import_quiz
         from metrics.intake.folders import files_of
@@ -180,17 +188,23 @@ def import_(
     if answers is not None:
         _import_answers(answers, truth, out, method, texts)
         return
+    pattern = pattern or layers or meshes
     assert pattern is not None
     from metrics.intake.importing import import_rooms
+    from metrics.intake.meshes import import_meshes
     from metrics.measured.reader import open_images
 
     numbers["surer"] = "less" if confidence_is == "error" else "more"
-    reading = read_as(alignment=alignment, missing=missing, **numbers)
+    reading = read_as(alignment=alignment, missing=missing, layered=layers is not None, **numbers)
+    importing: Callable[..., str] = import_rooms
+    more = {"normals": normals, "confidence": confidence}
+    if meshes is not None:
+        importing, more = import_meshes, {}
     with open_images(truth) as rooms:
         with progress_bar(len(rooms), "image") as bar:
-            how = import_rooms(
+            how = importing(
                 pattern, rooms, out, method=method or _name_of(pattern), reading=reading,
-                normals=normals, confidence=confidence, shown=shown, progress=bar.update, **texts,
+                shown=shown, progress=bar.update, **more, **texts,
             )
         print_line(f"{out}: {how}")
         _print_hints(out, rooms)
