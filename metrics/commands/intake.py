@@ -316,6 +316,8 @@ def run(
     points_scale_invariant, depth_scale_invariant: up to a factor
     points_affine_invariant, depth_affine_invariant: up to a factor and a shift
     disparity_affine_invariant: 1 / depth, up to a factor and a shift
+    layers_metric, layers_scale_invariant, layers_affine_invariant: depths of all surfaces along
+    each ray, (h, w, L), or points (h, w, L, 3)
 
     Re-run the same command to resume an interrupted run.
     """

@@ -83,10 +83,10 @@ class Reading:
         """
         if self.layered:
             depth = layers_of(stored, "layers", self.frame)
+            depth[np.isin(depth, self.invalid)] = np.nan
             if self.kind == "distance":
                 depth = planar_from_distance(depth, rays(*depth.shape[:2])[:, :, None])
-            depth = np.where(np.isin(depth, self.invalid), np.nan, depth * self.scale)
-            return Geometry("layers", self.alignment or "none", depth)
+            return Geometry("layers", self.alignment or "none", depth * self.scale)
         values = image_of(stored, self.kind, vectors=self.kind == "points")
         marks = np.asarray(self.invalid)
         if stored.dtype.kind == "f":  # in which a mark such as 255.996 has fewer digits
