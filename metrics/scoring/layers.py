@@ -94,7 +94,8 @@ def read_true_layers(truth: RoomsFile, row: int, view: TrueView) -> TrueLayers:
     )
     scored = view.mask & ~((ids > 0) & (entering == 0)).any(axis=0)
     layers = depth[:, scored].astype(np.float64), ids[:, scored], entering[:, scored]
-    rays = pixel_directions(*scored.shape, view.fov_y_degrees)[scored]
+    height, width = scored.shape
+    rays = pixel_directions(height, width, view.fov_y_degrees)[scored]
     pixel, bodies = pixel_size(len(scored), view.fov_y_degrees), solids.round_bodies(view.object_id)
     return TrueLayers(scored, rays, pixel, bodies[scored], *layers)
 
@@ -106,12 +107,9 @@ def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float
     `submissions.rules`.
     """
     refuse_pixels(PredictionError, "predicted layers", "layers", predicted.geometry, truth.scored)
-    layers = predicted.geometry[truth.scored].T
+    layers = fitted_layers(predicted, truth)[truth.scored].T
     layers = layers[: max(2, np.isfinite(layers).any(axis=1).sum())]
     of_objects = truth.object_id > 0
-    seen = np.isfinite(layers[0]) & of_objects[0]
-    scale, shift = scale_and_shift(layers[0, seen], truth.depth[0, seen], predicted.alignment)
-    layers = scale * layers + shift
     spans = solids.paired_spans(layers)
     scores = {
         "solid_iou": truth.iou(spans),
@@ -127,6 +125,14 @@ def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float
         distance = chamfer(nearest_distances(found, true)) if both else np.inf
         scores[name] = min(distance, metric(name).worst())
     return scores if truth.shows_solids else dict.fromkeys(scores, np.nan)
+
+
+def fitted_layers(predicted: PredictedView, truth: TrueLayers) -> Array:
+    """Return layers (H, W, L) after the declared alignment of the first to visible objects."""
+    first = predicted.geometry[truth.scored, 0]
+    seen = np.isfinite(first) & (truth.object_id[0] > 0)
+    scale, shift = scale_and_shift(first[seen], truth.depth[0, seen], predicted.alignment)
+    return np.asarray(scale * predicted.geometry + shift)
 
 
 def worst_of_layers(truth: TrueLayers) -> dict[str, float]:
