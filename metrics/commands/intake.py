@@ -300,7 +300,7 @@ def run(
     intrinsics: bool, curve: str, exposure: float, key: str | None, frame: Any, missing: Any,
     keep: str | None, timeout: float | None, traceback: bool, overwrite: bool,
 ) -> None:
-    r"""Run a model on every image of a file and write its predictions.
+    """Run a model on every image of a file and write its predictions.
 
     MODEL is a public depth model, as hf:NAME (loaded by transformers) or moge:NAME (MoGe), or a
     Python file.
@@ -320,7 +320,7 @@ def run(
     each ray, (h, w, L), or points (h, w, L, 3)
 
     Re-run the same command to resume an interrupted run.
-    """
+    """  # noqa: D301 - \b is click's mark: lines stay as they are
     from metrics.intake.model_file import LIBRARIES, ModelError, opened_model
     from metrics.intake.outputs import KEYS
     from metrics.intake.running import DEFAULT_BATCH, Call, run_model
