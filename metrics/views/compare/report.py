@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import metric
@@ -23,8 +23,10 @@ from scenegen.common.text_table import Interval, number
 
 FORMAT_NAME = "pix2shape-bench/comparison"
 FORMAT_VERSION = "1.0"
-HEAD = ("metric", "", "method", "value", "difference", "better/worse/same", "p (Holm)",
-        "min. detectable", "verdict")  # fmt: skip
+HEAD = (
+    *("metric", "method", "value", "difference", "verdict"),
+    *("b/w/s", "p (Holm)", "MDE"),
+)
 
 
 def text_report(
@@ -82,9 +84,10 @@ def difference_table(comparison: Comparison) -> Table:
         differences = [d for d in comparison.differences if d.metric == name]
         first, up = differences[0], metric(name).higher_is_better
         reference = number(first.reference_value, (first.low, first.high))
-        rows.append((name, "up" if up else "down", comparison.reference, reference, *[""] * 5))
-        rows += [("", "", *_difference_row(d)) for d in differences]
-    return make_table("", HEAD, rows)
+        label = f"{name} {'up' if up else 'down'}"
+        rows.append((label, comparison.reference, reference, *[""] * 5))
+        rows += [("", *_difference_row(d)) for d in differences]
+    return replace(make_table("", HEAD, rows), named_by=1)
 
 
 def _difference_row(d: Difference) -> Sequence[Cell | str]:
@@ -98,7 +101,7 @@ def _difference_row(d: Difference) -> Sequence[Cell | str]:
     smallest = "none" if d.smallest is None else number(d.smallest)
     counts = f"{d.wins}/{d.losses}/{d.ties}"
     holm = f"{d.p_holm:.4f}" if d.p_holm >= 0.0001 else "<0.0001"
-    return d.method, number(d.value, ends), difference, counts, holm, smallest, d.verdict
+    return d.method, number(d.value, ends), difference, d.verdict, counts, holm, smallest
 
 
 def _signed(value: float, interval: Interval) -> str:
@@ -148,9 +151,10 @@ def _notes(comparison: Comparison, files: Sequence[ScoreFile]) -> list[str]:
         *skill_notes(files[0]),
         "difference: method - first method, paired, with its uncorrected"
         f" {CONFIDENCE:.0%} bootstrap CI over {apart}",
-        f"better/worse/same: number of {items}; p: {test}, two-sided; Holm: corrected for"
-        f" {len(comparison.differences)} comparisons; verdict: at {ALPHA:.0%}",
-        f"min. detectable: smallest difference that this test set detects with {POWER:.0%} power"
+        f"b/w/s: number of {items} that are better, worse, the same; p: {test}, two-sided; Holm:"
+        f" corrected for {len(comparison.differences)} comparisons; verdict: at {ALPHA:.0%}",
+        "MDE: minimum detectable effect, the smallest difference that this test set detects with"
+        f" {POWER:.0%} power"
         " after the correction",
         *unread_notes(files),
         *comparison.notes,
