@@ -419,7 +419,9 @@ def _check_meta(scores: ScoreFile) -> None:
     ]
     if test is not None:
         if test.task != task:
-            raise refusal("meta.truth_digest", f"that of {test.name}", f"a truth of task {task!r}")
+            raise refusal(
+                "meta.truth_digest", f"that of {test.name}", f"ground truth of task {task!r}"
+            )
         rules.append((total, counts[total] == test.rows, f"{test.rows}, as {test.name} has"))
     for name, holds, expected in rules:
         if not holds:
@@ -446,7 +448,7 @@ def _check_groups(scores: ScoreFile) -> None:
             low, high = (value if end is None else end for end in ends)
             if ends.count(None) == 1 or not low - ROUNDING <= value <= high + ROUNDING:
                 found = f"{value} outside of {ends}"
-                raise refusal(f"{place}.{key}", found, "an interval that holds the accuracy")
+                raise refusal(f"{place}.{key}", found, "an interval that contains the accuracy")
         right = np.sum([group.right for group in groups.values()], axis=0)
         total = scores.columns[ACCURACY].sum(axis=1)
         questions = sum(group.n for group in groups.values())

@@ -206,7 +206,7 @@ class QuestionsFile(RowFile):
         if part is None and len(self.tables) == 1:
             return self.tables[0]
         if part is None or part not in self.tables:
-            expected = " or ".join(self.tables) or "none, as there is one table only"
+            expected = " or ".join(self.tables) or "none, because the file has one table only"
             raise SpecError(f"{self.path}: part", part or "none", expected)
         return part
 
@@ -394,15 +394,15 @@ def table_names(opened: OpenFile, content: str) -> tuple[str, ...]:
     if content == "questions" and any(name in file for name in ("answers", "labeled/answers")):
         images = path.name.replace("-answers", "")
         what = images if images != path.name else "the file of questions"
-        hint = f"open {what} instead, with this file for answers"
-        raise NoImagesError(path, "answers but no images", "questions", hint)
+        hint = f"open {what} instead, with this file as the answer key"
+        raise NoImagesError(path, "an answer key without images", "questions", hint)
     if content == "answers" and "questions" in file:
-        hint = "ask those who made the questions for the file of answers"
-        raise NoAnswersError(path, "questions but no answers", "answers", hint)
+        hint = "ask the creators of the questions for the answer key"
+        raise NoAnswersError(path, "questions without an answer key", "answers", hint)
     expected = f"a dataset {content!r}, 'labeled/{content}' or 'unlabeled/{content}'"
     raise FileFormatError(path, "no question file", expected)
 
 
 def _identity(file: QuestionsFile) -> str:
-    mark = f"fingerprint {file.fingerprint[:12]}" if file.fingerprint else "no fingerprint"
+    mark = f"recipe hash {file.fingerprint[:12]}" if file.fingerprint else "no recipe hash"
     return f"{len(file)} questions, {mark}"

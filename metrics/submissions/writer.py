@@ -274,7 +274,7 @@ def write_answers(
     if count == 0:
         raise PredictionError(place, "no questions", "at least one")
     if answer is None and scores is None:
-        raise PredictionError(path, "neither answer nor scores", "either")
+        raise PredictionError(path, "neither a response nor scores", "either")
     ids = np.arange(count) if rows is None else as_array(rows, f"{path}: rows")
     arrays = {"question": ids, "answer": answer, "scores": scores}
     arrays |= {"outcome": outcome, "rotated": rotated}

@@ -181,10 +181,10 @@ def _questions(scores: ScoreFile, truth: Path, predictions: QuestionPredictions)
         answers = np.array([answer.get(i, ABSTAINED) for i in ids])
         true = np.asarray(questions.read("answers", slice(None)), np.int64)[scores.ids]
         right = answers == true
-        totals = {"right": int(right.sum()), "wrong": int((~right).sum())}
+        totals = {"correct": int(right.sum()), "wrong": int((~right).sum())}
         return [
             (
-                f"{len(entries)} of {totals[title]:,} questions answered {title}ly",
+                f"{len(entries)} of {totals[title]:,} {title} responses",
                 [_question(questions[ids[i]], int(true[i]), int(answers[i])) for i in entries],
             )
             for title, entries in chosen_questions(right).items()
@@ -205,11 +205,11 @@ def _question(record: Any, right: int, answer: int) -> Example:
     urls = [data_url(srgb_bytes(np.nan_to_num(image))) for image in record.radiance]
     pictures = [Picture("reference", urls[0])]
     for k, url in enumerate(urls[1:]):
-        marks = ["right"] * (k == right) + ["answered"] * (k == answer)
-        pictures.append(Picture(f"answer {LETTERS[k]}", url, ", ".join(marks), k == right))
-    text = f"right is {LETTERS[right]}, "
-    text += "no answer was given" if answer == ABSTAINED else f"{LETTERS[answer]} was answered"
+        marks = ["correct"] * (k == right) + ["selected"] * (k == answer)
+        pictures.append(Picture(f"option {LETTERS[k]}", url, ", ".join(marks), k == right))
+    text = f"correct: {LETTERS[right]}, selected: "
+    text += "none" if answer == ABSTAINED else LETTERS[answer]
     kinds: Sequence[str | None] = record.truth.distractor_kind if record.truth else ()
     wrong = sorted({kind for kind in kinds if kind})
-    text += f"; wrong answers: {', '.join(wrong)}" if wrong else ""
+    text += f"; distractor types: {', '.join(wrong)}" if wrong else ""
     return Example(f"question {record.index}", text, pictures)

@@ -177,8 +177,8 @@ class RoomsFile(RowFile):
         """Raise SpecError unless `read` takes this name, FileFormatError if it is withheld."""
         if not self.has_truth and name in {c.name for c in columns(self.spec)} - {*INPUT}:
             beside = f"{self.path.stem}-truth{self.path.suffix}"
-            hint = f"the file of truth has it, such as {beside}"
-            raise FileFormatError(f"{self.path}: {name}", "rooms without truth", "it", hint)
+            hint = f"it is in the file with the ground truth, such as {beside}"
+            raise FileFormatError(f"{self.path}: {name}", "rooms without ground truth", "it", hint)
         super().check_field(name)
 
     def reopener(self) -> Callable[[], "RoomsFile"]:
