@@ -154,9 +154,9 @@ def _entry_scores(scores: ScoreFile, entry: int) -> str:
 
 
 def chosen_questions(right: NDArray[np.bool_], most: int = SHOWN) -> dict[str, list[int]]:
-    """Return entries to show that are "right" and "wrong", (Q,), spread evenly over the file."""
+    """Return entries to show that are "correct" and "wrong", (Q,), spread evenly over the file."""
     lists = {}
-    for title, entries in (("right", np.flatnonzero(right)), ("wrong", np.flatnonzero(~right))):
+    for title, entries in (("correct", np.flatnonzero(right)), ("wrong", np.flatnonzero(~right))):
         places = np.rint(np.linspace(0, len(entries) - 1, min(most, len(entries)))).astype(int)
         if len(entries):
             lists[title] = entries[places].tolist()
