@@ -47,7 +47,12 @@ UNUSABLE = "2 of 6 rows without a usable number: 1, 3"
 @pytest.mark.parametrize(
     ("files", "where", "found", "expected"),
     [
-        ([A, OTHER_BITS], "", "rooms, ground truth with hash ffff", f"{DIGEST[:12]}, as a.json has"),
+        (
+            [A, OTHER_BITS],
+            "",
+            "rooms, ground truth with hash ffff",
+            f"{DIGEST[:12]}, as a.json has",
+        ),
         ([A, iqtt_scores("b", [1])], "", "iqtt", f"{DIGEST[:12]}, as a.json has"),
         ([], "comparison", "0 score file", "two or more"),
         ([A], "comparison", "1 score file", "two or more"),
