@@ -124,7 +124,7 @@ def object_coordinates(
 
 
 def albedo(object_id: Array, reflectance: Array) -> NDArray[np.float64]:
-    """Return the point of each pixel in the frame of the unit shape of its object, (H, W, 3).
+    """Return the reflectance rho of each pixel, (H, W, 3) linear RGB; NaN without a surface.
 
     Args:
         object_id: (H, W).
