@@ -154,7 +154,7 @@ def test_a_stop_loses_nothing(error, run, tmp_path):
     assert len(list((tmp_path / "p.h5.rows").glob("*.npz"))) == 5
     if "Key" not in error:
         assert "row 5" in caught.value.where
-        assert "5 rows are kept" in caught.value.hint
+        assert "5 images are kept" in caught.value.hint
     assert run(text) == "depth_metric of 8 images, 5 of them from an earlier run"
     assert calls.read_text() == "." * 9
     assert not (tmp_path / "p.h5.rows").exists()
