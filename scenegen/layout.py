@@ -72,7 +72,7 @@ SCORED = (
 )
 # Sizes of axes that are the same in all files; those of the others follow from the spec.
 FIXED = {"channel": 3, "offset": 2, "xyz": 3, "matrix_row": 4, "matrix_column": 4, "coefficient": 2,
-         "setting": 5}  # fmt: skip
+         "setting": 5, "layer": 16}  # fmt: skip
 MATRIX = ("matrix_row", "matrix_column")
 HEAD = ("dataset", "row", "type", "unit", "frame", "meaning")  # of tables of columns
 
@@ -176,6 +176,19 @@ FURTHER = {  # columns of `DatasetSpec.truth`, by its names
     "albedo": (
         _column("albedo", ("y", "x", "channel"), "float32", "1", "RGB",
                "rho of the surface, linear; NaN where nothing is hit", own_chunk=True),
+    ),
+    "layers": (
+        _column("layers/depth", ("layer", "y", "x"), "float32", "scene unit", "camera",
+               "planar depth of the surfaces along the pixel's ray, in order; the first layer is"
+               " depth; NaN behind the last one", own_chunk=True),
+        _column("layers/object_id", ("layer", "y", "x"), "int8", "1", "pixels: row 0 on top",
+               "whose surface it is: 0 the room, k the k-th object; -1 behind the last one",
+               own_chunk=True),
+        _column("layers/entering", ("layer", "y", "x"), "int8", "1", "pixels: row 0 on top",
+               "1 where the ray enters the object, -1 where it leaves, 0 at surfaces without inside"
+               " (the room, open parts) and behind the last one", own_chunk=True),
+        _column("object/closed", ("object_slot",), "uint8", "1", "-",
+               "1 if all parts of the object's mesh are closed; 0 also in unused slots"),
     ),
 }
 # fmt: on

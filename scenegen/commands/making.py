@@ -133,7 +133,7 @@ def render(
     spec = _with_assets(preset_spec(preset, **chosen, **source.settings), **assets)
     spec, notes = _with_denoiser(spec, chosen)
     notes += _crowded(spec)
-    images = count * len(spec.views)
+    images = count * len(spec.view_angles)
     started = time.perf_counter()
     released, out = out, _truth_place(out, overwrite) if hold_out_truth else out
     with (

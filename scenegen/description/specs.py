@@ -32,7 +32,7 @@ IMAGE_DTYPES = ("uint8", "float16", "float32")
 BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES + FURNITURE_NAMES}
 FOLDERS = ("shapenet-v1", "shapenet-v2", "folder")
 SPLITS = ("all", "train", "val", "test")
-TRUTHS = ("amodal", "coordinates", "flow", "albedo")
+TRUTHS = ("amodal", "coordinates", "flow", "albedo", "layers")
 MAX_CLASSES = 4000  # their names are an attribute, of which HDF5 allows 64 kB
 MAX_LIGHTS = 16
 MAX_PIXELS = 4096 * 4096
@@ -92,6 +92,8 @@ class RoomSpec:
         fov_degrees: field of view of a square image; others have its diagonal.
         fov_spread_degrees: range of the field of view above `fov_degrees`; each scene samples its
             own, uniformly.
+        stereo: distance between the cameras of a stereo pair; 0 for single cameras. Each view is
+            then followed by a view whose camera is moved along its x axis.
         truth: additional ground truth, some of TRUTHS (`rooms.truth`).
     """
 
@@ -122,11 +124,18 @@ class RoomSpec:
     )
     fov_degrees: float = setting(28.0)
     fov_spread_degrees: float = setting(0.0, later=True)
+    stereo: float = setting(
+        0.0,
+        "Baseline of stereo pairs in scene units (metres in interiors), such as 0.065: each view"
+        " gets a second image, from a camera further to the right. 0 renders no pairs",
+        limits=(0.0, 0.25), later=True,
+    )  # fmt: skip
     truth: tuple[str, ...] = setting(
         (),
         "Additional ground truth to store, comma-separated. amodal: masks of whole objects and"
         " their visible fractions; coordinates: object coordinates (NOCS); flow: optical flow to"
-        " the next view, with occlusion; albedo: reflectance of each pixel",
+        " the next view, with occlusion; albedo: reflectance of each pixel; layers: all surfaces"
+        " along each ray, up to 16",
         later=True, option="with", shown="none",
     )  # fmt: skip
 
@@ -147,6 +156,12 @@ class RoomSpec:
     def object_slots(self) -> int:
         """Length of the object axis of every array; at least 1, which HDF5 needs."""
         return max(1, self.objects[1])
+
+    @property
+    def view_angles(self) -> tuple[float, ...]:
+        """Degrees from the input view to each image of a scene: one of `views`, or two of each."""
+        eyes = 2 if self.stereo else 1
+        return tuple(angle for angle in self.views for _ in range(eyes))
 
     @property
     def fov_y_degrees(self) -> float:
@@ -456,4 +471,4 @@ def _check_truth(spec: RoomSpec) -> None:
     check(not wrong, "truth", ", ".join(wrong), f"some of {', '.join(TRUTHS)}")
     object.__setattr__(spec, "truth", tuple(name for name in TRUTHS if name in spec.truth))
     expected = "two views or more, such as --views 0,35"
-    check("flow" not in spec.truth or len(spec.views) > 1, "flow", "one view", expected)
+    check("flow" not in spec.truth or len(spec.view_angles) > 1, "flow", "one view", expected)

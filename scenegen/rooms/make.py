@@ -75,7 +75,7 @@ def make_dataset(
     Raises SpecError for a setting out of range, BackendError where the device cannot render here,
     PlacementError where no scene meets the request, and others as `making.make_set`.
     """
-    views = len(spec.views)
+    views = len(spec.view_angles)
     check_batch(batch, spec, views)
     check(0 <= workers <= MAX_WORKERS, "workers", workers, f"from 0 to {MAX_WORKERS}")
     check(1 <= count <= MAX_COUNT // views, "n", count, f"from 1 to {MAX_COUNT // views:,} scenes")
@@ -118,7 +118,7 @@ def check_batch(batch: int, size: Any, views: int = 1, images: int = 1) -> None:
 
 def rooms_part(spec: Request, count: int, marks: tuple[Mark, ...] = ()) -> Part:
     """Return the rows of so many scenes."""
-    return Part("", "", count, [Sheet(columns(spec))], marks, len(spec.views), "scenes")
+    return Part("", "", count, [Sheet(columns(spec))], marks, len(spec.view_angles), "scenes")
 
 
 def merge_rooms(
@@ -131,5 +131,5 @@ def merge_rooms(
 
     Raises as `sets.merge_file`.
     """
-    part = rooms_part(rooms.spec, len(rooms) // len(rooms.spec.views))
+    part = rooms_part(rooms.spec, len(rooms) // len(rooms.spec.view_angles))
     merge_file(rooms.opened, out, [part], rooms.compression(), overwrite, progress)

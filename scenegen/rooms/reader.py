@@ -11,9 +11,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import back_project, transform_points
+from scenegen.camera import back_project, pixel_size, transform_points
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
+from scenegen.derived import seen_from
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import request_from_json
 from scenegen.files.attributes import read_root
@@ -74,6 +75,46 @@ class Room:
     def points_world(self) -> Array:
         """Surfel positions in the world frame, (H, W, 3), scene units; NaN where nothing."""
         return transform_points(self.world_from_camera, self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class StereoPair:
+    """Two images by cameras of the same orientation, of which the second is further to the right.
+
+    `baseline` is the distance between the cameras, in the unit of the rooms.
+    """
+
+    left: Room
+    right: Room
+    baseline: float
+
+    @property
+    def focal(self) -> float:
+        """The focal length, in pixels."""
+        return 1.0 / pixel_size(len(self.left.depth), self.left.fov_y_degrees)
+
+    @property
+    def disparity(self) -> NDArray[np.float64]:
+        """Disparity of the left and of the right image, (2, H, W), in pixels.
+
+        The point at (x, y) of the left image is at (x - d, y) of the right image. NaN where nothing
+        is hit.
+        """
+        depths = np.stack([self.left.depth, self.right.depth]).astype(float)
+        return np.asarray(self.focal * self.baseline / depths)
+
+    @property
+    def visible(self) -> NDArray[np.bool_]:
+        """Which pixels of each image show what the other image shows too, (2, H, W).
+
+        As `derived.seen_from`, so it can be wrong within half a pixel of a silhouette.
+        """
+        pairs = (self.left, self.right), (self.right, self.left)
+        return np.stack([
+            seen_from(one.points_world, one.object_id, other.depth, other.normal, other.object_id,
+                      other.world_from_camera, other.fov_y_degrees)
+            for one, other in pairs
+        ])  # fmt: skip
 
 
 def radiance_of(rooms: Any, row: int) -> Array:
@@ -180,6 +221,14 @@ class RoomsFile(RowFile):
             hint = f"it is in the file with the ground truth, such as {beside}"
             raise FileFormatError(f"{self.path}: {name}", "rooms without ground truth", "it", hint)
         super().check_field(name)
+
+    def stereo(self, row: int) -> StereoPair:
+        """Return the stereo pair that a row is part of. Raises SpecError where there are none."""
+        check(
+            self.spec.stereo > 0, str(self.path), "single images", "stereo pairs (render --stereo)"
+        )
+        left, right = self[[row - row % 2, row - row % 2 + 1]]
+        return StereoPair(left, right, self.spec.stereo)
 
     def reopener(self) -> Callable[[], "RoomsFile"]:
         """Return a function, which can be pickled, that opens the same rows again."""

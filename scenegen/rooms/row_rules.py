@@ -46,6 +46,7 @@ _FURTHER_RULES = {
     "coordinates": "agree with depth and poses",
     "flow": "flow and occlusion agree with depth and cameras",
     "albedo": "reflectance of the object ids",
+    "layers": "in order, begin with depth and object ids, and enter and leave objects in turn",
 }
 
 
@@ -100,7 +101,7 @@ def row_problems(
 
 def _further_problems(rooms: RoomsFile, block: RowBlock, room: Room) -> Iterable[tuple[str, str]]:
     names = ("material/reflectance", "object/world_from_object")
-    other, views = room, len(rooms.spec.views)
+    other, views = room, len(rooms.spec.view_angles)
     if "flow" in rooms.spec.truth:
         first = room.index - room.index % views
         try:
@@ -118,7 +119,7 @@ def _description_problems(
     changed = changed_meshes(objects, room.scene)
     if changed:
         yield f"made from other files than the folder's: {', '.join(changed)}"
-    views = len(rooms.spec.views)
+    views = len(rooms.spec.view_angles)
     first = room.index - room.index % views
     if room.view_index != room.index - first or len(room.scene.cameras) != views:
         yield f"view_index or the number of cameras is not that of the {views} views"

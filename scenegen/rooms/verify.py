@@ -40,6 +40,7 @@ from scenegen.rooms.row_rules import (
     row_problems,
     row_rules,
 )
+from scenegen.rooms.truth import stored_layers
 from scenegen.rooms.withheld import truth_path
 from scenegen.sampling.scenes import most_attempts, sample_scenes
 
@@ -213,6 +214,12 @@ def _render(
                 pixels = render(batch, device).pixels()
                 if "amodal" in rooms.spec.truth:
                     pixels[AMODAL] = amodal_masks(batch, device)
+                layers = [
+                    stored_layers(batch, i, pixels["depth"][i], pixels["object_id"][i])
+                    for i in range(len(batch) if "layers" in rooms.spec.truth else 0)
+                ]
+                names = layers[0] if layers else ()
+                pixels |= {name: np.stack([one[name] for one in layers]) for name in names}
         except (SpecError, BadMeshError):
             for room in shown if len(shown) > 1 else ():
                 draw(view, [room])

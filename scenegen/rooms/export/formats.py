@@ -57,7 +57,7 @@ FOLDER_FORMATS = _by_name(
     Format(name, f"a folder in the layout of {tool}", f"{HERE}.{name}:write")
     for name, tool in (
         ("nerfstudio", "nerfstudio"), ("colmap", "COLMAP"), ("bop", "BOP"),
-        ("coco", "COCO"), ("moge", "MoGe"),
+        ("coco", "COCO"), ("moge", "MoGe"), ("stereo", "Middlebury's stereo pairs"),
     )
 ) | _by_name((
     Format("glb", "a glTF 2.0 file per scene, with its materials, cameras and lights",

@@ -33,7 +33,7 @@ from scenegen.sampling.interiors.viewpoints import draw_cameras
 Array = NDArray[Any]
 STREET = 32  # rooms beside each other that are furnished from the same stock
 STOCK = 10  # models of each family in it: models take longer to make than rooms to furnish
-_Drawn = tuple[Room, list[Placed], list[tuple[float, float, float]], tuple[float, float, float]]
+_Drawn = tuple[Room, list[Placed], Array, Array]
 
 
 def item_room(spec: InteriorSpec, index: int) -> tuple[Room, int, float]:
@@ -45,7 +45,7 @@ def item_room(spec: InteriorSpec, index: int) -> tuple[Room, int, float]:
 
 
 def draw_interior(spec: InteriorSpec, index: int, attempt: int, objects: Objects) -> _Drawn | None:
-    """Return room, objects, camera positions and target of a proposal; None if it found no room."""
+    """Return room, objects, camera positions and targets; None if the proposal found no room."""
     room, count, fov = item_room(spec, index)
     draws = Draws(spec.seed, index, Purpose.ARRANGEMENT, attempt)
     by_family = furniture_models(objects)
@@ -96,7 +96,7 @@ def _numbers(objects: Objects, classes: tuple[str, ...]) -> dict[str, int]:
 def _arrays(
     spec: InteriorSpec, index: Array, drawn: Sequence[_Drawn], objects: Objects
 ) -> SceneArrays:
-    count, slots, views = len(drawn), spec.object_slots, len(spec.views)
+    count, slots, views = len(drawn), spec.object_slots, len(spec.view_angles)
     number = _numbers(objects, spec.shapes)
     shape, mesh = np.full((count, slots), -1, np.int32), np.full((count, slots), "", object)
     position, scale = np.zeros((count, slots, 3)), np.zeros((count, slots))
