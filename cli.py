@@ -5,7 +5,8 @@ import click
 from scenegen.command_line.groups import PackageCommands
 
 ROOMS = tuple(
-    f"scenegen.commands.{name}" for name in ("making", "rooms", "viewing", "sharing", "meshes")
+    f"scenegen.commands.{name}"
+    for name in ("making", "rooms", "viewing", "sharing", "checking", "meshes")
 )
 QUESTIONS = tuple(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing", "quiz"))
 SCORES = (

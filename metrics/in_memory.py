@@ -210,8 +210,8 @@ def _geometry(
 ) -> Geometry:
     if isinstance(prediction, Mapping):
         return read_output(prediction, height, width, frame=frame)
-    if kind not in KINDS:
-        raise SpecError("kind", repr(kind), " or ".join(KINDS))
+    if kind not in KINDS or kind == "layers":
+        raise SpecError("kind", repr(kind), "depth, disparity or points")
     alignment = alignment or KINDS[kind][0]  # type: ignore[assignment]
     if alignment not in KINDS[kind]:
         raise SpecError("alignment", repr(alignment), f"{' or '.join(KINDS[kind])}, for {kind}")

@@ -101,11 +101,12 @@ def test_the_programs_read_every_row_and_what_they_write_can_be_scored(tmp_path)
     assert "9 questions" in run_block("bash", "", SCORE_ANSWERS, tmp_path)
 
 
+IMAGE, DEPTH = "16, 32, 32, 3", "16, 32, 32"  # sizes of a batch
 LOADED = {  # what the blocks of training-data.md print, by words of theirs
-    "RoomStream(": "torch.Size([16, 3, 64, 64]) torch.Size([16, 64, 64]) True\n" * 4,
-    "DataLoader(rooms": "torch.Size([16, 32, 32, 3]) torch.Size([16, 32, 32])\n" * 4,
-    "np.array_split(": "(16, 32, 32, 3) (16, 32, 32)\n" * 4,
-    "load_dataset(": "(16, 32, 32, 3) (16, 32, 32)\n" * 4,
+    "RoomStream(": "torch.Size([16, 3, 64, 64]) torch.Size([16, 3, 64, 64]) True\n" * 4,
+    "DataLoader(rooms": f"torch.Size([{IMAGE}]) torch.Size([{DEPTH}]) torch.Size([{IMAGE}])\n" * 4,
+    "np.array_split(": f"({IMAGE}) ({DEPTH}) ({IMAGE})\n" * 4,
+    "load_dataset(": f"({IMAGE}) ({DEPTH}) ({IMAGE})\n" * 4,
 }
 
 

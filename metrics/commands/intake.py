@@ -116,6 +116,12 @@ def read_as(
 @click.option("--depth", "pattern", metavar="FILES",
               help="Predictions: a folder, a quoted pattern such as 'out/*.png', or one NPY or NPZ"
               " file with all images. Formats: PNG, TIFF, EXR, PFM, NPY and NPZ.")
+@click.option("--layers", metavar="FILES",
+              help="Predictions of hidden surfaces, too: NPY or NPZ files with depths (h, w, L) or"
+              " points (h, w, L, 3), nearest first, NaN behind the last layer.")
+@click.option("--meshes", metavar="FILES",
+              help="Predictions of whole objects: a GLB, PLY or OBJ file per image, in the frame of"
+              " the camera. They are cast along the rays of the pixels.")
 @reading_options(*DEPTH_KINDS, "points")
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
               help="Alignment that the predictions need: what the method cannot determine [default:"
@@ -149,7 +155,8 @@ def import_(
     pattern: str | None, alignment: Any, missing: Any, normals: str | None, shown: Any,
     answers: str | None, people: str | None, truth: str, out: str, method: str | None,
     run_name: str, notes: str, overwrite: bool, expanded: tuple[str, ...],
-    confidence: str | None, confidence_is: str, **numbers: Any,
+    confidence: str | None, confidence_is: str, layers: str | None, meshes: str | None,
+    **numbers: Any,
 ) -> None:
     """Import predictions from files.
 
@@ -162,8 +169,9 @@ def import_(
     if expanded:
         found = f"{expanded[0]} after the options: the shell has expanded a pattern"
         raise click.UsageError(f"found {found}; quote patterns, such as 'out/*.png'")
-    if sum(source is not None for source in (pattern, answers, people)) != 1:
-        raise click.UsageError("give --depth for rooms, or --responses or --quiz for questions")
+    if sum(source is not None for source in (pattern, layers, meshes, answers, people)) != 1:
+        ways = "--depth, --layers or --meshes for rooms"
+        raise click.UsageError(f"give {ways}, or --responses or --quiz for questions")
     if people is not None:
         from metrics.intake.answers.quiz_answers import import_quiz
         from metrics.intake.folders import files_of
@@ -180,17 +188,23 @@ def import_(
     if answers is not None:
         _import_answers(answers, truth, out, method, texts)
         return
+    pattern = pattern or layers or meshes
     assert pattern is not None
     from metrics.intake.importing import import_rooms
+    from metrics.intake.meshes import import_meshes
     from metrics.measured.reader import open_images
 
     numbers["surer"] = "less" if confidence_is == "error" else "more"
-    reading = read_as(alignment=alignment, missing=missing, **numbers)
+    reading = read_as(alignment=alignment, missing=missing, layered=layers is not None, **numbers)
+    importing: Callable[..., str] = import_rooms
+    more = {"normals": normals, "confidence": confidence}
+    if meshes is not None:
+        importing, more = import_meshes, {}
     with open_images(truth) as rooms:
         with progress_bar(len(rooms), "image") as bar:
-            how = import_rooms(
+            how = importing(
                 pattern, rooms, out, method=method or _name_of(pattern), reading=reading,
-                normals=normals, confidence=confidence, shown=shown, progress=bar.update, **texts,
+                shown=shown, progress=bar.update, **more, **texts,
             )
         print_line(f"{out}: {how}")
         _print_hints(out, rooms)
@@ -286,7 +300,7 @@ def run(
     intrinsics: bool, curve: str, exposure: float, key: str | None, frame: Any, missing: Any,
     keep: str | None, timeout: float | None, traceback: bool, overwrite: bool,
 ) -> None:
-    r"""Run a model on every image of a file and write its predictions.
+    """Run a model on every image of a file and write its predictions.
 
     MODEL is a public depth model, as hf:NAME (loaded by transformers) or moge:NAME (MoGe), or a
     Python file.
@@ -302,9 +316,11 @@ def run(
     points_scale_invariant, depth_scale_invariant: up to a factor
     points_affine_invariant, depth_affine_invariant: up to a factor and a shift
     disparity_affine_invariant: 1 / depth, up to a factor and a shift
+    layers_metric, layers_scale_invariant, layers_affine_invariant: depths of all surfaces along
+    each ray, (h, w, L), or points (h, w, L, 3)
 
     Re-run the same command to resume an interrupted run.
-    """
+    """  # noqa: D301 - \b is click's mark: lines stay as they are
     from metrics.intake.model_file import LIBRARIES, ModelError, opened_model
     from metrics.intake.outputs import KEYS
     from metrics.intake.running import DEFAULT_BATCH, Call, run_model

@@ -268,7 +268,7 @@ def skills(
                     (perfect - errors[:, [k]])[:, 0], low, high, metric(name).unit
                 )
                 low = (low - float(floor[k])) / (1.0 - float(floor[k]))
-            span = finite(min(low, value)), finite(max(high, value))
+            span = finite(min(low, value)), finite(min(max(high, value), 1.0))  # none is above 1
             if all(abs(end) <= ROUNDING for end in (value, *span) if end is not None):
                 value = 0.0
                 span = None if span[0] is None else 0.0, None if span[1] is None else 0.0

@@ -50,6 +50,9 @@ EMPTY_ROOM, CUT_OUT, LEANING = "empty_room_", "cut_out_", "leaning_"
 BALLS, BLOCKS, FLAT, RAMP = "balls_", "blocks_", "flat_", "ramp_"
 OTHER_SCENE, HALF, LIFTED = "other_scene_", "half_resolution_", "lifted_"
 RANDOM_ORDER, EDGE_DISTANCE = "random_order_", "edge_distance_"
+CONSTANT, SIZED = "constant_thickness_", "size_thickness_"
+INFLATED, MIRRORED = "inflated_mask_", "mirrored_front_"
+_GIVEN = " behind the true front, in the true mask, by the factor that is best for the image."
 _BLIND = (
     " without the image, fitted as predictions are; by least squares in place of L1, and by scale"
     " and shift in place of no alignment."
@@ -89,6 +92,22 @@ BASELINES = {
         "blocks", "a box proxy per object of the first view",
         "box proxies of the first view's objects.", needs="first_view",
     ),
+    CONSTANT: Baseline(
+        "constant thickness", "true masks and fronts, one thickness for the image",
+        f"one thickness for all objects{_GIVEN}",
+    ),
+    SIZED: Baseline(
+        "thickness by size", "true masks and fronts, thickness by the size of the mask",
+        f"a thickness proportional to the square root of the mask's area{_GIVEN}",
+    ),
+    INFLATED: Baseline(
+        "inflated masks", "true masks and fronts, as thick as round bodies",
+        f"bodies that are round over the masks, as thick as 2 sqrt(e (2 r - e)){_GIVEN}",
+    ),
+    MIRRORED: Baseline(
+        "mirrored front", "true masks and fronts, mirrored",
+        "the true front of each object, mirrored at its farthest visible depth.",
+    ),
     HALF: Baseline(
         "half resolution", "ground-truth depth, downsampled and upsampled by 2",
         "the true depth, averaged over 2 x 2 pixels and enlarged bilinearly.",
@@ -112,10 +131,11 @@ _SEEN: Sequence[Shown] = ("no_view", "first_view", "scored_view")  # ever more
 
 Lacking = Literal[
     "", "objects", "relief", "inside", "bends", "behind", "boundary", "planes", "partner", "edges",
-    "pairs", "order", "order within", "order between",
+    "pairs", "order", "order within", "order between", "solids",
+    "layer 3", "layer 4",
 ]  # fmt: skip
 # The kinds of test sets, which differ in their headline: `ScoreFile.kind`.
-KINDS = ("rooms", "interiors", "measured", "iqtt")
+KINDS = ("rooms", "interiors", "layers", "measured", "iqtt")  # layers: of either kind of rooms
 
 
 @dataclass(frozen=True)
@@ -146,7 +166,8 @@ class Metric:
             "boundary", those whose true depth nowhere jumps; "planes", those in which no pixel has
             a reliable normal from its depth; "partner", those whose view no other scene has;
             "edges", those without an occlusion edge; "pairs" and "order", those without the pairs
-            of pixels that `measures.pairs` compares; else "".
+            of pixels that `measures.pairs` compares; "solids", those in which no ray first
+            meets a solid; "layer 3" and "layer 4", those without such layers; else "".
         unchanged_by: what may be fitted to the truth without a change of the value.
         signed: whether the value is a bias, which is best at 0 and ranks nothing.
     """
@@ -155,7 +176,9 @@ class Metric:
     title: str
     unit: str
     definition: str
-    of: Literal["points", "depth", "normals", "field of view", "answers", "confidence"] = "depth"
+    of: Literal[
+        "points", "depth", "normals", "field of view", "answers", "confidence", "layers"
+    ] = "depth"
     higher_is_better: bool = False
     largest: float = math.inf
     smallest: float = 0.0
@@ -248,6 +271,7 @@ _INSIDE: dict[str, Any] = {"lacking": "inside", "redefined": True}
 _BEHIND = _SURFACE | {"lacking": "behind"}
 _OBJECT: dict[str, Any] = {"lacking": "objects", "of_objects": True}
 _RELIEF = _SURFACE | {"lacking": "relief", "baselines": (OTHER_SCENE,)}
+_LAYERS: dict[str, Any] = {"of": "layers", "lacking": "solids"}
 # Tops and fronts of furniture are parallel to floor and walls, so the empty room may be better.
 _FLAT_OR_EMPTY = (CUT_OUT, EMPTY_ROOM)
 
@@ -441,6 +465,26 @@ TABLE: Sequence[Metric] = (
     _share("relief_iou", "Segmentation (relief IoU)",
            "foreground IoU: pixels where predicted and true relief both exceed 0.05 scene units,"
            " divided by those where either does.", headline={"rooms": 3}, printed=6, **_RELIEF),
+    _share("solid_iou", "Solid IoU",
+           "length of the rays that is inside objects in prediction and ground truth, divided by"
+           " that inside either.",
+           headline={"layers": 1},
+           baselines=(CONSTANT, SIZED, INFLATED, MIRRORED), **_LAYERS),
+    _error("back_depth_error", "Back depth error",
+           "mean absolute error of the depth at which rays leave the first visible solid.",
+           headline={"layers": 2}, **_LAYERS),
+    _error("unseen_chamfer", "Chamfer, unseen",
+           "Chamfer distance of the surfaces of objects behind the first layer.",
+           headline={"layers": 3}, **_LAYERS),
+    _error("seen_chamfer", "Chamfer, seen",
+           "Chamfer distance of the surfaces of objects in the first layer.", **_LAYERS),
+    _share("layer_recall_0.02", "Layer recall",
+           "fraction of the true layers of objects behind the first whose depth is within 0.02"
+           " scene units of the predicted layer of the same number.",
+           headline={"layers": 4}, **_LAYERS),
+    *(_share(f"layer_{number}_recall_0.02", f"Layer recall, layer {number}",
+             f"`layer_recall_0.02` of layer {number}.", **{**_LAYERS, "lacking": lacking})
+      for number, lacking in ((2, "solids"), (3, "layer 3"), (4, "layer 4"))),
     _share("iqtt_accuracy", "IQTT accuracy",
            "1 if the correct option is chosen, else 0 (also abstentions); chance is 1 / options.",
            of="answers", tasks=("iqtt",), headline={"iqtt": 1}),

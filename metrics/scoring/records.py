@@ -222,6 +222,8 @@ class ScoreFile:
     @property
     def kind(self) -> str:
         """The kind of the test set, by which its headline goes: one of `metric_names.KINDS`."""
+        if "solid_iou" in self.columns:
+            return "layers"
         return "interiors" if self.task == "rooms" and self.length == "metre" else self.task
 
     @property

@@ -19,6 +19,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "depth": ("none", "median_scale", "scale", "scale_shift"),
     "disparity": ("scale_shift",),
     "points": ("none", "scale", "scale_shift"),
+    "layers": ("none", "scale", "scale_shift"),
 }
 ALIGNMENTS = KINDS["depth"]
 LONGEST_NAME = 200  # characters of method and run, which tables and file names repeat
@@ -77,6 +78,11 @@ COLUMNS = {
         Column("points", (), "float32", "scene unit", "camera",
                "surface points, x right, y up, z towards the viewer, so that planar depth is -z",
                ("y", "x", "xyz"), own_chunk=True),
+        Column("layers", (), "float32", "scene unit", "camera",
+               "planar depth of the surfaces along each pixel's ray, in order, also of hidden ones;"
+               " NaN behind the last one; layers 1 and 2, 3 and 4, ... are front and back of a"
+               " solid, a last one without a partner is background", ("y", "x", "layer"),
+               own_chunk=True),
         Column("normal", (), "float32", "1", "camera",
                "surface normal, x right, y up, z towards the viewer; faces the viewer; of any"
                " length but 0", ("y", "x", "xyz"), own_chunk=True),

@@ -24,6 +24,7 @@ Ids = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 MOST_ROWS = 10_000_000
+LAYERS = range(1, 65)  # how many an image may have
 # Of depths and normals: what single precision holds. All scores of such values are finite, and so
 # are the squares that intervals need of them.
 LARGEST = float(np.finfo(np.float32).max)
@@ -123,6 +124,16 @@ RULES = (
         lambda vectors, against: _on_surface(~_finite(vectors).all(axis=-1), against),
     ),
     Rule(
+        ("layers",), "range", "depths above 0, and NaN behind the last layer",
+        "infinite, huge, or at or behind the camera",
+        lambda layers, _: ~(np.isnan(layers) | (_finite(layers) & (layers > 0.0))).all(axis=-1),
+    ),
+    Rule(
+        ("layers",), "order", "depths in order, nearest first, without gaps", "not in order",
+        lambda layers, _: (~np.isnan(layers[..., 1:]) & ~(layers[..., 1:] >= layers[..., :-1]))
+        .any(axis=-1),
+    ),
+    Rule(
         ("normal",), "length", f"normals of a length above 0 {SURFACE}", "of length 0",
         lambda normal, against: _on_surface(~normal.any(axis=-1), against),
     ),
@@ -206,7 +217,7 @@ def refuse_behind_camera(
         geometry: (H, W), or points (H, W, 3).
         surface: where the truth shows a surface, (H, W).
     """
-    if kind == "disparity" or alignment == "scale_shift":
+    if kind in ("disparity", "layers") or alignment == "scale_shift":
         return
     depth = geometry if kind == "depth" else -geometry[..., 2]
     if 2 * np.count_nonzero(depth[surface] <= 0.0) > np.count_nonzero(surface):
@@ -230,6 +241,7 @@ def array_problem(
     name = column.name
     shape: tuple[int, ...] = array.shape or ()
     kinds = "f" if is_float(column) else "iu"
+    sizes = {**sizes, "layer": LAYERS}
     axes = [sizes.get(axis, ()) for axis in column.axes or ()]
     fits = len(shape) == 1 + len(axes) and all(
         size in allowed if allowed else size > 0

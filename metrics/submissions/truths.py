@@ -143,6 +143,10 @@ def match_problems(
             problems.append(
                 Problem(predictions.kind, "shape", f"{height}x{width}, as the ground truth", found)
             )
+    layered = isinstance(truth, RoomsFile) and "layers" in truth.spec.truth
+    if isinstance(predictions, RoomPredictions) and predictions.kind == "layers" and not layered:
+        expected = "ground truth with layers, by scenegen render --with layers"
+        problems.append(Problem("layers", "match", expected, f"{truth.path}, which has none"))
     name, rows = ID_NAMES[predictions.task], predictions.rows
     problems += [
         problem

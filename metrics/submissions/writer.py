@@ -84,6 +84,11 @@ class RoomPredictionWriter:
         assert context is not None, "a block ends after it began"
         context.__exit__(*error)
 
+    @property
+    def truth(self) -> Images:
+        """The open file that is predicted, while the block lasts."""
+        return self._truth
+
     def add(
         self,
         row: int,
@@ -92,12 +97,14 @@ class RoomPredictionWriter:
         *,
         disparity: ArrayLike | None = None,
         points: ArrayLike | None = None,
+        layers: ArrayLike | None = None,
         fov_y_degrees: float | None = None,
         confidence: ArrayLike | None = None,
     ) -> None:
         """Write the prediction for one row of the ground truth; rows may come in any order.
 
-        Give one of depth, disparity and points, the same for all rows. Torch tensors are accepted.
+        Give one of depth, disparity, points and layers, the same for all rows. Torch tensors are
+        accepted.
 
         Args:
             row: row of the ground truth file.
@@ -107,10 +114,11 @@ class RoomPredictionWriter:
             disparity: (H, W) floats: 1 / planar depth, up to a scale above 0 and a shift.
             points: (H, W, 3) floats: camera frame (x right, y up, z towards the viewer), scene
                 units.
+            layers: (H, W, L) floats: planar depth of all surfaces along each ray, in order; NaN
+                behind the last one.
             fov_y_degrees: vertical field of view that the method estimates. For all rows or none.
             confidence: (H, W) floats: larger for more certain depth; only the order within the
-            image
-                counts. For all rows or none.
+                image counts. For all rows or none.
 
         Raises PredictionError, naming the row, what was found and what was expected.
         """
@@ -124,6 +132,7 @@ class RoomPredictionWriter:
             surface = np.isfinite(self._truth.read("depth", row)[:height, :width])
         sizes = dict(zip(("y", "x"), ((size,) for size in surface.shape), strict=True))
         images = {"depth": depth, "disparity": disparity, "points": points}
+        images["layers"] = layers
         images |= {"normal": normal, "confidence": confidence}
         values = {}
         for column in layout.COLUMNS["rooms"]:
@@ -139,6 +148,7 @@ class RoomPredictionWriter:
         if self._table is None:
             self._table = self._new_table(values)
             self._names = list(values)
+        self._check_layers(values, where)
         for name in sorted(set(self._names) ^ set(values)):
             found, expected = ("one", "none") if name in values else ("none", "one")
             raise PredictionError(f"{where}: {name}", found, f"{expected}, as in the first row")
@@ -146,6 +156,14 @@ class RoomPredictionWriter:
         self._table.append({name: self._padded(image) for name, image in values.items()})
         self._rows.append(row)
         self._written[row] = True
+
+    def _check_layers(self, values: Mapping[str, rules.Array], where: str) -> None:
+        """Raise PredictionError unless there are as many layers as in the first row."""
+        assert self._table is not None, "a row was given"
+        shapes = {column.name: column.shape for column in self._table.columns}
+        if "layers" in values and shapes.get("layers", (0,))[-1] != values["layers"].shape[-1]:
+            found, expected = values["layers"].shape[-1], shapes.get("layers", (0,))[-1]
+            raise PredictionError(f"{where}: layers", found, f"{expected}, as in the first row")
 
     def _padded(self, image: rules.Array) -> rules.Array:
         """Return an image (h, w, ...) in the size to which those of the truth are padded."""

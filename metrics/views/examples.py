@@ -12,14 +12,17 @@ from numpy.typing import NDArray
 from iqtt.questions.specs import LETTERS
 from metrics.measured.reader import Images, MeasuredFile
 from metrics.measures.answers import ABSTAINED
+from metrics.scoring.layers import fitted_layers, read_true_layers
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
+from metrics.submissions.truths import read_true_view
 from metrics.views.figures import shown_row
 from metrics.views.pictures import Picture, data_url, depth_pictures, normal_pictures
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import number
-from scenegen.rooms.preview import srgb_bytes
+from scenegen.rooms.preview import cut_places, cuts, srgb_bytes
+from scenegen.rooms.reader import RoomsFile
 
 if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
@@ -129,9 +132,33 @@ def _pictures(rooms: Images, predictions: RoomPredictions, row: int, place: int)
     if isinstance(rooms, MeasuredFile):
         return pictures
     normal = predictions.normal(place) if predictions.has_normals else None
+    if predictions.kind == "layers":
+        return [*pictures, *_cut_pictures(rooms, predictions, row, place)]
     fov_y_degrees = float(rooms.read("camera/fov_y_degrees", row))
     true_normal = rooms.read("normal", row)
     return [*pictures, *normal_pictures(true, depth, true_normal, fov_y_degrees, normal)]
+
+
+def _cut_pictures(
+    rooms: RoomsFile, predictions: RoomPredictions, row: int, place: int
+) -> list[Picture]:
+    """Return cuts through true and predicted layers, along the row and column of most objects."""
+    truth = read_true_layers(rooms, row, read_true_view(rooms, row))
+    true = [rooms.read(f"layers/{x}", row) for x in ("depth", "object_id", "entering")]
+    fitted = np.moveaxis(fitted_layers(predictions.view(place), truth), -1, 0)
+    there = np.isfinite(fitted)
+    alone = there & ~np.concatenate([there[1:], np.zeros_like(there[:1])])
+    alone[1::2] = False  # a last one without a partner is background
+    kind = np.where(np.arange(len(fitted))[:, None, None] % 2 == 0, 1, -1)
+    said = [fitted, np.where(there & ~alone, 1, np.where(alone, 0, -1)), np.where(alone, 0, kind)]
+    at, known = cut_places(true[2]), true[0][np.isfinite(true[0])]
+    ends = float(known.min()), float(known.max())
+    captions = ("cut from above", "cut from the side")
+    return [
+        Picture(f"{which} {caption}", data_url(image))
+        for which, layers in (("true", true), ("predicted", said))
+        for caption, image in zip(captions, cuts(layers, *at, ends), strict=True)
+    ]
 
 
 def _name(scores: ScoreFile, entry: int) -> str:

@@ -146,14 +146,14 @@ def rankings(
         if score.signed:
             found = f"{name}, a bias, of which neither direction is better"
             raise LeaderboardError("metric", found, "a metric with a better direction")
-    groups: dict[tuple[tuple[Task, str, str], Shown | None, bool], list[ScoreFile]] = {}
+    groups: dict[tuple[tuple[Task, str, str, str], Shown | None, bool], list[ScoreFile]] = {}
     for file in files:
-        key = ((*file.truth, file.protocol), file.shown_of_several, file.older)
+        key = ((*file.truth, file.protocol, file.kind), file.shown_of_several, file.older)
         groups.setdefault(key, []).append(file)
     ranked = []
     for (truth, seen, older), group in groups.items():
         task, members = truth[0], aligned(group, align if truth[0] != "iqtt" else None)
-        together = [f for f in files if (*f.truth, f.protocol, f.older) == (*truth, older)]
+        together = [f for f in files if (*f.truth, f.protocol, f.kind, f.older) == (*truth, older)]
         _require_same_rows(together)
         _require_same_baselines(together)
         names = [name for name, score in wanted.items() if task in score.tasks]
@@ -224,12 +224,14 @@ def _is_shared(name: str) -> bool:
 def _keys(files: Sequence[ScoreFile], names: Sequence[str], headline: bool) -> list[str]:
     """Return the keys of columns: scores, and skills where any file has them.
 
-    In the headline the skills stand before all scores that they are made of; else after each.
+    In the headline the skills stand before all scores that they are made of; else after each. The
+    first name, or its skill, is the first key, which ranks.
     """
     skilled = [name for name in names if any(name in file.skills for file in files)]
     if headline:
         others = [name for name in names if name not in skilled]
-        return [*others, *(SKILL_OF + name for name in skilled), *skilled]
+        with_skills = [*(SKILL_OF + name for name in skilled), *skilled]
+        return [*with_skills, *others] if names[0] in skilled else [*others, *with_skills]
     return [k for n in names for k in ((n, SKILL_OF + n) if n in skilled else (n,))]
 
 

@@ -1,5 +1,7 @@
 """How the numbers of one prediction move with the protocol: one table, and one figure."""
 
+import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +13,7 @@ from metrics.scoring.records import ScoreFile
 from metrics.views.figures import COLUMN, draw_scores
 from metrics.views.score_tables import INTERVAL, baseline_cell, score_cell, size_of
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
-from scenegen.common.text_table import piped, plain
+from scenegen.common.text_table import plain
 
 
 def protocols_report(
@@ -60,12 +62,12 @@ def range_text(low: float, high: float) -> str:
     return f"from {low:g}" if low else "all"
 
 
-def markdown_table() -> str:
-    """Return the table of protocols of docs/real-data.md."""
+def csv_table() -> str:
+    """Return docs/data/protocols.csv."""
     head = ("protocol", "pixels", "metres", "alignment", "clipped to", "mean over", "source")
     rows = [
         (
-            f"`{p.name}`",
+            p.name,
             ", then ".join(_crop_text(crop) for crop in p.crops) or "all",
             range_text(p.least, p.largest),
             p.alignment or "as declared",
@@ -75,7 +77,9 @@ def markdown_table() -> str:
         )
         for p in PROTOCOLS
     ]
-    return "\n".join(piped([head, *rows]))
+    table = io.StringIO()
+    csv.writer(table, lineterminator="\n").writerows([head, *rows])
+    return table.getvalue()
 
 
 def _crop_text(crop: Crop) -> str:

@@ -224,9 +224,8 @@ class RoomsFile(RowFile):
 
     def stereo(self, row: int) -> StereoPair:
         """Return the stereo pair that a row is part of. Raises SpecError where there are none."""
-        check(
-            self.spec.stereo > 0, str(self.path), "single images", "stereo pairs (render --stereo)"
-        )
+        expected = "stereo pairs (render --stereo)"
+        check(self.spec.stereo > 0, str(self.path), "single images", expected)
         left, right = self[[row - row % 2, row - row % 2 + 1]]
         return StereoPair(left, right, self.spec.stereo)
 

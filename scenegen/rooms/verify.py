@@ -266,11 +266,16 @@ def _same_picture(name: str, a: Array, b: Array) -> bool:
 def _within_tolerance(name: str, stored: Array, again: Array, edges: Array, spec: Request) -> bool:
     """Return whether two arrays of pixels, (H, W, ...), agree as far as other variants can."""
     most: float | Array
+    if name == AMODAL or name.startswith("layers/"):  # below, pixels come first
+        stored, again = np.moveaxis(stored, 0, -1), np.moveaxis(again, 0, -1)
+    elif stored.ndim < 2:
+        return False
     a, b = stored.astype(np.float64), again.astype(np.float64)
     if spec.interior and name in PICTURE:
         return _same_picture(name, a, b)
     if name != "image":
         tolerances = {"depth": DEPTH_TOLERANCE, "normal": NORMAL_TOLERANCE}
+        tolerances["layers/depth"] = DEPTH_TOLERANCE
         most = {**tolerances, "albedo": NORMAL_TOLERANCE}.get(name, 0.0)
     elif spec.shading == "path":
         # Rounding turns some paths, and another release draws others: only means are comparable.

@@ -33,7 +33,7 @@ def test_names_that_are_derived():
     assert (derived.tasks, derived.of, derived.lacking) == (("rooms",), "points", "planes")
     assert (derived.redefined, metric("empty_room_chamfer").redefined) == (True, False)
     for kind, names in (*HEADLINE.items(), *PRINTED.items()):
-        task = "rooms" if kind == "interiors" else kind
+        task = "rooms" if kind in ("interiors", "layers") else kind
         assert all(task in metric(name).tasks for name in names)
     behind = metric("behind_depth_error")
     assert behind.baselines_shown("no_view") == ["empty_room_"]
