@@ -178,13 +178,13 @@ FURTHER = {  # columns of `DatasetSpec.truth`, by its names
                "rho of the surface, linear; NaN where nothing is hit", own_chunk=True),
     ),
     "layers": (
-        _column("layers/depth", ("layer", "y", "x"), "float32", "scene unit", "camera",
+        _column("layers/depth", ("y", "x", "layer"), "float32", "scene unit", "camera",
                "planar depth of the surfaces along the pixel's ray, in order; the first layer is"
-               " depth; NaN behind the last one", own_chunk=True),
-        _column("layers/object_id", ("layer", "y", "x"), "int8", "1", "pixels: row 0 on top",
+               " depth; NaN behind the last one", own_chunk=True, shuffle=False),
+        _column("layers/object_id", ("y", "x", "layer"), "int8", "1", "pixels: row 0 on top",
                "whose surface it is: 0 the room, k the k-th object; -1 behind the last one",
                own_chunk=True),
-        _column("layers/entering", ("layer", "y", "x"), "int8", "1", "pixels: row 0 on top",
+        _column("layers/entering", ("y", "x", "layer"), "int8", "1", "pixels: row 0 on top",
                "1 where the ray enters the object, -1 where it leaves, 0 at surfaces without inside"
                " (the room, open parts) and behind the last one", own_chunk=True),
         _column("object/closed", ("object_slot",), "uint8", "1", "-",

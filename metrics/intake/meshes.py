@@ -75,10 +75,10 @@ def import_meshes(
         for row, path in enumerate(paths):
             vertices, faces = read_mesh(path)
             vertices = vertices * FRAMES[reading.frame] * reading.scale
-            corners, closed = welded(vertices, faces)
+            vertices, faces, closed = welded(vertices, faces)
             height, width = rooms.spec.height, rooms.spec.width
             fov = float(rooms.read("camera/fov_y_degrees", row))
-            layers = mesh_layers(corners, closed, height, width, fov)
+            layers = mesh_layers(vertices[faces], closed, height, width, fov)
             writer.add(row, layers=layers)
             opened += not closed.all()
             unseen += not np.isfinite(layers).any()
@@ -139,7 +139,7 @@ def mesh_layers(
     kept = np.delete(np.arange(len(pixel)), alone)
     crossings = Crossings(pixel[kept], depth[kept], kind[kept])
     layers = stacked([crossings], np.ones(len(kept), np.int64), height, width)
-    ends = entered_spans(*(x.reshape(len(x), -1) for x in (layers.depth, layers.entering)))
+    ends = entered_spans(*(x.reshape(-1, MOST_LAYERS).T for x in (layers.depth, layers.entering)))
     image = np.full((height, width, MOST_LAYERS), np.nan, np.float32)
     pairs = np.stack(ends, axis=1).reshape(-1, height, width).transpose(1, 2, 0)
     image[..., : pairs.shape[2]] = np.where(np.isfinite(pairs), pairs, np.nan)

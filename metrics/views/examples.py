@@ -145,11 +145,11 @@ def _cut_pictures(
     """Return cuts through true and predicted layers, along the row and column of most objects."""
     truth = read_true_layers(rooms, row, read_true_view(rooms, row))
     true = [rooms.read(f"layers/{x}", row) for x in ("depth", "object_id", "entering")]
-    fitted = np.moveaxis(fitted_layers(predictions.view(place), truth), -1, 0)
-    there = np.isfinite(fitted)
-    alone = there & ~np.concatenate([there[1:], np.zeros_like(there[:1])])
-    alone[1::2] = False  # a last one without a partner is background
-    kind = np.where(np.arange(len(fitted))[:, None, None] % 2 == 0, 1, -1)
+    fitted = fitted_layers(predictions.view(place), truth)
+    there, odd = np.isfinite(fitted), np.arange(fitted.shape[-1]) % 2 == 1
+    alone = there & ~odd  # a last one without a partner is background
+    alone[..., :-1] &= ~there[..., 1:]
+    kind = np.where(odd, -1, 1)
     said = [fitted, np.where(there & ~alone, 1, np.where(alone, 0, -1)), np.where(alone, 0, kind)]
     at, known = cut_places(true[2]), true[0][np.isfinite(true[0])]
     ends = float(known.min()), float(known.max())

@@ -27,6 +27,8 @@ Array = NDArray[Any]
 Error = Callable[[Sequence[View]], float]
 Undo = Callable[[View], View]
 BETTER = 0.5  # share of a disagreement that may remain
+# The same of a principal point: half a pixel of a large image is little beside the steps of depths.
+BETTER_SHIFT = 0.75
 BETTER_COLORS = 0.6  # the same of colours, which differ where surfaces shine
 ALIKE = 1.05  # factor within which two explanations count as the same: the first is taken
 MOST = 3  # mistakes that are undone one after another
@@ -86,7 +88,8 @@ def geometry_faults(views: Sequence[View], error: Error) -> tuple[list[Fault], S
         ]
         least = min(after for _, after in tried)
         guess, after = next(one for one in tried if one[1] <= ALIKE * least)
-        if not after <= BETTER * before or guess.name in {fault.name for fault in found}:
+        most = BETTER_SHIFT if guess.name == "principal-point" else BETTER
+        if not after <= most * before or guess.name in {fault.name for fault in found}:
             break
         views = [guess.undo(view) for view in views]
         found.append(Fault(guess.name, guess.size, guess.text, before, after))

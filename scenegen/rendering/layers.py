@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_directions, pixel_size
+from scenegen.camera import pixel_size
 from scenegen.common.recent import recent
 from scenegen.common.rotations import cross, product
 from scenegen.objects.catalogue import mesh_to_cast
@@ -44,7 +44,7 @@ class Crossings:
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """The surfaces along the ray of each pixel, (L, H, W).
+    """The surfaces along the ray of each pixel, (H, W, L).
 
     Attributes:
         depth: planar, float32, ascending; NaN behind the last surface.
@@ -63,25 +63,33 @@ def layers_of(batch: SceneBatch, image: int, depth: Array, object_id: Array) -> 
     fov, count = float(batch.fov_y_degrees[image]), int(batch.object_count[image])
     rotation = np.swapaxes(batch.world_from_camera[image, :3, :3], 0, 1)
     view = np.concatenate([rotation, -product(rotation, batch.world_from_camera[image, :3, 3:])], 1)
-    parts = [_room_crossings(batch, image, view, height, width, fov)]
+    parts = []
     for k in range(count):
         name = batch.names[batch.shape[image, k]]
-        matrix = batch.world_from_object[image, k]
-        shape = batch.shape_of(name) if batch.spec.source == "shapes" else None
-        if shape is not None and shape.surface is not None:
-            local = product(np.swapaxes(matrix[:3, :3], 0, 1), batch.world_from_camera[image, :3])
-            local[:, 3] -= product(np.swapaxes(matrix[:3, :3], 0, 1), matrix[:3, 3:])[:, 0]
-            local /= batch.object_scale[image, k] ** 2
-            parts.append(_surface_crossings(shape.surface, local, height, width, fov))
-            continue
-        corners, closed = _model(batch.shape_of, name)
-        placed = product(view, matrix)
-        corners = product(corners.reshape(-1, 3), placed[:, :3].T) + placed[:, 3]
-        parts.append(solid_crossings(corners.reshape(-1, 3, 3), closed, height, width, fov))
-    ids = np.repeat(np.arange(len(parts)), [len(part.pixel) for part in parts])
+        placed = product(view, batch.world_from_object[image, k])
+        surface = _surface_of(batch, name)
+        if surface is not None:
+            parts.append(_surface_crossings(surface, placed, height, width, fov))
+        else:
+            vertices, faces, closed = _model(batch.shape_of, name)
+            vertices = product(vertices, placed[:, :3].T) + placed[:, 3]
+            parts.append(solid_crossings(vertices[faces], closed, height, width, fov))
+    # Of other rays, the first layer is the only one.
+    layered = (object_id > 0).ravel()
+    for part in parts:
+        layered[part.pixel] = True
+    parts.append(_room_crossings(batch, image, view, layered, depth.shape))
+    ids = np.repeat([*range(1, count + 1), 0], [len(part.pixel) for part in parts])
     layers = stacked(parts, ids, height, width)
+    single = ~layered.reshape(depth.shape)
+    layers.depth[single, 0], layers.object_id[single, 0] = depth[single], object_id[single]
     _begin_with(layers, depth, object_id)
     return layers
+
+
+def _surface_of(batch: SceneBatch, name: str) -> Surface | None:
+    """Return the exact surface of a basic shape, None of others."""
+    return batch.shape_of(name).surface if batch.spec.source == "shapes" else None
 
 
 def closed_objects(batch: SceneBatch, image: int) -> NDArray[np.uint8]:
@@ -89,22 +97,22 @@ def closed_objects(batch: SceneBatch, image: int) -> NDArray[np.uint8]:
     found = np.zeros(batch.spec.object_slots, np.uint8)
     for k, number in enumerate(batch.shape[image, : batch.object_count[image]].tolist()):
         name = batch.names[number]
-        exact = batch.spec.source == "shapes" and batch.shape_of(name).surface is not None
-        found[k] = exact or _model(batch.shape_of, name)[1].all()
+        exact = _surface_of(batch, name) is not None
+        found[k] = exact or _model(batch.shape_of, name)[2].all()
     return found
 
 
 @recent(200_000_000)
-def _model(shape_of: Any, name: str) -> tuple[Array, Array]:
-    """Return the corners of a model's triangles, (F, 3, 3), and which are of closed parts, (F,)."""
+def _model(shape_of: Any, name: str) -> tuple[Array, Array, Array]:
+    """Return what `welded` makes of a model."""
     mesh = mesh_to_cast(shape_of, name)
     return welded(mesh.vertices.astype(np.float64), mesh.faces.astype(np.int64))
 
 
-def welded(vertices: Array, faces: Array) -> tuple[Array, Array]:
-    """Return corners (F, 3, 3) of triangles, near ones made one, and which parts are closed, (F,).
+def welded(vertices: Array, faces: Array) -> tuple[Array, Array, Array]:
+    """Return vertices (V, 3), near ones made one, triangles (F, 3), and which are closed, (F,).
 
-    A part is closed if neighbours pass each of its edges as often in one direction as in the other.
+    Those of a part are if neighbours pass its edges as often in one direction as in the other.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -122,7 +130,7 @@ def welded(vertices: Array, faces: Array) -> tuple[Array, Array]:
     part = connected_components(links, directed=False)[1]
     open_parts = np.unique(part[start[uneven[edge]]])
     closed = ~np.isin(part[faces[:, 0]] if len(faces) else np.zeros(0), open_parts)
-    return vertices[first][faces], closed
+    return vertices[first], faces, closed
 
 
 def solid_crossings(
@@ -227,18 +235,20 @@ def _edge_plane(a: Array, b: Array) -> Array:
 
 
 def _surface_crossings(
-    surface: Surface, local: Array, height: int, width: int, fov_y_degrees: float
+    surface: Surface, placed: Array, height: int, width: int, fov_y_degrees: float
 ) -> Crossings:
-    """Return where rays enter and leave an exact surface.
-
-    `local`, (3, 4), maps directions and the origin of the camera to the frame of the unit shape.
-    """
-    x, y, z = _rays(local[:, :3], height, width, fov_y_degrees)
-    start = local[:, 3].tolist()
+    """Return where rays enter and leave an exact surface, placed by camera_from_object (3, 4)."""
+    size, squared = pixel_size(height, fov_y_degrees), (placed[:, 0] * placed[:, 0]).sum()
+    # The inverse of a similarity s R is its transpose over s squared.
+    linear = placed[:, :3].T / squared
+    start = (-product(linear, placed[:, 3:])[:, 0]).tolist()
+    (left, columns), (top, rows) = _bounds(placed[:, 3], np.sqrt(squared), height, width, size)
+    row, column = np.arange(top, top + rows)[:, None], np.arange(left, left + columns)
+    x, y, z = _rays(linear, row, column, height, width, size)
     middle = -(x * start[0] + y * start[1] + z * start[2]) / (x * x + y * y + z * z)
     nearest = [at + middle * along for at, along in zip(start, (x, y, z), strict=True)]
     inside = nearest[0] ** 2 + nearest[1] ** 2 + nearest[2] ** 2 < 1.0002
-    pixel, middle = np.flatnonzero(inside), middle[inside]
+    pixel, middle = (row * width + column)[inside], middle[inside]
     c, d = (np.stack([axis[inside] for axis in axes], axis=1) for axes in (nearest, (x, y, z)))
     roots = np.sort(np.stack(surface_roots(surface, c, d), axis=1), axis=1) + middle[:, None]
     kind = np.broadcast_to(np.resize([ENTERS, LEAVES], roots.shape[1]), roots.shape)
@@ -246,34 +256,54 @@ def _surface_crossings(
     return Crossings(np.broadcast_to(pixel[:, None], roots.shape)[there], roots[there], kind[there])
 
 
+def _bounds(
+    center: Array, radius: float, height: int, width: int, size: float
+) -> list[tuple[int, int]]:
+    """Return first column and columns, first row and rows, of the image of a sphere, or more."""
+    near, far = -center[2] - 1.01 * radius, -center[2] + 1.01 * radius
+    found = []
+    for middle, most in ((center[0], width), (-center[1], height)):
+        low, high = 0, most
+        if near > 0:
+            ends = [(middle + side) / at for side in (-radius, radius) for at in (near, far)]
+            low = min(max(int(np.floor(min(ends) / size + most / 2)) - 1, 0), most)
+            high = max(min(int(np.ceil(max(ends) / size + most / 2)) + 1, most), low)
+        found.append((low, high - low if far > 0 else 0))
+    return found
+
+
+def _rays(
+    linear: Array, row: Array, column: Array, height: int, width: int, size: float
+) -> list[Array]:
+    """Return the components of the rays of pixels after a linear map (3, 3)."""
+    x, y = (column + 0.5 - width / 2) * size, ((height / 2 - 0.5) - row) * size
+    return [a * x + b * y - c for a, b, c in linear.tolist()]
+
+
 def _room_crossings(
-    batch: SceneBatch, image: int, view: Array, height: int, width: int, fov_y_degrees: float
+    batch: SceneBatch, image: int, view: Array, chosen: Array, shape: tuple[int, ...]
 ) -> Crossings:
-    """Return where rays first meet the room."""
+    """Return where the rays of chosen pixels, (H W,), first meet the room."""
+    (height, width), fov = shape, float(batch.fov_y_degrees[image])
     if not batch.has_room[image]:
         return Crossings(*np.zeros((3, 0), np.int64))
     if batch.interior is not None:
         shell = shell_of(shell_name(str(batch.interior[image]))).corners
         corners = product(shell.reshape(-1, 3).astype(np.float64), view[:, :3].T) + view[:, 3]
-        found = mesh_crossings(corners.reshape(-1, 3, 3), height, width, fov_y_degrees)
+        found = mesh_crossings(corners.reshape(-1, 3, 3), height, width, fov)
         order = np.lexsort((found.depth, found.pixel))
         first = order[np.diff(found.pixel[order], prepend=-1) > 0]
+        first = first[chosen[found.pixel[first]]]
         return Crossings(found.pixel[first], found.depth[first], np.full(len(first), OPEN))
-    camera = batch.world_from_camera[image]
-    rays, start = _rays(camera[:3, :3], height, width, fov_y_degrees), camera[:3, 3].tolist()
+    camera, pixel = batch.world_from_camera[image], np.flatnonzero(chosen)
+    rays = _rays(camera[:3, :3], *np.divmod(pixel, width), height, width, pixel_size(height, fov))
+    start = camera[:3, 3].tolist()
     with np.errstate(divide="ignore", invalid="ignore"):
         walls = [np.where(d < 0, -o / d, np.inf) for o, d in zip(start, rays, strict=True)]
         depth = np.minimum(np.minimum(*walls[:2]), walls[2])
         within = [o + depth * d <= 1 for o, d in zip(start, rays, strict=True)]
     meets = np.isfinite(depth) & within[0] & within[1] & within[2]
-    pixel = np.flatnonzero(meets)
-    return Crossings(pixel, depth[meets], np.full(len(pixel), OPEN))
-
-
-def _rays(linear: Array, height: int, width: int, fov_y_degrees: float) -> list[Array]:
-    """Return the components of the rays of pixels, (H, W) each, after a linear map (3, 3)."""
-    x, y, z = np.moveaxis(pixel_directions(height, width, fov_y_degrees), -1, 0)
-    return [a * x[:1] + b * y[:, :1] + c * z[:1, :1] for a, b, c in linear.tolist()]
+    return Crossings(pixel[meets], depth[meets], np.full(meets.sum(), OPEN))
 
 
 def stacked(parts: list[Crossings], ids: Array, height: int, width: int) -> Layers:
@@ -293,9 +323,9 @@ def stacked(parts: list[Crossings], ids: Array, height: int, width: int) -> Laye
     kept = rank < MOST_LAYERS
 
     def image(values: Array, nothing: float, dtype: type) -> Array:
-        layers = np.full((MOST_LAYERS, height * width), nothing, dtype)
-        layers[rank[kept], pixel[kept]] = values[order][kept]
-        return layers.reshape(MOST_LAYERS, height, width)
+        layers: Array = np.full((height * width, MOST_LAYERS), nothing, dtype)
+        layers[pixel[kept], rank[kept]] = values[order][kept]
+        return layers.reshape(height, width, MOST_LAYERS)
 
     return Layers(
         image(depth, np.nan, np.float32), image(ids, -1, np.int8), image(kind, 0, np.int8)
@@ -307,21 +337,21 @@ def _begin_with(layers: Layers, depth: Array, object_id: Array) -> None:
 
     At silhouettes a ray may meet an object in one precision and miss it in the other.
     """
-    first = layers.depth[0]
+    first, ids = layers.depth[..., 0], layers.object_id[..., 0]
     with np.errstate(invalid="ignore"):
-        same = (layers.object_id[0] == object_id) & (np.abs(first - depth) <= SAME * depth)
-    other = ~(same | ((object_id < 0) & (layers.object_id[0] < 0)))
+        same = (ids == object_id) & (np.abs(first - depth) <= SAME * depth)
+    other = ~(same | ((object_id < 0) & (ids < 0)))
     first[same] = depth[same]
     for row, column in np.argwhere(other).tolist():
-        at = np.s_[:, row, column]
+        at = row, column
         along = [*zip(layers.depth[at], layers.object_id[at], layers.entering[at], strict=True)]
         along = _from(
             [x for x in along if x[1] >= 0], depth[row, column], int(object_id[row, column])
         )[:MOST_LAYERS]
         along += [(np.float32(np.nan), -1, OPEN)] * (MOST_LAYERS - len(along))
         layers.depth[at], layers.object_id[at], layers.entering[at] = zip(*along, strict=True)
-    late = layers.depth[0] > layers.depth[1]
-    layers.depth[:, late] = np.maximum.accumulate(layers.depth[:, late], axis=0)
+    late = first > layers.depth[..., 1]
+    layers.depth[late] = np.maximum.accumulate(layers.depth[late], axis=-1)
 
 
 def _from(

@@ -71,8 +71,8 @@ def tiles(room: Room) -> list[NDArray[np.uint8]]:
 
 
 def cut_places(entering: Array) -> tuple[int, int]:
-    """Return the row and the column in which most rays enter an object, of layers (L, H, W)."""
-    enters = (entering == 1).any(axis=0)
+    """Return the row and the column in which most rays enter an object, of layers (H, W, L)."""
+    enters = (entering == 1).any(axis=-1)
     return int(enters.sum(axis=1).argmax()), int(enters.sum(axis=0).argmax())
 
 
@@ -84,17 +84,17 @@ def cuts(
     Objects have the colours of their ids, what is behind the room's surface is grey.
 
     Args:
-        layers: depth, object_id and entering, (L, H, W), as in `layers.Layers`.
+        layers: depth, object_id and entering, (H, W, L), as in `layers.Layers`.
         ends: least and largest depth that are shown; by default those of the layers.
     """
     depth = layers[0]
-    height, width = depth.shape[1:]
+    height, width = depth.shape[:2]
     known = depth[np.isfinite(depth)]
     near, far = ends or (float(known.min(initial=1.0)), float(known.max(initial=1.0)))
     margin = 0.05 * max(far - near, 1e-6)
     levels = [np.linspace(near - margin, far + margin, n) for n in (height, width)]
-    above = _cut([x[:, row] for x in layers], levels[0])[::-1]
-    aside = _cut([x[:, :, column] for x in layers], levels[1]).transpose(1, 0, 2)
+    above = _cut([x[row].T for x in layers], levels[0])[::-1]
+    aside = _cut([x[:, column].T for x in layers], levels[1]).transpose(1, 0, 2)
     return [above, aside]
 
 

@@ -192,18 +192,22 @@ def _albedo_problems(spec: Request, stored: Mapping[str, Array], view: Any) -> I
 def _layer_problems(stored: Mapping[str, Array], view: Any, count: int) -> Iterable[str]:
     depth, ids, entering = (stored[f"layers/{x}"] for x in ("depth", "object_id", "entering"))
     if not (
-        np.array_equal(depth[0], view.depth, equal_nan=True)
-        and np.array_equal(ids[0], view.object_id)
+        np.array_equal(depth[..., 0], view.depth, equal_nan=True)
+        and np.array_equal(ids[..., 0], view.object_id)
     ):
         yield "the first layer is not depth and object id"
     there = ids >= 0
-    if (np.isfinite(depth) != there).any() or (there[1:] & ~there[:-1]).any() or ids.max() > count:
+    if (
+        (np.isfinite(depth) != there).any()
+        or (there[..., 1:] & ~there[..., :-1]).any()
+        or ids.max() > count
+    ):
         yield "layers without a surface come before others, or object ids are impossible"
-    elif not (depth[1:] >= depth[:-1])[there[1:]].all():
+    elif not (depth[..., 1:] >= depth[..., :-1])[there[..., 1:]].all():
         yield "layers are not in order"
     if np.abs(entering).max() > 1 or entering[ids <= 0].any():
         yield "entering has other values than -1, 0 and 1, or is not 0 where no object is"
-    inside = [np.cumsum(np.where(ids == k + 1, entering, 0), axis=0) for k in range(count)]
+    inside = [np.cumsum(np.where(ids == k + 1, entering, 0), axis=-1) for k in range(count)]
     if any(some.min() < 0 or some.max() > 1 for some in inside):
         yield "a ray enters an object twice, or leaves it before"
     if (stored["object/closed"] > 1).any() or stored["object/closed"][count:].any():

@@ -266,7 +266,7 @@ def _same_picture(name: str, a: Array, b: Array) -> bool:
 def _within_tolerance(name: str, stored: Array, again: Array, edges: Array, spec: Request) -> bool:
     """Return whether two arrays of pixels, (H, W, ...), agree as far as other variants can."""
     most: float | Array
-    if name == AMODAL or name.startswith("layers/"):  # below, pixels come first
+    if name == AMODAL:  # below, pixels come first
         stored, again = np.moveaxis(stored, 0, -1), np.moveaxis(again, 0, -1)
     elif stored.ndim < 2:
         return False

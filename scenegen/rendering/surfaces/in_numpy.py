@@ -108,25 +108,29 @@ def _root_between(polynomial: list[Array], low: Array, high: Array) -> tuple[Arr
     halves where these leave the range.
     """
 
-    def value(x: Array) -> tuple[Array, Array]:
-        y, slope = polynomial[0], np.zeros_like(x)
-        for k in polynomial[1:]:
+    def value(factors: list[Array], x: Array) -> tuple[Array, Array]:
+        y, slope = factors[0], np.zeros_like(x)
+        for k in factors[1:]:
             y, slope = y * x + k, slope * x + y
         return y, slope
 
-    at_low, at_high = value(low)[0], value(high)[0]
+    at_low, at_high = value(polynomial, low)[0], value(polynomial, high)[0]
     crosses = (at_low < 0) != (at_high < 0)
-    end = np.where(np.abs(at_low) < np.abs(at_high), low, high)
-    negative = at_low < 0
+    found = np.where(np.abs(at_low) < np.abs(at_high), low, high)
+    factors = [k[crosses] for k in polynomial]
+    low, high, negative = low[crosses], high[crosses], at_low[crosses] < 0
     x = (low + high) / 2
     for _ in range(STEPS):
-        y, slope = value(x)
+        y, slope = value(factors, x)
         before = (y < 0) == negative
         low, high = np.where(before, x, low), np.where(before, high, x)
         with np.errstate(divide="ignore", invalid="ignore"):
             step = x - y / slope
-        x = np.where((step >= low) & (step <= high), step, (low + high) / 2)
-    return np.where(crosses, x, end), crosses
+        last, x = x, np.where((step >= low) & (step <= high), step, (low + high) / 2)
+        if (np.abs(x - last) <= 1e-12).all():
+            break
+    found[crosses] = x
+    return found, crosses
 
 
 def _dot(a: Array, b: Array) -> Array:

@@ -39,22 +39,24 @@ class Gltf:
         self.extensions.add(name)
         return {name: values}
 
-    def view(self, content: bytes, target: int | None = None) -> int:
-        """Return the index of a buffer view of bytes."""
-        if (content, target) not in self._seen:
+    def view(self, content: bytes, **how: int) -> int:
+        """Return the index of a buffer view of bytes; `how` is what else it tells."""
+        key = content, *how.items()
+        if key not in self._seen:
             self.data += bytes(-len(self.data) % 4)
-            told = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content)}
-            told |= {"target": target} if target else {}
+            place = {"buffer": 0, "byteOffset": len(self.data), "byteLength": len(content)}
             self.data += content
-            self._seen[content, target] = self.add("bufferViews", told)
-        return self._seen[content, target]
+            self._seen[key] = self.add("bufferViews", {**place, **how})
+        return self._seen[key]
 
     def accessor(self, values: Array, kind: str, bounds: bool = False) -> int:
         """Return the index of an accessor of attributes, (N, 2 to 4), or of indices, (N,)."""
         values = np.ascontiguousarray(values, kind)
-        target = VERTICES if values.ndim > 1 else INDICES
+        how = {"target": INDICES}
+        if values.ndim > 1:  # positions and normals of a sphere are equal, and share a view
+            how = {"target": VERTICES, "byteStride": values.strides[0]}
         told = {
-            "bufferView": self.view(values.tobytes(), target),
+            "bufferView": self.view(values.tobytes(), **how),
             "componentType": COMPONENTS[kind],
             "count": len(values),
             "type": TYPES[values.shape[1] if values.ndim > 1 else 1],

@@ -15,7 +15,6 @@ from metrics.submissions.reader import open_predictions
 from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.scene_mesh import scene_parts
-from scenegen.rendering.layers import welded
 from scenegen.rooms.reader import RoomsFile
 
 OPENCV = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -76,10 +75,10 @@ def test_open_parts_are_paired_in_order():
     lid = trimesh.creation.box((1, 1, 1))
     lid.update_faces(lid.triangles_center[:, 2] < 0.49)  # no front
     lid.apply_translation((0.07, 0.05, -3))
-    layers = mesh_layers(*welded(lid.vertices, lid.faces), 3, 3, 20.0)
+    layers = mesh_layers(lid.triangles, np.zeros(len(lid.faces), bool), 3, 3, 20.0)
     assert np.isnan(layers[1, 1]).all()
     lid = trimesh.util.concatenate([lid, lid.copy().apply_translation((0, 0, -2))])
-    layers = mesh_layers(*welded(lid.vertices, lid.faces), 3, 3, 20.0)
+    layers = mesh_layers(lid.triangles, np.zeros(len(lid.faces), bool), 3, 3, 20.0)
     np.testing.assert_allclose(layers[1, 1, :2], [3.5, 5.5], rtol=1e-6)
     assert np.isnan(layers[1, 1, 2:]).all()
 
@@ -109,7 +108,7 @@ def test_huge_meshes_are_refused_and_broken_faces_left_out(monkeypatch, tmp_path
 def test_files_of_layers(kind, layered, tmp_path):
     with RoomsFile(layered) as rooms:
         for room in rooms:
-            layers = np.moveaxis(room.truth["layers/depth"], 0, -1).astype(float)
+            layers = room.truth["layers/depth"].astype(float)
             rays = room.points / room.depth[..., None] * OPENCV.diagonal()[:3]
             values = layers
             if kind == "distance":
@@ -122,7 +121,7 @@ def test_files_of_layers(kind, layered, tmp_path):
     with open_predictions(tmp_path / "p.h5") as found, RoomsFile(layered) as rooms:
         assert (found.kind, found.alignment) == ("layers", "scale")
         for row in range(2):
-            true = np.moveaxis(rooms.read("layers/depth", row), 0, -1)
+            true = rooms.read("layers/depth", row)
             np.testing.assert_allclose(found.geometry(row), true, rtol=1e-6)
 
 

@@ -34,8 +34,7 @@ def write(path, truth, change=lambda layers: layers, **settings):
         RoomPredictionWriter(path, truth, method="m", **settings) as out,
     ):
         for row in range(len(rooms)):
-            layers = np.moveaxis(rooms.read("layers/depth", row), 0, -1)
-            out.add(row, layers=change(layers.astype(np.float64)))
+            out.add(row, layers=change(rooms.read("layers/depth", row).astype(np.float64)))
     return path
 
 
@@ -88,12 +87,12 @@ def test_thickness_is_what_is_scored(layered, tmp_path):
     with RoomsFile(layered) as rooms, open_predictions(path) as said:
         for row, value in enumerate(found.columns["solid_iou"].ravel()):
             kinds = rooms.read("layers/entering", row)
-            opened = ((rooms.read("layers/object_id", row) > 0) & (kinds == 0)).any(axis=0)
+            opened = ((rooms.read("layers/object_id", row) > 0) & (kinds == 0)).any(axis=-1)
             true, mine = (
-                paired_spans(layers.reshape(16, -1)[:, ~opened.ravel()].astype(float))
+                paired_spans(layers[~opened].T.astype(float))
                 for layers in (
                     rooms.read("layers/depth", row),
-                    np.moveaxis(said.geometry(row), -1, 0),
+                    said.geometry(row),
                 )
             )
             lengths = [length(spans).sum() for spans in (mine, true)]

@@ -81,13 +81,13 @@ def test_are_those_of_every_triangle(source, shapes):
         expected, batch = by_brute_force(spec, scene, objects)
         image = render(batch)
         layers = layers_of(batch, 0, image.depth[0], image.object_id[0])
-        np.testing.assert_array_equal(layers.depth[0], image.depth[0])
-        np.testing.assert_array_equal(layers.object_id[0], image.object_id[0])
+        np.testing.assert_array_equal(layers.depth[..., 0], image.depth[0])
+        np.testing.assert_array_equal(layers.object_id[..., 0], image.object_id[0])
         off = 0
         for pixel, along in enumerate(expected):
             row, column = divmod(pixel, spec.width)
-            ids, kinds = (x[:, row, column] for x in (layers.object_id, layers.entering))
-            depth = layers.depth[:, row, column]
+            ids, kinds = (x[row, column] for x in (layers.object_id, layers.entering))
+            depth = layers.depth[row, column]
             assert (ids == 0).sum() <= 1
             same = [(k, e) for _, k, e in along] == [
                 (k, e) for k, e in zip(ids.tolist(), kinds.tolist(), strict=True) if k > 0
@@ -101,8 +101,9 @@ def test_are_those_of_every_triangle(source, shapes):
 
 def test_a_ray_crosses_a_torus_four_times():
     surface = unit_shape("torus").surface
-    local = np.array([[0.0, 0, 1, 2], [0, 1, 0, 0.01], [1, 0, 0, 0.02]])  # from x = 2 to the left
-    found = _surface_crossings(surface, local, 1, 1, 20.0)
+    turned = np.array([[0.0, 0, -1], [0, 1, 0], [1, 0, 0]])  # so that the ray runs along -x
+    placed = np.column_stack([turned, -turned @ [2, 0.01, 0.02]])
+    found = _surface_crossings(surface, placed, 1, 1, 20.0)
     outer, inner = (np.sqrt((0.68 + r) ** 2 - 0.02**2) for r in tube_at(0.01))
     np.testing.assert_allclose(found.depth, [2 - outer, 2 - inner, 2 + inner, 2 + outer])
     assert found.kind.tolist() == [1, -1, 1, -1]
@@ -121,7 +122,8 @@ def cube(side, middle):
 def along_the_axis(corners, faces=None):
     """Return depth and kind of what the middle pixel of 3 x 3 meets."""
     faces = np.arange(3 * len(corners)).reshape(-1, 3) if faces is None else faces
-    found = solid_crossings(*welded(corners.reshape(-1, 3), faces), 3, 3, 20.0)
+    vertices, faces, closed = welded(corners.reshape(-1, 3), faces)
+    found = solid_crossings(vertices[faces], closed, 3, 3, 20.0)
     at = found.pixel == 4
     order = np.argsort(found.depth[at])
     return found.depth[at][order], found.kind[at][order].tolist()
@@ -164,7 +166,7 @@ def test_a_mesh_may_reach_behind_the_camera():
 
 
 def layers_by_hand(*along):
-    arrays = [np.array(x, kind).reshape(-1, 1, 1) for x, kind in zip(
+    arrays = [np.array(x, kind).reshape(1, 1, -1) for x, kind in zip(
         zip(*along, *[(NAN, -1, 0)] * (16 - len(along)), strict=True),
         (np.float32, np.int8, np.int8), strict=True)]  # fmt: skip
     return Layers(*arrays)

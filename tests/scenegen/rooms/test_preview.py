@@ -55,12 +55,12 @@ def test_the_command(run, rooms_path, rooms):
 
 def test_cuts_show_what_is_inside_of_objects():
     """An object from depth 2 to 3 in the left of two columns, a room at 4, and a sheet at 3.5."""
-    depth = np.full((4, 2, 2), np.nan)
-    depth[:, 0, 0], depth[0, 0, 1], depth[0, 1] = (2, 3, 3.5, 4), 4, 4
-    ids, kinds = np.full((4, 2, 2), -1), np.zeros((4, 2, 2), int)
-    ids[:, 0, 0], ids[0, 0, 1], ids[0, 1], kinds[:2, 0, 0] = (1, 1, 2, 0), 0, 0, (1, -1)
+    depth = np.full((2, 2, 4), np.nan)
+    depth[0, 0], depth[0, 1, 0], depth[1, :, 0] = (2, 3, 3.5, 4), 4, 4
+    ids, kinds = np.full((2, 2, 4), -1), np.zeros((2, 2, 4), int)
+    ids[0, 0], ids[0, 1, 0], ids[1, :, 0], kinds[0, 0, :2] = (1, 1, 2, 0), 0, 0, (1, -1)
     assert cut_places(kinds) == (0, 0)
-    wide = [np.repeat(np.repeat(x, 50, axis=1), 50, axis=2) for x in (depth, ids, kinds)]
+    wide = [np.repeat(np.repeat(x, 50, axis=0), 50, axis=1) for x in (depth, ids, kinds)]
     above, aside = cuts(wide, 10, 10, (2.0, 4.0))
     assert above.shape == aside.shape == (100, 100, 3)
     levels = np.linspace(1.9, 4.1, 100)[::-1]

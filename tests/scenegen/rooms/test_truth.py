@@ -65,11 +65,11 @@ def test_what_is_stored(full):
             np.testing.assert_allclose(
                 room.truth["albedo"][hit], rho[room.object_id[hit]], rtol=1e-7
             )
-            np.testing.assert_array_equal(room.truth["layers/depth"][0], room.depth)
-            np.testing.assert_array_equal(room.truth["layers/object_id"][0], room.object_id)
+            np.testing.assert_array_equal(room.truth["layers/depth"][..., 0], room.depth)
+            np.testing.assert_array_equal(room.truth["layers/object_id"][..., 0], room.object_id)
             ids = room.truth["layers/object_id"]
             np.testing.assert_array_equal(
-                masks, [(ids == k + 1).any(axis=0) for k in range(len(masks))]
+                masks, [(ids == k + 1).any(axis=-1) for k in range(len(masks))]
             )
             coordinates = room.truth["object_coordinates"]
             np.testing.assert_array_equal(np.isnan(coordinates[..., 0]), room.object_id <= 0)
@@ -125,7 +125,7 @@ def mask_of_no_object(file):
         (values("flow_occluded", lambda stored: 1 - stored), "flow"),
         (values("albedo", lambda stored: stored + 1e-3), "albedo"),
         (values("layers/depth", lambda stored: stored + 1e-3), "layers"),
-        (values("layers/depth", lambda stored: stored[:, ::-1]), "layers"),
+        (values("layers/depth", lambda stored: stored[..., ::-1]), "layers"),
         (values("layers/object_id", lambda stored: stored.clip(0)), "layers"),
         (values("layers/entering", lambda stored: -stored), "layers"),
         (put("object/closed", (0, 2), 7), "layers"),

@@ -391,7 +391,8 @@ def test_images_agree_in_their_floats_and_path_traced_ones_in_their_means(how, f
 def test_tolerances_of_pixels(name, by, within):
     again, none = np.ones((64, 64)), np.zeros((64, 64), bool)
     if "/" in name:  # several images of a row, or a number for each object
-        again = np.ones(5) if name == "object/closed" else np.ones((5, 64, 64))
+        shape = {"object/closed": (5,), "object/amodal_mask": (5, 64, 64)}.get(name, (64, 64, 5))
+        again = np.ones(shape)
     assert _within_tolerance(name, again + by, again, none, DatasetSpec()) == within
 
 

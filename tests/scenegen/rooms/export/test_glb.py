@@ -110,6 +110,9 @@ def test_structure(made):
                 material = json.dumps(about["materials"][part["material"]])
                 assert ("Texture" in material) <= ("TEXCOORD_0" in held)
                 assert ("normalTexture" in material) == ("TANGENT" in held)
+                for name, number in part["attributes"].items():
+                    view = about["bufferViews"][about["accessors"][number]["bufferView"]]
+                    assert (view["target"], view["byteStride"]) == (34962, held[name].strides[0])
         assert used == set(range(len(about["accessors"])))
         told = {"KHR_lights_punctual", "KHR_materials_specular", "KHR_materials_emissive_strength"}
         assert set(about["extensionsUsed"]) <= told
