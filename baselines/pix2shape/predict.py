@@ -59,7 +59,7 @@ def predict_file(
     """
     model, card = open_weights(weights)
     if method not in (None, card.submission):
-        hint = "names tell what a model was told and taught; `pix2shape predict` takes any weights"
+        hint = "the name states inputs and supervision; `pix2shape predict` takes any weights"
         raise SpecError("weights", f"{weights}, whose method is {card.submission}", method, hint)
     model.to(chosen_device(device))
     predict = (
@@ -86,8 +86,12 @@ def views_of(model: Pix2Shape, earlier_depth: bool, run: str, rooms: RoomsFile) 
     """
     spec = model.config.networks
     if not spec.camera or spec.classes:
-        what = "is told classes, which are part of the truth" if spec.classes else "is not told it"
-        raise SpecError("weights", f"a model that {what}", "one that is told the camera alone")
+        what = (
+            "takes categories as input, which are part of the ground truth"
+            if spec.classes
+            else "does not take it as input"
+        )
+        raise SpecError("weights", f"a model that {what}", "one that takes the camera only")
     device = next(model.parameters()).device
     method = TAUGHT_DEPTH if earlier_depth else model.config.method
     notes = "; ".join([TOLD] * spec.rays + [DEPTH] * (method == TAUGHT_DEPTH))
@@ -121,7 +125,7 @@ def answers_of(model: Pix2Shape, labels: int, run: str, questions: QuestionsFile
     """
     spec, device = model.config.networks, next(model.parameters()).device
     if spec.condition:
-        raise SpecError("weights", "a model that is told the camera", "one for questions")
+        raise SpecError("weights", "a model that takes the camera as input", "one for questions")
     check_background(questions, model.config)
 
     def scores(images: Tensor) -> Tensor:

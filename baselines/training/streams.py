@@ -76,7 +76,7 @@ class TrainingStreams:
             if not self.allow_test_set:
                 refuse_request(self.where, specs[-1].to_json())
         if len({getattr(spec, "interior", False) for spec in specs}) > 1:
-            raise SpecError("stream", self.names, "closed rooms alone, or none of them")
+            raise SpecError("stream", self.names, "only closed rooms, or none")
         return Shown(tuple(specs))
 
 

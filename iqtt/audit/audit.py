@@ -193,7 +193,7 @@ def _prove(
         explanations.no_other_explanation(with_cubes, shapes, _spread(counts, EXPLAINED)),
     ]
     untold = [table.name for table in tables if not table.truth]
-    note = f"; not told of {', '.join(untold)}" if untold else ""
+    note = f"; not stored in {', '.join(untold)}" if untold else ""
     return [replace(proof, detail=proof.detail + note) for proof in by_cubes] + proofs
 
 

@@ -46,7 +46,7 @@ def question_kind(kinds: Sequence[int]) -> str:
     """
     wrong = sorted({DISTRACTOR_KINDS[kind] for kind in kinds if kind >= 0})
     if not wrong:
-        raise ValueError("a question has a wrong answer")
+        raise ValueError("a question has a wrong option")
     kind = "mirror" if {"mirror", "near-mirror"} & set(wrong) else wrong[0]
     if wrong == ["mirror"]:
         kind = "mirror-pair"

@@ -167,8 +167,8 @@ def import_(
 
     texts: dict[str, Any] = {"run": run_name, "notes": notes, "overwrite": overwrite}
     if expanded:
-        found = f"{expanded[0]} beside the options, as where a shell expands a pattern"
-        raise click.UsageError(f"found {found}; put patterns in quotes, such as 'out/*.png'")
+        found = f"{expanded[0]} after the options: the shell has expanded a pattern"
+        raise click.UsageError(f"found {found}; quote patterns, such as 'out/*.png'")
     if sum(source is not None for source in (pattern, layers, meshes, answers, people)) != 1:
         ways = "--depth, --layers or --meshes for rooms"
         raise click.UsageError(f"give {ways}, or --responses or --quiz for questions")
@@ -180,9 +180,9 @@ def import_(
             files_of(people, (".json",)), truth, out,
             method=method or "people", notes=notes, overwrite=overwrite,
         )
-        print_line(f"{out}: answers of {len(made)} people")
+        print_line(f"{out}: responses of {len(made)} people")
         score = f"bench score {shlex.quote(out.rstrip('/'))}/*.h5 --allow-partial --truth"
-        print_line(f"now: {score} ANSWERS.h5")
+        print_line(f"now: {score} ANSWER_KEY.h5")
         return
     check_writable(Path(out), overwrite)
     if answers is not None:
@@ -230,7 +230,7 @@ def _import_answers(
             name = method or Path(answers).stem
             count = import_answers(answers, questions, out, method=name, **texts)
         of_all = f" of {len(questions)}" if count < len(questions) else ""
-    print_line(f"{out}: answers to {count}{of_all} questions")
+    print_line(f"{out}: responses to {count}{of_all} questions")
 
 
 def _name_of(pattern: str) -> str:
@@ -363,7 +363,7 @@ def run(
         raise
     except KeyboardInterrupt:
         at = f" at {loaded.calls[0]}" if loaded is not None and loaded.calls else ""
-        print_line(f"stopped{at}; the same command goes on with the rows in {out}.rows", err=True)
+        print_line(f"stopped{at}; re-run the same command to resume with {out}.rows", err=True)
         raise
 
 

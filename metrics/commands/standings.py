@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 ALIGN = click.option(
     "--align",
     type=click.Choice(FITS),
-    help="Score depth and points of all methods after this alignment to the truth of each image"
-    " [default: the loosest one that a method declares].",
+    help="Alignment to the ground truth of each image, for all methods [default: the loosest"
+    " alignment that a method declares].",
 )
 TRUTH = click.option(
     "--truth",
@@ -53,17 +53,19 @@ def _scores_of(paths: tuple[str, ...], truth: str | None, **settings: Any) -> "l
 @TRUTH
 @click.option(
     "--metric", "metrics", multiple=True,
-    help="A score to compare; may be repeated [default: the headline scores].",
+    help="Metric to compare. Repeatable [default: the main metrics].",
 )  # fmt: skip
-@click.option("--json", "json_path", type=OutputPath(), help="Write the comparison here.")
-@click.option("--html", "html_path", type=OutputPath(), help="Write a page: verdicts and charts.")
+@click.option("--json", "json_path", type=OutputPath(), help="Write the comparison as JSON.")
+@click.option(
+    "--html", "html_path", type=OutputPath(), help="Write a page with verdicts and charts."
+)
 @MARKDOWN
 @SEED
 @ALIGN
 @click.option(
     "--allow-incomparable",
     is_flag=True,
-    help="Compare files that say that they are not comparable, over the rows that all have.",
+    help="Also compare scores that are not comparable, over the items that all files have.",
 )
 @OVERWRITE
 def compare(
@@ -76,11 +78,11 @@ def compare(
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Compare methods with the first one, item by item, all after one alignment.
+    """Compare methods with a reference, paired by item and under one alignment.
 
     Each argument is a score file of `bench score --json`, or a submission, which is scored first.
-    Prints the differences, their confidence intervals and significance tests, and the smallest
-    difference that the test set could show.
+    The output lists differences with confidence intervals and significance tests, and the smallest
+    difference that the test set can detect.
     """
     from metrics.scoring.aligned import aligned
     from metrics.views.compare.compare import compare as compare_files
@@ -108,8 +110,7 @@ def compare(
 @TRUTH
 @click.option(
     "--metric", "metrics", multiple=True,
-    help="A score to show; may be repeated, and the first one ranks [default: the headline"
-    " scores].",
+    help="Metric to show. Repeatable; the first metric ranks [default: the main metrics].",
 )  # fmt: skip
 @click.option(
     "--format",
@@ -119,16 +120,18 @@ def compare(
     show_default=True,
     help="Format of the tables.",
 )
-@click.option("--no-intervals", is_flag=True, help="Show the values alone.")
-@click.option("--caption", default="", help="Of the first LaTeX table [default: its test set].")
+@click.option("--no-intervals", is_flag=True, help="Print values without confidence intervals.")
+@click.option(
+    "--caption", default="", help="Caption of the first LaTeX table [default: its test set]."
+)
 @click.option(
     "--label",
     default="",
-    help=r"Of the first LaTeX table, for \ref; a number follows it for each other one.",
+    help=r"Label of the first LaTeX table, for \ref. Further tables append a number.",
 )
-@click.option("--out", type=OutputPath(), help="Write to this file instead of printing.")
+@click.option("--out", type=OutputPath(), help="Output file [default: print].")
 @ALIGN
-@click.option("--no-paper", is_flag=True, help="Leave out what the paper reports.")
+@click.option("--no-paper", is_flag=True, help="Leave out the results of the Pix2Shape paper.")
 @OVERWRITE
 def leaderboard(
     scores: tuple[str, ...],
@@ -143,12 +146,12 @@ def leaderboard(
     no_paper: bool,
     overwrite: bool,
 ) -> None:
-    """Rank methods in one table for each test set, all after one alignment.
+    """Rank methods, in one table per test set and under one alignment.
 
     Each METHOD is a score file of `bench score --json`, or a submission, which is scored first.
-    The headline ranks: shape for the paper's rooms, or what is behind for methods that see the
-    first view alone, the relative error of depth for interiors, and skill for questions. Baselines,
-    and what the paper reported on its own data, stand below the methods, without a rank.
+    The first main metric ranks: shape_error for box rooms, hidden surfaces for methods that get the
+    first view only, abs_rel for interiors, and skill for questions. Baselines, and the results that
+    the paper reports on its own data, are listed without a rank.
     """
     from metrics.views.leaderboard import leaderboard as rank
     from metrics.views.leaderboard import to_html

@@ -144,7 +144,9 @@ def score(
     if beside and html_path is None:
         raise click.UsageError("--compare-with adds to the page of --html: give --html as well")
     if (protocol == "all") != bool(figure_path) and (figure_path or outputs):
-        raise click.UsageError("--protocol all gives a table and --figure; keep one with NAME")
+        raise click.UsageError(
+            "--protocol all prints a table and writes --figure; other outputs need --protocol NAME"
+        )
     if protocol == "all":
         _score_all(submissions, truth, Settings(**settings), figure_path, markdown, overwrite)
         return

@@ -43,7 +43,7 @@ FRAMES: dict[Frame, Array] = {  # what an axis is multiplied by to be one of our
     "opencv": np.array([1.0, -1.0, -1.0]),
     "opengl": np.array([1.0, 1.0, 1.0]),
 }
-FILL = "say --missing nearest to fill them from the nearest pixel that has a value"
+FILL = "use --missing nearest to fill them from the nearest valid pixel"
 _WANTED = "a dict with one of " + ", ".join(KEYS)
 
 
@@ -263,7 +263,9 @@ def _refuse_zeros(geometry: Geometry, name: str) -> None:
     """Raise OutputError for depths of 0: the camera's own place, or a file's mark for no value."""
     zeros = np.count_nonzero(geometry.geometry == 0.0)
     if geometry.kind == "depth" and geometry.alignment != "scale_shift" and zeros:
-        hint = "if 0 stands for no value, bench import --invalid 0, or let the model return NaN"
+        hint = (
+            "if 0 marks invalid pixels, use bench import --invalid 0, or return NaN from the model"
+        )
         raise OutputError(name, f"0 at {zeros} pixels", "depths above 0", hint)
 
 

@@ -310,7 +310,7 @@ def question_skill(
         return None
     floor, name = found
     value = skill(score.value, floor, higher_is_better=True)
-    assert value is not None, "no floor is perfect"
+    assert value is not None, "no baseline is perfect"
     low, high = (
         None if end is None else skill(end, floor, higher_is_better=True)
         for end in (score.low, score.high)

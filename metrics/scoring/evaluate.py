@@ -124,7 +124,9 @@ def _align(files: Sequence[Predictions], alignment: Alignment | None) -> None:
     """Score files under an alignment that is as loose as theirs. Raises ScoringError for others."""
     for file in files if alignment is not None else ():
         if not isinstance(file, RoomPredictions):
-            raise ScoringError(file.path, f"answers under --align {alignment}", "depth or points")
+            raise ScoringError(
+                file.path, f"responses to questions, with --align {alignment}", "depth or points"
+            )
         allowed = allowed_alignments(file)
         if alignment not in allowed:
             found = f"{file.kind} under {file.alignment}, scored under {alignment}"
@@ -142,7 +144,7 @@ def _unchanged(runs: Runs, scores: Result) -> Result:
 def _measured(runs: Runs) -> MeasuredRuns:
     """Raise ProtocolError for truth that is exact, and has no pixels or ranges to choose."""
     if not isinstance(runs, MeasuredRuns):
-        expected = "measured truth, as `bench truth` makes it"
+        expected = "measured ground truth, as `bench truth` makes it"
         raise ProtocolError("protocol", f"one for {runs.truth.path}", expected)
     return runs
 

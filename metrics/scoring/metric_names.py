@@ -436,11 +436,11 @@ TABLE: Sequence[Metric] = (
     _angle("derived_shape_normal_degrees", "Normals inside objects, from points",
            "`shape_normal_degrees` of normals derived from the predicted and from the true points.",
            of="points", baselines=_FLAT_OR_EMPTY, **_INSIDE),
-    _error(BEHIND, "Depth error behind",
+    _error(BEHIND, "Hidden surfaces, depth error",
            "mean error at the pixels of objects that are hidden in the first view of the scene.",
            headline={"rooms": 2}, printed=7,
            baselines=(EMPTY_ROOM, CUT_OUT, LEANING, BALLS, BLOCKS), **_BEHIND),
-    _share("behind_recall_0.05", "Found behind within 0.05",
+    _share("behind_recall_0.05", "Hidden surfaces within 0.05",
            "fraction of the hidden true surface that is nearer than 0.05 scene units to a predicted"
            " point.", **_BEHIND),
     _error("object_depth_error", "Objects' depth error",
@@ -523,7 +523,7 @@ _FITTED = "after the non-negative scale"
 FORMS: Mapping[str, Sequence[Form]] = {
     "": (),
     "depth": (
-        Form("*_after_median_scale", "scaled to the truth's median",
+        Form("*_after_median_scale", "scaled by the median",
              "after scaling the predicted depth to the true median depth of the image."),
         Form("*_after_scale", "scaled", f"{_FITTED} {_LEAST_SQUARES}"),
         Form("*_after_scale_shift", "scaled and shifted", f"{_FITTED} and shift {_LEAST_SQUARES}"),

@@ -110,7 +110,7 @@ class Predictions:
             theirs not in (0, ours) for theirs, ours in zip(identity, self.identity, strict=True)
         ):
             found = "another file than the one that was opened"
-            raise FileFormatError(self.path, found, "one that does not change while it is scored")
+            raise FileFormatError(self.path, found, "a file that does not change during scoring")
 
     def close(self) -> None:
         """Close the file; idempotent."""
@@ -316,7 +316,7 @@ def inspect_predictions(
     else:
         if not tried:
             trial.try_file(path)
-        file = open_unchecked(path, "submission; `bench import` makes one of other files")
+        file = open_unchecked(path, "submission; `bench import` converts other files")
         with checking(file):
             content = inspect(file)
     opened: RoomPredictions | QuestionPredictions | None = None

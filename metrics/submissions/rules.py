@@ -109,11 +109,11 @@ def _on_surface(wrong: Any, against: Against) -> Any:
 
 OUTCOMES = ("answered", "unparsed", "refused", "cut off")  # of the text of a model that was asked
 NOT_ASKED = -2  # in this order of the answers, or the model failed
-IDS, SURFACE = ("row", "question"), "wherever the truth shows a surface"
+IDS, SURFACE = ("row", "question"), "wherever the ground truth has a surface"
 RULES = (
     Rule(IDS, "range", "0 or more", "negative", lambda ids, _: ids < 0),
     Rule(IDS, "unique", "each once", "given more than once", lambda ids, _: _repeated(ids)),
-    Rule(IDS, "known", "rows of the truth", "that the truth does not have", _unknown),
+    Rule(IDS, "known", "rows of the ground truth", "that the ground truth does not have", _unknown),
     Rule(
         ("depth", "disparity", "confidence"), "finite", f"finite numbers {SURFACE}",
         "NaN, infinite or huge",
@@ -142,15 +142,15 @@ RULES = (
         lambda degrees, _: ~((degrees > 0.0) & (degrees < 180.0)),
     ),
     Rule(
-        ("answer",), "range", "the number of an answer from 0, or -1", "that are no answer",
+        ("answer",), "range", "the index of an option from 0, or -1", "that are not an option",
         _no_answer,
     ),
     Rule(
-        ("rotated",), "range", "numbers of answers from 0, -1 or -2", "that are no answers",
+        ("rotated",), "range", "indices of options from 0, -1 or -2", "that are not options",
         _no_rotated,
     ),
     Rule(
-        ("rotated",), "agreement", "`answer`, in the first column", "that begin with another one",
+        ("rotated",), "agreement", "`answer`, in the first column", "that begin with another value",
         lambda answers, against: _other_than_scores(answers[:, 0], against),
     ),
     Rule(
@@ -163,7 +163,7 @@ RULES = (
     ),
     Rule(
         ("answer",), "agreement", "the highest of scores, -1 where it is tied",
-        "other than scores say", _other_than_scores,
+        "that disagree with scores", _other_than_scores,
     ),
 )  # fmt: skip
 

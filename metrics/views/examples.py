@@ -181,9 +181,9 @@ def _entry_scores(scores: ScoreFile, entry: int) -> str:
 
 
 def chosen_questions(right: NDArray[np.bool_], most: int = SHOWN) -> dict[str, list[int]]:
-    """Return entries to show that are "right" and "wrong", (Q,), spread evenly over the file."""
+    """Return entries to show that are "correct" and "wrong", (Q,), spread evenly over the file."""
     lists = {}
-    for title, entries in (("right", np.flatnonzero(right)), ("wrong", np.flatnonzero(~right))):
+    for title, entries in (("correct", np.flatnonzero(right)), ("wrong", np.flatnonzero(~right))):
         places = np.rint(np.linspace(0, len(entries) - 1, min(most, len(entries)))).astype(int)
         if len(entries):
             lists[title] = entries[places].tolist()
@@ -208,10 +208,10 @@ def _questions(scores: ScoreFile, truth: Path, predictions: QuestionPredictions)
         answers = np.array([answer.get(i, ABSTAINED) for i in ids])
         true = np.asarray(questions.read("answers", slice(None)), np.int64)[scores.ids]
         right = answers == true
-        totals = {"right": int(right.sum()), "wrong": int((~right).sum())}
+        totals = {"correct": int(right.sum()), "wrong": int((~right).sum())}
         return [
             (
-                f"{len(entries)} of {totals[title]:,} questions answered {title}ly",
+                f"{len(entries)} of {totals[title]:,} {title} responses",
                 [_question(questions[ids[i]], int(true[i]), int(answers[i])) for i in entries],
             )
             for title, entries in chosen_questions(right).items()
@@ -232,11 +232,11 @@ def _question(record: Any, right: int, answer: int) -> Example:
     urls = [data_url(srgb_bytes(np.nan_to_num(image))) for image in record.radiance]
     pictures = [Picture("reference", urls[0])]
     for k, url in enumerate(urls[1:]):
-        marks = ["right"] * (k == right) + ["answered"] * (k == answer)
-        pictures.append(Picture(f"answer {LETTERS[k]}", url, ", ".join(marks), k == right))
-    text = f"right is {LETTERS[right]}, "
-    text += "no answer was given" if answer == ABSTAINED else f"{LETTERS[answer]} was answered"
+        marks = ["correct"] * (k == right) + ["selected"] * (k == answer)
+        pictures.append(Picture(f"option {LETTERS[k]}", url, ", ".join(marks), k == right))
+    text = f"correct: {LETTERS[right]}, selected: "
+    text += "none" if answer == ABSTAINED else LETTERS[answer]
     kinds: Sequence[str | None] = record.truth.distractor_kind if record.truth else ()
     wrong = sorted({kind for kind in kinds if kind})
-    text += f"; wrong answers: {', '.join(wrong)}" if wrong else ""
+    text += f"; distractor types: {', '.join(wrong)}" if wrong else ""
     return Example(f"question {record.index}", text, pictures)

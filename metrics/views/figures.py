@@ -198,7 +198,7 @@ def draw_grid(
             for row in rows:
                 if not 0 <= row < len(rooms):
                     raise FigureError(
-                        f"{truth}: row {row}", "no such row", f"0 to {len(rooms) - 1}"
+                        f"{truth}: row {row}", "no such image", f"0 to {len(rooms) - 1}"
                     )
                 lines.append(shown_row(rooms, row, [_view(file, row) for file in opened]))
     finally:
@@ -231,10 +231,10 @@ def shown_row(rooms: Images, row: int, views: Sequence[PredictedView]) -> Line:
 
 def _view(file: Any, row: int) -> PredictedView:
     if not isinstance(file, RoomPredictions):
-        raise FigureError(file.path, "answers to questions", "predictions of rooms")
+        raise FigureError(file.path, "responses to questions", "predictions of rooms")
     places = np.flatnonzero(file.rows == row)
     if not len(places):
-        raise FigureError(f"{file.path}: row {row}", "no prediction", "one of this row")
+        raise FigureError(f"{file.path}: row {row}", "no prediction", "one of this image")
     return file.view(int(places[0]))
 
 

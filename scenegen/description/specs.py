@@ -2,7 +2,7 @@
 
 `DatasetSpec` asks for the paper's rooms, and `InteriorSpec` for closed rooms with furniture. Each
 setting stands once: it is a field, whose metadata has its limits and its text for `--help`. Lengths
-are in scene units (the room's edge; metres in closed rooms), frames as in `camera.py`.
+are in scene units (side length of the room; metres in closed rooms), frames as in `camera.py`.
 """
 
 import itertools
@@ -77,24 +77,24 @@ class RoomSpec:
         seed: dataset seed, 0 to 2**63 - 1.
         height, width: image size in pixels.
         objects: fewest and most objects of a scene.
-        source: what objects are: "shapes" for basic shapes, "families" for the built-in object
-            classes, else the kind of folder that their meshes come from; the
-            classes of closed rooms that a folder lacks are built in.
-        shapes: names to draw from, each with the same probability: basic shapes, or classes.
-        object_split: which objects of a class are drawn from (see `meshes.listing.object_split`).
-        listing: digest of the names of a folder's models; empty for what is built in.
+        source: "shapes" for basic shapes, "families" for the built-in object categories, else the
+            type of the folder of meshes; closed rooms take categories that the folder lacks from
+            the built-in ones.
+        shapes: names to sample from with equal probability: basic shapes, or object categories.
+        object_split: split of object instances to sample from (see `meshes.listing.object_split`).
+        listing: hash of the names of the meshes of a folder; empty for built-in objects.
         views: degrees about the vertical axis through the target, from the input view, which is
             the first, to each view of a scene; see `sampling.cameras`.
         spp: colour samples per pixel; 1 shades the ground-truth hit itself.
         image_dtype: "uint8" (linear radiance 0..1 as 0..255), "float16" or "float32" (radiance).
-        min_visible_pixels: every object shows at least so many pixels in every view, in closed
-            rooms LEAST_SEEN objects; by default VISIBLE_SHARE of the image's, at least 1.
+        min_visible_pixels: minimum number of visible pixels of every object in every view (in
+            closed rooms, of LEAST_SEEN objects); by default VISIBLE_SHARE of the image.
         fov_degrees: field of view of a square image; others have its diagonal.
-        fov_spread_degrees: how much wider than `fov_degrees` a scene's field of view can be; each
-            scene draws its own, uniformly.
+        fov_spread_degrees: range of the field of view above `fov_degrees`; each scene samples its
+            own, uniformly.
         stereo: distance between the cameras of a stereo pair; 0 for single cameras. Each view is
-            then followed by one whose camera is moved along its x axis.
-        truth: further truth of each row, some of TRUTHS (`rooms.truth`).
+            then followed by a view whose camera is moved along its x axis.
+        truth: additional ground truth, some of TRUTHS (`rooms.truth`).
     """
 
     seed: int = setting(0)
@@ -184,28 +184,28 @@ class RoomSpec:
 
 @dataclass(frozen=True)
 class DatasetSpec(RoomSpec):
-    """A request for the paper's rooms: a floor and two walls, with objects on the floor.
+    """A request for box rooms, as in the paper: a ground and two walls, with objects on the ground.
 
     Attributes:
         object_radius: smallest and largest bounding radius of an object, scene units.
-        pose: "resting" puts every object down in a position where it would stay; "any" turns it
-            uniformly on SO(3) and lowers it until it touches the floor.
+        pose: "resting" puts each object in a stable position; "any" rotates it uniformly on SO(3)
+            and lowers it until it touches the ground.
         lights: fewest and most point lights.
         shading: "paper" for the paper's equation, "path" for a path tracer on the same scene.
         shadows: whether lights are occluded (the paper's shading equation has no visibility term).
-        allow_cropped: let the image's border cut objects (their centres stay in the image).
+        allow_cropped: allow objects that the image border crops (centres stay in the image).
         camera_radius: distance from camera to target, scene units.
         camera_target: the fixed point of the room that cameras look at, world.
         light_radius: distance from the target to each light, scene units.
         light_level: radiance of a white surface at the target that faces all lights, ambient apart.
         ambient: the RGB of L_a.
         attenuation: k_l and k_q of the shading equation.
-        light_saturation: each light's RGB is drawn from 1 - this to 1, then its largest made 1.
+        light_saturation: RGB of each light is sampled from 1 - this to 1, then scaled to maximum 1.
         reflectance, room_reflectance: the RGB of rho, of objects and of the room.
-        random_reflectance: draw every object's instead, from 0.15 to 0.95 each.
+        random_reflectance: sample the reflectance of each object, from 0.15 to 0.95 per channel.
         specular, shininess: ranges of Phong's k_s and exponent of objects; the room is matte.
         own_reflectance: multiply the reflectance of objects by the colours of their files; the
-            truth then has "albedo", as no other column tells it.
+            ground truth then has "albedo".
 
     The other settings are those of `RoomSpec`.
     """
@@ -299,11 +299,11 @@ class InteriorSpec(RoomSpec):
     """A request for closed rooms with furniture, in metres (`description.interiors`).
 
     Attributes:
-        hours: earliest and latest hour of the day; each scene draws its own, uniformly.
+        hours: earliest and latest hour of the day; each scene samples its own, uniformly.
         denoise: whether images are denoised.
-        sensor_noise: standard deviation of noise that is added to images, as a share of white.
-        materials: digest of a folder of materials; empty for those that are drawn.
-        environment: digest of an image of the surroundings; empty for sun and sky.
+        sensor_noise: standard deviation of the noise that is added to images, relative to white.
+        materials: hash of a folder of materials; empty for procedural materials.
+        environment: hash of an environment map; empty for sun and sky.
 
     The other settings are those of `RoomSpec`. Class attributes answer for settings of
     `DatasetSpec` that the renderer asks for.

@@ -70,7 +70,7 @@ def _judge(path: str | Path, done: "subprocess.CompletedProcess[str]", limit: fl
     elif code in (killed, slow) and "cpu" in lower:
         why, hint = "it used all of the processor time that is allowed here", "raise ulimit -t"
     elif "memory" in lower and code != slow:
-        why = f"memory is limited here, and it ended with {ended(code)}"
+        why = f"memory is limited here, and the process exited with {ended(code)}"
         hint = "raise ulimit -v"
     elif code == killed:
         why, hint = "it was killed", "memory may be short"

@@ -57,18 +57,18 @@ def make_dataset(
     """Render scenes 0 .. count - 1 of `spec` to a rooms file, each with a row for each view.
 
     Args:
-        path: a file, or a URL such as `s3://bucket/rooms.h5`: what goes there is written on this
-            machine, or on a worker of the cluster, and uploaded when it is complete.
-        batch: images rendered at once; it bounds memory and changes no byte of the file.
-        workers: processes that render; 0 for one a processor where that is worth while. They
-            change no byte either. More than one need `objects` that can be pickled.
-        shard_size: if there are more scenes, they go to shards of so many beside `path`, which then
-            shows all of them as one. The same call goes on where an earlier one was killed.
+        path: a file, or a URL such as `s3://bucket/rooms.h5`. Files for a URL are written on this
+            machine, or on a worker of the cluster, and uploaded when complete.
+        batch: images rendered at once; limits the memory and changes no byte of the file.
+        workers: rendering processes; 0 for one per processor if that is faster. The number changes
+            no byte of the file. Several processes need `objects` that can be pickled.
+        shard_size: maximum number of scenes per file; more scenes are split into shards next to
+            `path`, which reads as one file. The same call resumes an interrupted one.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         command: stored as the file's creation command.
-        objects: what the scenes are made of; None for `objects_of(spec)`.
-        cluster: whose workers make the shards; `path` must then be in a folder that all of them
-            see, or a URL.
+        objects: source of the objects; None for `objects_of(spec)`.
+        cluster: Dask cluster that makes the shards; `path` must then be a URL, or in a folder that
+            all workers see.
         progress: called now and then with the number of rows written since the last call, first
             before anything is rendered.
 

@@ -58,7 +58,7 @@ class Room:
 
     @property
     def radiance(self) -> Array:
-        """Linear RGB radiance, (H, W, 3) float32; of developed pictures, that which they show."""
+        """Linear RGB radiance, (H, W, 3) float32; of tone-mapped images, the displayed radiance."""
         return _linear(self.image, self.scene.interior is not None)
 
     @property
@@ -139,10 +139,10 @@ class RoomsFile(RowFile):
     """An open rooms file: a sequence of `Room`s. Use it as a context manager, or close it.
 
     Attributes, besides those of `RowFile`:
-        spec: the request that it answers.
-        fingerprint: SHA-256 of request and scenes (`content.fingerprint`).
+        spec: the request that the file was made from.
+        fingerprint: recipe hash: SHA-256 of request and scenes (`content.fingerprint`).
         further: names of the columns of `layout.FURTHER` that it holds.
-        has_truth: whether it holds more than INPUT; see `rooms.withheld`.
+        has_truth: whether the file has ground truth, and not only INPUT; see `rooms.withheld`.
     """
 
     SCORED = SCORED
@@ -215,11 +215,11 @@ class RoomsFile(RowFile):
         return np.asarray(self.read("room/size", row)) if self.spec.interior else None
 
     def check_field(self, name: str) -> None:
-        """Raise SpecError unless `read` takes this name, FileFormatError if it is withheld."""
+        """Raise SpecError unless `read` takes this name, FileFormatError if it is held out."""
         if not self.has_truth and name in {c.name for c in columns(self.spec)} - {*INPUT}:
             beside = f"{self.path.stem}-truth{self.path.suffix}"
-            hint = f"the file of truth has it, such as {beside}"
-            raise FileFormatError(f"{self.path}: {name}", "rooms without truth", "it", hint)
+            hint = f"it is in the file with the ground truth, such as {beside}"
+            raise FileFormatError(f"{self.path}: {name}", "rooms without ground truth", "it", hint)
         super().check_field(name)
 
     def stereo(self, row: int) -> StereoPair:

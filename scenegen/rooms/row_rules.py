@@ -60,7 +60,7 @@ def _pixel_rules(spec: Request, corrupted: bool) -> dict[str, str]:
     if spec.shading == "path" or corrupted:
         return {**_RULES, "image": "finite and not negative"}
     if spec.spp > 1 or spec.shadows:
-        return {**_RULES, "image": "finite, and no darker than ambient light alone"}
+        return {**_RULES, "image": "finite, and not darker than ambient light"}
     return _RULES
 
 
@@ -148,9 +148,9 @@ def _depth_problems(room: Room, points: Array) -> Iterable[str]:
     if room.scene.interior:
         size = np.array(room.scene.interior.size) / 2
         if walls.size and not (np.abs(points[room.object_id == 0] - size) < size + OUTSIDE).all():
-            yield "a surfel of the room lies beyond its walls"
+            yield "a surfel of the room is outside its walls"
     elif walls.size and not (walls.min(axis=1) < PLANE_TOLERANCE).all():
-        yield "a surfel of the room lies off floor and walls"
+        yield "a surfel of the room is not on ground or walls"
 
 
 def _normal_problems(room: Room) -> Iterable[str]:
@@ -199,7 +199,7 @@ def _image_problems(
         darkest = (batch.reflectance[0, : batch.object_count[0] + 1] * batch.ambient[0]).min(axis=0)
         darkest = 0 * darkest if spec.own_reflectance else darkest
         if (room.object_id >= 0).all() and (radiance < darkest - 0.5 / 255 - 1e-3).any():
-            yield "a pixel is darker than ambient light alone"
+            yield "a pixel is darker than ambient light"
         return
     material = room.object_id.clip(0, spec.object_slots)
     specular, shininess = batch.gloss[0, material, 0], batch.gloss[0, material, 1]

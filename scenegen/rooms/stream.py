@@ -38,7 +38,7 @@ UNUSED = {"object/shape": -1, "object/stands_on": -1, "material/shininess": 1}  
 
 
 class RoomStream(RowStream):
-    """Batches of the rows of a file of rooms, rendered while somebody learns from them.
+    """Batches of rooms, rendered during training.
 
     Row i is, bit for bit, row i of the file that `scenegen render` makes of the same request.
     Iterating gives dicts of numpy arrays (B, ...) with the names, types and units of the file's

@@ -86,7 +86,8 @@ def labels(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
         tables,
         wrong,
         lambda t, row: (
-            f"kinds {tables[t].truth['distractor_kind'][row].tolist()} do not match the shapes"
+            f"distractor types {tables[t].truth['distractor_kind'][row].tolist()} do not match the"
+            " shapes"
         ),
     )
 
@@ -144,7 +145,7 @@ def mirror_images(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pro
         "the two mirror images differ in view as much as the options must",
         tables,
         wrong,
-        lambda t, row: "they are seen from nearly one side",
+        lambda t, row: "they are seen from nearly the same side",
     )
 
 

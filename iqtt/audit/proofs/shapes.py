@@ -127,7 +127,9 @@ def one_right_answer(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> 
         answers = tables[t].answers
         stored = "" if answers is None else f", answer key {answers[row]}"
         kinds = tables[t].truth["distractor_kind"][row].tolist()
-        return f"congruent to the reference: {congruent or 'none'}{stored}, kinds {kinds}"
+        return (
+            f"congruent to the reference: {congruent or 'none'}{stored}, distractor types {kinds}"
+        )
 
     rule = "exactly one option is congruent to the reference, as in the answer key"
     return judge("one correct option", rule, tables, wrong, found_instead)

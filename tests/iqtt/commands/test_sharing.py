@@ -40,4 +40,4 @@ def test_export(form, run, refuses, split_folder, tmp_path):
     ]  # fmt: skip
     refuses("export", train, "--format", form, words=("labeled or unlabeled",))
     answers = split_folder / "iqtt-test-answers.h5"
-    refuses("export", answers, "--format", form, words=("answers but no images",))
+    refuses("export", answers, "--format", form, words=("an answer key without images",))

@@ -258,8 +258,8 @@ def test_examples_of_questions_say_what_is_right(truths, tmp_path):
     with open_runs([path], answers) as runs:
         page = Page(html_report(scores, runs))
     right = int(scores.items["iqtt_accuracy"].sum())
-    for count, how in ((right, "rightly"), (6 - right, "wrongly")):
-        assert f"{count} of {count} questions answered {how}" in page.text
+    for count, how in ((right, "correct"), (6 - right, "wrong")):
+        assert f"{count} of {count} {how} responses" in page.text
     assert len(page.pictures) == 6 * 4
 
 

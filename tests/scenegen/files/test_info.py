@@ -54,7 +54,7 @@ def test_facts_and_settings_are_those_of_the_file(file):
     text = text.partition("settings (")[2]
     for name, setting in json.loads(root["spec"]).items():
         shown = ", ".join(map(str, setting)) if isinstance(setting, list) else str(setting)
-        assert value(text, name) == ("not told" if setting is None else shown)
+        assert value(text, name) == ("not stored" if setting is None else shown)
 
 
 def test_ranges_of_rooms(float_path):

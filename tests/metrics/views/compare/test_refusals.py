@@ -47,7 +47,12 @@ UNUSABLE = "2 of 6 rows without a usable number: 1, 3"
 @pytest.mark.parametrize(
     ("files", "where", "found", "expected"),
     [
-        ([A, OTHER_BITS], "", "rooms, truth of digest ffff", f"{DIGEST[:12]}, as a.json has"),
+        (
+            [A, OTHER_BITS],
+            "",
+            "rooms, ground truth with hash ffff",
+            f"{DIGEST[:12]}, as a.json has",
+        ),
         ([A, iqtt_scores("b", [1])], "", "iqtt", f"{DIGEST[:12]}, as a.json has"),
         ([], "comparison", "0 score file", "two or more"),
         ([A], "comparison", "1 score file", "two or more"),
@@ -95,8 +100,8 @@ NAN = float("nan")
 @pytest.mark.parametrize(
     ("name", "column", "found"),
     [
-        ("relief_iou", [0.1, 0.2, NAN, NAN, NAN, 0.3], "other rows without a number, such as 4"),
-        ("relief_iou", [0.1, 0.2, NAN, 0.3, 0.1, 0.3], "other rows without a number, such as 3"),
+        ("relief_iou", [0.1, 0.2, NAN, NAN, NAN, 0.3], "other items without a value, such as 4"),
+        ("relief_iou", [0.1, 0.2, NAN, 0.3, 0.1, 0.3], "other items without a value, such as 3"),
         ("empty_room_chamfer", [0.1, 0.2, 0.3, 0.2, 0.1, 0.3001], "0.3001"),
     ],
 )
