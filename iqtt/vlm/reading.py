@@ -86,8 +86,8 @@ def unread_note(unread: Sequence[tuple[str, str]], rows: int) -> str:
     if not unread:
         return f"all {rows} replies name a letter"
     quoted = [f"{name}: {_quoted(text)}" for name, text in unread[:QUOTED]]
-    share = f"{len(unread)} of {rows} replies name no letter and count as no response ({len(unread) / rows:.0%})"
-    return f"{share}, such as {'; '.join(quoted)}"
+    share = f"{len(unread)} of {rows} replies name no letter ({len(unread) / rows:.0%})"
+    return f"{share} and count as no response, such as {'; '.join(quoted)}"
 
 
 def _quoted(text: str) -> str:
