@@ -1,8 +1,10 @@
 """The check of a folder: its views are read, and compared by all evidence that there is."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,9 +16,21 @@ from scenegen.common.errors import SpecError
 from scenegen.files.verify import Check
 
 MOST_VIEWS = 24  # that are read, of scenes spread over the folder
-# Disagreement that needs no explanation: relative depth, pixels, degrees. Images may always
-# differ, as surfaces shine.
-DEPTH_AGREES, TRACKS_AGREE, NORMALS_AGREE = 0.01, 1.0, 8.0
+
+
+class _Kind(NamedTuple):
+    """A kind of evidence: its name, how a disagreement is told, and which needs no explanation."""
+
+    name: str
+    told: str
+    enough: float
+
+
+DEPTH = _Kind("depth of other views", "differs by {:.3%}", 0.01)
+TRACKS = _Kind("observed points", "off by {:.2f} pixels", 1.0)
+NORMALS = _Kind("normals and depth", "{:.1f} degrees apart", 8.0)
+# Images may always differ, as surfaces shine.
+IMAGES = _Kind("images of other views", "1 - correlation of brightness is {:.2f}", np.inf)
 
 
 @dataclass(frozen=True)
@@ -72,46 +86,36 @@ def check_views(
         for v in views
     ]
     pairs = [(i, j) for i, j in pairs if posed[i] and posed[j]]
-    checks: list[Check] = []
-
-    def note(name: str, form: Callable[[float], str], found: list[Fault], rest: float,
-             enough: float) -> None:  # fmt: skip
-        if not np.isfinite(rest) and not found:
-            return
-        text = "; ".join(f"{f.text}: {form(f.before)}, {form(f.after)} if undone" for f in found)
-        unexplained = "" if rest <= enough else f"{form(rest)}, and no known fault explains it"
-        detail = "; ".join(filter(None, (text, unexplained))) or form(rest)
-        checks.append(Check(name, not found and rest <= enough, detail))
-
-    kinds: dict[str, tuple[Callable[[Sequence[View]], float], Callable[[float], str], float]] = {
-        "depth of other views": (
-            lambda some: depth_error(some, pairs), lambda e: f"differs by {e:.3%}", DEPTH_AGREES),
-        "observed points": (track_error, lambda e: f"off by {e:.2f} pixels", TRACKS_AGREE),
-        "normals and depth": (normal_error, lambda e: f"{e:.1f} degrees apart", NORMALS_AGREE),
-    }  # fmt: skip
-    has_normals = np.isfinite(normal_error(views))
+    has_normals = bool(np.isfinite(normal_error(views)))
+    faults: list[Fault] = []
     if pairs:
-        name = "depth of other views"
+        kind, error = DEPTH, partial(depth_error, pairs=pairs)
     elif all(view.points is not None for view in views):
-        name = "observed points"
+        kind, error = TRACKS, partial(track_error)
     elif has_normals:
-        name = "normals and depth"
+        kind, error = NORMALS, partial(normal_error)
+        faults, rest = normal_faults(views)
     else:
         found = "neither two posed views of a scene with depth, nor normals, nor observed points"
         raise SpecError(where, found, "something to compare")
-    error, form, enough = kinds[name]
-    wrong, rest = normal_faults(views) if not pairs and has_normals else ([], np.nan)
-    faults, mended = ([], views) if wrong else geometry_faults(views, error)
-    faults = [*wrong, *faults]
-    note(name, form, faults, rest if wrong else error(mended), enough)
-    if has_normals and pairs:
-        wrong, rest = normal_faults(mended)
-        name = "normals and depth"
-        note(name, kinds[name][1], wrong, rest, NORMALS_AGREE)
-        faults = [*faults, *wrong]
+    if not faults:
+        faults, views = geometry_faults(views, error)
+        rest = error(views)
+    checks = [_check(kind, faults, rest)]
+    if pairs and has_normals:
+        wrong, rest = normal_faults(views)
+        faults, checks = [*faults, *wrong], [*checks, _check(NORMALS, wrong, rest)]
     if pairs:
-        wrong, rest = image_faults(mended, pairs)
-        note("images of other views", lambda e: f"brightness correlates by {1 - e:.2f}",
-             wrong, rest, np.inf)  # fmt: skip
-        faults = [*faults, *wrong]
+        wrong, rest = image_faults(views, pairs)
+        if np.isfinite(rest):
+            faults, checks = [*faults, *wrong], [*checks, _check(IMAGES, wrong, rest)]
     return faults, checks
+
+
+def _check(kind: _Kind, faults: Sequence[Fault], rest: float) -> Check:
+    """Return the outcome of a kind of evidence; `rest` is the disagreement that remains."""
+    told = kind.told.format
+    texts = [f"{f.text} ({told(f.before)}; undone, {told(f.after)})" for f in faults]
+    if rest > kind.enough:
+        texts.append(f"{told(rest)}: no known fault, or views that hardly overlap")
+    return Check(kind.name, not texts, "; ".join(texts) or told(rest))

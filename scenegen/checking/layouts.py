@@ -114,9 +114,10 @@ def _image(path: Path) -> Array | None:
 def nerfstudio(paths: list[Path]) -> Scenes:
     """Read transforms.json: OpenGL cameras, planar depth in steps, 1e-3 by default."""
     return [
-        [partial(_of_nerfstudio, path.parent, about, frame) for frame in about["frames"]]
+        [partial(_of_nerfstudio, path.parent, about, frame) for frame in frames]
         for path in paths
         for about in [_json(path)]
+        for frames in [sorted(about["frames"], key=lambda frame: str(frame["file_path"]))]
     ]
 
 
