@@ -30,9 +30,11 @@ from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
 
 BATCH = 64  # images at a time
-TOLD = "told: one image of each scene, the cameras, and where the empty room's floor and walls are"
-DEPTH = "told: in training, true depth maps"
-TAUGHT = "told: in training, the lights of its images and the answers of {} questions"
+TOLD = (
+    "given as input: one image of each scene, the cameras, and ground and walls of the empty room"
+)
+DEPTH = "given in training: ground-truth depth maps"
+TAUGHT = "given in training: the lights of its images and the labels of {} questions"
 
 
 def predict_file(

@@ -68,7 +68,7 @@ def show(
         sheet = question_sheet([questions[row] for row in rows], answers, task)
         count = len(questions)
     save_picture(sheet, out, overwrite)
-    print_line(f"{out}: {len(rows)} of {file}'s {count} questions")
+    print_line(f"{out}: {len(rows)} of {count} questions of {file}")
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt info iqtt-split/iqtt-val.h5")

@@ -117,7 +117,8 @@ def _export_for_models(
     with progress_bar(count, "question") as bar:
         written = export_for_models(asked, folder, overwrite=overwrite, progress=bar.update)
     megabytes = sum(path.stat().st_size for path in written) / 1e6
-    print_line(f"{folder}: {count} rows, {megabytes:.1f} MB: {', '.join(p.name for p in written)}")
+    names = ", ".join(path.name for path in written)
+    print_line(f"{folder}: {count} prompts, {megabytes:.1f} MB: {names}")
 
 
 # fmt: on

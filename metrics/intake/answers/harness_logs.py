@@ -101,9 +101,9 @@ class Log:
         notes = [self.failure_note, unread_note(unread, len(self.answers))]
         cut_off = sum(answer.outcome == "cut off" for answer in self.answers)
         if cut_off:
-            notes.append(f"{cut_off} of {len(self.answers)} replies reached the limit of tokens")
+            notes.append(f"{cut_off} of {len(self.answers)} replies reached --max-tokens")
         if any(self.tokens):
-            notes.append(f"{self.tokens[0]:,} + {self.tokens[1]:,} tokens")
+            notes.append(f"{self.tokens[0]:,} input and {self.tokens[1]:,} output tokens")
         return list(filter(None, notes))
 
 

@@ -26,9 +26,7 @@ IMAGES = (255.0, 65535.0)  # largest values of images of 8 and 16 bits
 SCALE = "looks like another scale"
 UNITS = {1000.0: "millimetres instead of metres", 100.0: "centimetres instead of metres"}
 # Factors that a hint names only where they fit within EXACT.
-FACTORS = {
-    3.2808: "feet instead of metres", 39.37: "inches instead of metres"
-}  # fmt: skip
+FACTORS = {3.2808: "feet instead of metres", 39.37: "inches instead of metres"}
 EXACT = 0.03
 USUAL_FOCAL = 300.0  # pixels: a network trained at this focal length is often scaled by it
 
