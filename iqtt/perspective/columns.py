@@ -42,6 +42,7 @@ class RoomTruth:
         visible_pixels, whole_pixels: pixels that show each of these, and would if nothing hid it,
             (1 + K, n).
         exposure: how images were developed, (1 + K, 5).
+        picture_seed: of surfaces and of the noise of images.
         distractor_kind: kind of each answer, such as "moved"; None for the right one.
         angle_degrees: between the lines of sight of the reference and the answers.
         depth: planar depth, (1 + K, H, W), metres; None if not stored.
@@ -52,6 +53,7 @@ class RoomTruth:
     visible_pixels: Array
     whole_pixels: Array
     exposure: Array
+    picture_seed: int
     distractor_kind: tuple[str | None, ...]
     angle_degrees: float
     depth: Array | None
@@ -66,6 +68,7 @@ def room_truth(values: Mapping[str, Any]) -> RoomTruth:
         visible_pixels=values["visible_pixels"][:, :count],
         whole_pixels=values["whole_pixels"][:, :count],
         exposure=values["exposure"],
+        picture_seed=int(values["picture_seed"]),
         distractor_kind=tuple(
             None if kind < 0 else DISTRACTOR_KINDS[kind] for kind in values["distractor_kind"]
         ),
@@ -103,6 +106,7 @@ def room_columns(spec: PerspectiveSpec) -> list[Column]:
                "how images are developed: factor of radiance, factors of red, green and blue, and"
                " the exposed radiance that is white"),
     ]
+    columns.append(Column("picture_seed", (), "int64", "1", "-", "of surfaces and image noise"))
     if spec.with_depth:
         columns.append(
             Column("depth", (images, spec.height, spec.width), "float32", "metre", "camera",

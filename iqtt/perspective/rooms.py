@@ -4,6 +4,7 @@ Options are drawn, accepted and rendered before anything depends on which of the
 reference is then another view of that one's room.
 """
 
+import hashlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -179,6 +180,7 @@ class RenderedRooms:
         scenes: that of each image as JSON.
         images: reference and K options, (1 + K, H, W, 3).
         exposure: how these were developed, (1 + K, 5), as `pictures.development.EXPOSURE`.
+        seed: of surfaces and of the noise of images.
     """
 
     drawn: Drawn
@@ -186,6 +188,7 @@ class RenderedRooms:
     scenes: list[str]
     images: Array
     exposure: Array
+    seed: int
 
     def of_images(self, values: Array) -> Array:
         """Return what images show, from values of each camera and room, (2, K, ...)."""
@@ -211,7 +214,9 @@ def render_rooms(
 def _rendered(rooms: Rooms, drawn: Drawn, answer: int, device: str) -> RenderedRooms:
     """Trace the images of a question: rooms apart, as images of one item share their surfaces."""
     spec = rooms.spec
-    radiance = replace(rooms.interior, image_dtype="float32")
+    # Surfaces and noise have a seed of their own, which files can tell.
+    seed = picture_seed(rooms.interior.seed, int(drawn.scenes[REFERENCE].index[0]))
+    radiance = replace(rooms.interior, image_dtype="float32", seed=seed)
     options, found = len(drawn.scenes[OPTION]), {}
     for k in range(options):
         views = (REFERENCE, OPTION) if k == answer else (OPTION,)
@@ -229,7 +234,13 @@ def _rendered(rooms: Rooms, drawn: Drawn, answer: int, device: str) -> RenderedR
     images = encode_image(images, spec.image_dtype)
     scenes = [drawn.scenes[REFERENCE].to_json(answer)]
     scenes += [drawn.scenes[OPTION].to_json(k) for k in range(options)]
-    return RenderedRooms(drawn, answer, scenes, images, exposure)
+    return RenderedRooms(drawn, answer, scenes, images, exposure, seed)
+
+
+def picture_seed(seed: int, number: int) -> int:
+    """Return the seed of a room's surfaces, which does not tell that of the split."""
+    text = f"surfaces {seed} {number}"
+    return int.from_bytes(hashlib.sha256(text.encode()).digest()[:8]) >> 1
 
 
 def room_rows(rendered: Sequence[RenderedRooms]) -> dict[str, Any]:
@@ -247,5 +258,6 @@ def room_rows(rendered: Sequence[RenderedRooms]) -> dict[str, Any]:
         "visible_pixels": np.array([one.of_images(one.drawn.visible) for one in rendered]),
         "whole_pixels": np.array([one.of_images(one.drawn.whole) for one in rendered]),
         "exposure": np.array([one.exposure for one in rendered]),
+        "picture_seed": np.array([one.seed for one in rendered], np.int64),
         "depth": [one.of_images(one.drawn.depth) for one in rendered],
     }

@@ -3,8 +3,27 @@
 "use strict";
 
 const FORMAT = "pix2shape-bench/quiz-answers";
+const WORDS = {
+  cubes: {
+    title: "Which one is it, turned? A quiz about shapes",
+    thing: "a shape made of cubes",
+    task: "One answer is the same shape, seen from another side. The others are different shapes, and" +
+      " some may be mirror images. Which answer is the same shape?",
+    rule: "Every cube of a shape shows in every picture.",
+    ask: "Which answer is the same shape as the reference, turned?",
+  },
+  rooms: {
+    title: "Which room is it? A quiz about rooms",
+    thing: "a furnished room",
+    task: "One answer is the same room, seen from another place. In the others some furniture stands" +
+      " elsewhere or faces another way, or the room is mirrored. Which answer is the same room?",
+    rule: "All answers are seen from one place.",
+    ask: "Which answer is the same room as the reference?",
+  },
+};
 const LETTERS = "ABC";
 const quiz = JSON.parse(document.getElementById("quiz").textContent);
+const words = WORDS[quiz.about];
 const main = document.getElementById("main");
 const place = `${FORMAT}/${quiz.quiz}`;
 let storage = true; // whether the browser keeps anything
@@ -102,7 +121,7 @@ function consent() {
     ? "At the end they are sent to those who run the study, and you can keep a copy."
     : "At the end you save them as a file, and hand it to those who run the study.";
   const rules = [
-    "Every cube of a shape shows in every picture.",
+    words.rule,
     `Choose an answer by clicking it, or with the keys 1 to ${quiz.answers}.`,
     "Work as fast as you can without mistakes. Guess where you do not know. There is no way back" +
       " to an earlier question.",
@@ -114,11 +133,10 @@ function consent() {
     rules.unshift(`First ${first} to practise. You are told the right answer after each.`);
   }
   show(
-    "Which one is it, turned? A quiz about shapes",
-    make("h1", {}, "Which one is it, turned?"),
-    make("p", {}, "Every question shows a shape made of cubes, the ", make("strong", {}, "reference"),
-      `, and ${quiz.answers} answers. One answer is the same shape, seen from another side. The` +
-      " others are different shapes, and some may be mirror images. Which answer is the same shape?"),
+    words.title,
+    make("h1", {}, words.title.split("?")[0] + "?"),
+    make("p", {}, `Every question shows ${words.thing}, the `, make("strong", {}, "reference"),
+      `, and ${quiz.answers} answers. ${words.task}`),
     make("ul", {}, ...rules.map((rule) => make("li", {}, rule))),
     make("h2", {}, "What is recorded"),
     make("p", {}, "Your answers, and how long each took, under a random number. No name, no network" +
@@ -145,7 +163,7 @@ function progress(title, done) {
 async function picturesOf(question) {
   const images = question.pictures.map((text, k) => make("img", {
     src: `data:image/webp;base64,${text}`,
-    alt: k ? "" : "The reference: a shape made of cubes",
+    alt: k ? "" : `The reference: ${words.thing}`,
     width: 256, height: 256,
   }));
   await Promise.all(images.map((image) => image.decode().catch(() => {})));
@@ -175,8 +193,7 @@ async function ask(question, title, done, answered) {
     { type: "button", "aria-keyshortcuts": `${k + 1} ${LETTERS[k]}`, onclick: () => answer(k) },
     image, make("span", {}, `Answer ${k + 1}`)));
   show(title, progress(title, done),
-    make("h1", { class: "ask", id: "ask" },
-      "Which answer is the same shape as the reference, turned?"),
+    make("h1", { class: "ask", id: "ask" }, words.ask),
     make("div", { class: `shapes shapes-${quiz.answers}`, role: "group", "aria-labelledby": "ask" },
       reference(first), ...buttons),
     make("p", { class: "hint" }, `Click an answer, or press a key from 1 to ${quiz.answers}.`));
@@ -192,7 +209,7 @@ async function feedback(question, title, done) {
   const figures = images.map((image, k) => {
     const [kind, text] = k === right ? ["right", ": right"]
       : k === answer ? ["wrong", ": yours, wrong"] : ["", ""];
-    image.alt = "A shape made of cubes";
+    image.alt = words.thing;
     return make("figure", { class: kind }, image,
       make("figcaption", {}, `Answer ${k + 1}${text}`));
   });

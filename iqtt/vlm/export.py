@@ -29,7 +29,7 @@ COLUMNS = {
     "answer": "the right letter; left out of a withheld test, as are the facts below",
     "kind": "kind of the question, such as matched",
     "angle": "smallest rotation from the reference's view to the right answer's, degrees",
-    "cubes": "number of cubes of each shape",
+    "cubes": "number of cubes of each shape; null for rooms",
     "shape": "cluster for intervals: questions about one shape, or its mirror image, share it",
     "floor": "accuracy that is reached on this kind without any idea of 3D; null if not known",
     "canary": "mark of test data; do not train on text or pictures that carry it",
@@ -183,6 +183,11 @@ def _card(name: str, row: Row) -> str:
         for column, text in COLUMNS.items()
         if not (row.answer is None and column in FACTS)
     )
+    shows = "One answer shows the same shape,\nturned. A program drew all pictures from cubes."
+    report = "on `matched` and on `mirror-pair` with two answers, beside their floors"
+    if row.of_rooms:
+        shows = "One answer shows the same room,\nseen from elsewhere. A program drew all pictures."
+        report = "on each kind, and from 60 degrees on"
     return f"""---
 license: cc-by-4.0
 task_categories: [visual-question-answering]
@@ -196,8 +201,7 @@ configs:
 
 # {name}: mental-rotation questions for models
 
-Each question shows a reference and {len(row.letters)} answers. One answer shows the same shape,
-turned. A program drew all pictures from cubes. `iqtt audit` of pix2shape-bench checks that each
+Each question shows a reference and {len(row.letters)} answers. {shows} `iqtt audit` of pix2shape-bench checks that each
 question has one right answer.
 
 `{CONTROL}` asks the same questions without the reference. A model scores at the floor there, or
@@ -207,7 +211,7 @@ it has learned something else than mental rotation.
 | --- | --- |
 {columns}
 
-Report the accuracy on `matched` and on `mirror-pair` with two answers, beside their floors, with
+Report the accuracy {report}, with
 intervals by `shape`. Circular accuracy counts a question as right if every rotation is right.
 
 {CANARY}
