@@ -59,8 +59,15 @@ UNTRAINED = {
     "pix2shape-rays": "rooms: the same, told walls; learned from several views",
     "pix2shape-views": "questions: the same, with an encoder of its own",
 }
-OF_SHAPES = ("cubes", "depth-match", "ptn", "rezende", "pix2shape", "pix2shape-compact",
-             "pix2shape-views")  # which know the camera of shapes, and no rooms
+OF_SHAPES = (
+    "cubes",
+    "depth-match",
+    "ptn",
+    "rezende",
+    "pix2shape",
+    "pix2shape-compact",
+    "pix2shape-views",
+)  # which know the camera of shapes, and no rooms
 REFERENCE = ("pix2shape", "pix2shape-compact", "pix2shape-rays", "pix2shape-views")
 # Baselines that are trained with `bench train NAME`: the modules of their `BASELINE`, and what they
 # are. A new one is a line here.

@@ -60,7 +60,7 @@ def write_warp(
 def warp_scores(scenes: tuple[SceneSpec, ...], depth: Array) -> Array:
     """Return how well each option agrees with the reference, (K,), at most 0.
 
-    A mirror image is seen from the mirrored camera, so each option is compared from both.
+    A mirror image is seen from the mirrored camera, so both of two options are compared from both.
 
     Args:
         scenes: of the reference and of K options, one camera each.
@@ -80,14 +80,17 @@ def warp_scores(scenes: tuple[SceneSpec, ...], depth: Array) -> Array:
         found = [
             _before(depth[0], shown, np.linalg.inv(camera) @ of, fov)
             + _before(shown, depth[0], np.linalg.inv(of) @ camera, fov)
-            for of in (place, mirrored)
+            for of in ((place,) if len(options) > 2 else (place, mirrored))
         ]
         scores.append(-min(found))
     return np.array(scores)
 
 
 def _before(depth: Array, other: Array, other_from_camera: Array, fov: float) -> float:
-    """Return the share of an image's points that lie before what another image shows there."""
+    """Return the share of an image's points that lie before what another image shows there.
+
+    It is 1 where no point is in the other image.
+    """
     from scipy.ndimage import minimum_filter
 
     height, width = depth.shape
@@ -100,4 +103,4 @@ def _before(depth: Array, other: Array, other_from_camera: Array, fov: float) ->
     inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
     nearest = minimum_filter(np.where(np.isfinite(other), other, np.inf), 3)
     before = far[inside] < (1 - TOLERANCE) * nearest[y[inside], x[inside]]
-    return float(before.mean()) if inside.any() else 0.0
+    return float(before.mean()) if inside.any() else 1.0

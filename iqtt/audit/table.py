@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from iqtt.audit.features.statistics import border, border_color, measure, silhouettes
 from iqtt.files.layout import FORMAT, NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, table_names
-from iqtt.questions.specs import QuestionSpec
 from scenegen.common.records import check
 from scenegen.files.content import ColumnDigest, column_digest, dataset_digest, joint_digest
 from scenegen.files.input_file import checking
@@ -69,8 +68,8 @@ class AuditTable:
     statistics: Array
 
     @property
-    def spec(self) -> QuestionSpec | None:
-        """The settings of the file; None for a released one."""
+    def spec(self) -> Any:
+        """The settings of the file, of cubes or of rooms; None for a released one."""
         return self.questions.spec
 
     @property

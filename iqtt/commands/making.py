@@ -109,8 +109,9 @@ option = partial(click.option, show_default=True)
 )
 @click.option("--spp", type=int, help="Colour samples per pixel of rooms.")
 @click.option(
-    "--denoise/--no-denoise", default=None, help="Whether images of rooms are denoised [default:"
-    " if the extra `denoise` is there]."
+    "--denoise/--no-denoise",
+    default=None,
+    help="Whether images of rooms are denoised [default: if the extra `denoise` is there].",
 )
 @option(
     "--min-angle",
@@ -250,7 +251,8 @@ def make_split(
     )
     refused = "rooms were refused" if of_rooms else "views hid a cube and were refused"
     print_line(
-        f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} proposed {refused}"
+        f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} proposed"
+        f" {refused}"
     )
     if spec.test and secret_seed is None:
         click.echo(KNOWN_SEED, err=True)

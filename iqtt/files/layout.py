@@ -148,7 +148,9 @@ def known_kinds(group: Any) -> Sequence[str]:
     return earlier if earlier and list(names["names"]) == list(earlier) else OF_CUBES
 
 
-def root_attributes(spec: QuestionSpec, renderer: Mapping[str, str], command: str) -> dict[str, Any]:
+def root_attributes(
+    spec: QuestionSpec, renderer: Mapping[str, str], command: str
+) -> dict[str, Any]:
     """Return the root attributes of a file.
 
     Args:

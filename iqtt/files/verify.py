@@ -99,7 +99,7 @@ def _made_again(
                 table.join(opened[answers][0])
             for row in spread_rows(rows, items):
                 again = render_question(source, split, first + row, device)
-                values, count = question_rows(spec, [again]), count + 1  # type: ignore[list-item]
+                values, count = question_rows(spec, [again]), count + 1  # type: ignore[arg-type]
                 if not all(_same(table.read(x, row), values[x][0]) for x in table.fields):
                     wrong.append(f"{name} {part} row {row}".replace("  ", " "))
     return listed_check(title, f"{count} questions, bit for bit", wrong)

@@ -15,9 +15,9 @@ from scenegen.layout import DEVELOPED
 
 Array = NDArray[Any]
 CONVENTIONS = (
-    "unit: metre; image i shows scene i, image 0 is the reference, the others the answers; world and"
-    " camera of each scene as of interiors: right-handed, y up, the camera looks along -z; pixels:"
-    " row 0 on top; see docs/perspective.md"
+    "unit: metre; image i shows scene i, image 0 is the reference, the others the answers; world"
+    " and camera of each scene as of interiors: right-handed, y up, the camera looks along -z;"
+    " pixels: row 0 on top; see docs/perspective.md"
 )
 TASK = (
     "One answer shows the room of the reference, seen from elsewhere. Which one? All answers are"
@@ -89,7 +89,7 @@ def room_columns(spec: PerspectiveSpec) -> list[Column]:
     kind = "of each answer, seen from the reference: -1 the right one, else an index into `names`"
     # fmt: off
     columns = [
-        Column("scene", (images,), "text", "-", "-", "full description of each image's scene, JSON"),
+        Column("scene", (images,), "text", "-", "-", "description of each image's scene, JSON"),
         Column("distractor_kind", (spec.answers,), "int8", "1", "-", kind,
                within=(-1, len(DISTRACTOR_KINDS) - 1), more={"names": list(DISTRACTOR_KINDS)}),
         Column("angle_degrees", (), "float64", "degree", "-",
@@ -101,7 +101,7 @@ def room_columns(spec: PerspectiveSpec) -> list[Column]:
         Column("visible_pixels", (images, IN_PLAY), "int32", "pixel", "-",
                "pixels that show each of these objects"),
         Column("whole_pixels", (images, IN_PLAY), "int32", "pixel", "-",
-               "pixels that would show it if nothing hid it, up to half an image beyond the border"),
+               "the same if nothing hid it, up to half an image beyond the border"),
         Column("exposure", (images, 5), "float64", "1", "-",
                "how images are developed: factor of radiance, factors of red, green and blue, and"
                " the exposed radiance that is white"),

@@ -97,7 +97,9 @@ def draw_question(
     angle = draws.span(*spec.angle)
     degrees = -angle if draws.chance(0.5) else angle
     for attempt in range(ATTEMPTS):
-        number = ((key >> 3) * ATTEMPTS + attempt) << 3 | key & 7  # neighbours share their furniture
+        number = (
+            (key >> 3) * ATTEMPTS + attempt
+        ) << 3 | key & 7  # neighbours share their furniture
         tally.proposed += 1
         for found in draw_alternatives(rooms.interior, number, kind, degrees, rooms.objects):
             scenes = _scenes(rooms, number, found.rooms)
@@ -217,7 +219,8 @@ def _rendered(rooms: Rooms, drawn: Drawn, answer: int, device: str) -> RenderedR
     # Surfaces and noise have a seed of their own, which files can tell.
     seed = picture_seed(rooms.interior.seed, int(drawn.scenes[REFERENCE].index[0]))
     radiance = replace(rooms.interior, image_dtype="float32", seed=seed)
-    options, found = len(drawn.scenes[OPTION]), {}
+    options = len(drawn.scenes[OPTION])
+    found: dict[tuple[int, int], dict[str, Array]] = {}
     for k in range(options):
         views = (REFERENCE, OPTION) if k == answer else (OPTION,)
         batches = [pack_arrays(radiance, drawn.scenes[v].take([k]), (v,), rooms.objects)

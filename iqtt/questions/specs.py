@@ -88,7 +88,9 @@ class QuestionSpec:
         sides = f"{self.height}x{self.width}"
         small, large = min(self.height, self.width), max(self.height, self.width)
         least = self.SMALLEST
-        check(small >= least and large <= 4096, "size", sides, f"from {least} to 4096 pixels a side")
+        check(
+            small >= least and large <= 4096, "size", sides, f"from {least} to 4096 pixels a side"
+        )
 
     @property
     def kinds(self) -> tuple[str, ...]:

@@ -201,8 +201,8 @@ configs:
 
 # {name}: mental-rotation questions for models
 
-Each question shows a reference and {len(row.letters)} answers. {shows} `iqtt audit` of pix2shape-bench checks that each
-question has one right answer.
+Each question shows a reference and {len(row.letters)} answers. {shows} `iqtt audit`
+of pix2shape-bench checks that each question has one right answer.
 
 `{CONTROL}` asks the same questions without the reference. A model scores at the floor there, or
 it has learned something else than mental rotation.

@@ -67,7 +67,7 @@ def stored_pictures(record: QuestionRecord, size: int) -> Array:
     if shorter <= size:
         return pictures
     height, width = (round(side * size / shorter) for side in pictures.shape[1:3])
-    return np.stack([Image.fromarray(x).resize((width, height)) for x in pictures])
+    return np.stack([np.asarray(Image.fromarray(x).resize((width, height))) for x in pictures])
 
 
 def encoded(radiance: Array) -> NDArray[np.uint8]:

@@ -182,8 +182,9 @@ def _with_assets(spec: "Request", materials: str | None, environment: str | None
 def with_denoiser(spec: Any, chosen: Mapping[str, Any]) -> tuple[Any, list[str]]:
     """Return a spec with a denoiser, or with as many samples as do without, unless that is told.
 
-    `spec` has the settings `denoise` and `spp`. The lines say that there is no denoiser, where it is missed. Raises BackendError where no
-    denoiser is installed, and one is asked for.
+    `spec` has the settings `denoise` and `spp`, or neither. The lines say that there is no
+    denoiser, where it is missed. Raises BackendError where no denoiser is installed, and one is
+    asked for.
     """
     from scenegen.rendering.pictures.denoiser import check_denoiser, has_denoiser
 

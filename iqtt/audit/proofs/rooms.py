@@ -87,14 +87,18 @@ def prove_rooms(tables: Sequence[AuditTable], sample: Sequence[Array]) -> list[P
 
     proofs = [
         each("rooms", "scenes of one room, light and set of objects, as specified", _same_room),
-        each("one right answer", "the reference's arrangement in one answer, that told", _one_right),
+        each(
+            "one right answer", "the reference's arrangement in one answer, that told", _one_right
+        ),
         each("labels", "answers differ only as their kind says", _labels),
         each("views", "cameras look at one place, so many degrees apart as is told", _views),
         _apart(tables, questions),
     ]
     looked = [[(table, row, questions[t][row]) for row in sample[t].tolist()]
               for t, table in enumerate(tables)]  # fmt: skip
-    cast = {(t, row): _cast_again(table, q) for t, rows in enumerate(looked) for table, row, q in rows}
+    cast = {
+        (t, row): _cast_again(table, q) for t, rows in enumerate(looked) for table, row, q in rows
+    }
     proofs.append(_sampled(tables, "visibility", _VISIBLE, cast))
     pairs = list(cast)
     some = {pairs[i] for i in np.linspace(0, len(pairs) - 1, min(TRACED, len(pairs))).astype(int)}
@@ -174,7 +178,7 @@ def _same_room(spec: PerspectiveSpec, q: Question) -> str:
     return f"objects of another split or class: {other or unknown}" if other or unknown else ""
 
 
-def _one_right(spec: PerspectiveSpec, q: Question) -> str:
+def _one_right(_spec: PerspectiveSpec, q: Question) -> str:
     assert q.truth
     reference, *options = q.truth.scenes
     same = [k for k, scene in enumerate(options) if same_arrangement(reference, scene)]
@@ -184,7 +188,7 @@ def _one_right(spec: PerspectiveSpec, q: Question) -> str:
     return "two answers show one arrangement" if twice else ""
 
 
-def _labels(spec: PerspectiveSpec, q: Question) -> str:
+def _labels(_spec: PerspectiveSpec, q: Question) -> str:
     assert q.truth
     options, kind = q.truth.scenes[1:], question_kind(q.kinds)
     numbers = [n - 1 for n in q.truth.in_play]
@@ -254,17 +258,28 @@ def _mirrored(options: Sequence[SceneSpec], poses: Array) -> str:
     assert second
     places = poses[0, :-1, :, 3] @ FLIP + [first.size[0], 0, 0]
     turns = FLIP @ poses[0, :-1, :, :3] @ FLIP
-    if max(np.abs(places - poses[1, :-1, :, 3]).max(), np.abs(turns - poses[1, :-1, :, :3]).max()) > SAME:
+    if (
+        max(np.abs(places - poses[1, :-1, :, 3]).max(), np.abs(turns - poses[1, :-1, :, :3]).max())
+        > SAME
+    ):
         return "objects are not where the mirror image has them"
     sides = {"west": "east", "east": "west"}
     expected = {
         (h.kind, sides.get(h.wall, h.wall), h.bottom, h.top)
-        + ((h.left, h.right) if h.wall in sides else (first.size[0] - h.right, first.size[0] - h.left))
+        + (
+            (h.left, h.right)
+            if h.wall in sides
+            else (first.size[0] - h.right, first.size[0] - h.left)
+        )
         for h in first.openings
     }
     found = {(h.kind, h.wall, h.bottom, h.top, h.left, h.right) for h in second.openings}
     turned = (first.facing_degrees + second.facing_degrees) % 360 < SAME
-    return "" if expected == found and turned else "openings or the sun are not where the mirror image has them"
+    return (
+        ""
+        if expected == found and turned
+        else "openings or the sun are not where the mirror image has them"
+    )
 
 
 def _views(spec: PerspectiveSpec, q: Question) -> str:
@@ -331,7 +346,9 @@ def _cast_again(table: AuditTable, q: Question) -> str:
         if np.abs(mine - stored).max() > 0.01 * ids[0].size * SHOWN + 1:
             return f"{name} pixels {mine.tolist()}, told {stored.tolist()}"
     if (shown < SHOWN * ids[0].size).any() or (shown < SHARE * whole).any():
-        return f"an object in play shows {shown.min()} pixels, of itself {(shown / whole).min():.2f}"
+        return (
+            f"an object in play shows {shown.min()} pixels, of itself {(shown / whole).min():.2f}"
+        )
     return ""
 
 

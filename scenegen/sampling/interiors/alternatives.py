@@ -10,8 +10,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple, TypeAlias
 
-import numpy as np
-
 from scenegen.camera import Camera
 from scenegen.common.random.seeding import Purpose
 from scenegen.description.specs import InteriorSpec
@@ -35,8 +33,18 @@ from scenegen.sampling.interiors.spaces import (
 from scenegen.sampling.interiors.viewpoints import Place, draw_cameras
 
 DIFFERENCES = ("moved", "swapped", "turned", "mirror-pair")
-STANDING = ("chair", "armchair", "stool", "floor_lamp", "tall_plant", "box", "bag", "basket",
-            "coffee_table", "nightstand")  # families that may stand anywhere on the floor
+STANDING = (
+    "chair",
+    "armchair",
+    "stool",
+    "floor_lamp",
+    "tall_plant",
+    "box",
+    "bag",
+    "basket",
+    "coffee_table",
+    "nightstand",
+)  # families that may stand anywhere on the floor
 SWAPPED = ("stool", "box", "bag", "basket", "tall_plant", "armchair", "chair", "nightstand")
 FRONTED = ("chair", "armchair", "nightstand", "screen")  # families whose front can be seen
 TOPS = ("table", "coffee_table", "desk", "cabinet", "nightstand")  # families that carry things
@@ -162,9 +170,9 @@ def _alike(arranger: Arranger, support: Support) -> tuple[Piece, ...]:
         found = [arranger.member(x) for x in arranger.draws.shuffled(families)[:3]]
         pieces = tuple(piece for piece in found if piece is not None)
         sizes = [4 * piece.half[0] * piece.half[1] * piece.height for piece in pieces]
-        if len(pieces) == 3 and max(sizes) <= LIKE**3 * min(sizes):
-            if below is None or all(_is_large(p) and suits(p, below) for p in pieces):
-                return pieces
+        alike = len(pieces) == 3 and max(sizes) <= LIKE**3 * min(sizes)
+        if alike and (below is None or all(_is_large(p) and suits(p, below) for p in pieces)):
+            return pieces
     return ()
 
 

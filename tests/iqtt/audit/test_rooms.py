@@ -1,4 +1,4 @@
-"""The audit of questions about furnished rooms: what holds, and what a wrong file is refused for."""
+"""The audit of questions about furnished rooms: what holds, and what is found in wrong files."""
 
 import json
 import shutil

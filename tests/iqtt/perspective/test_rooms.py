@@ -1,14 +1,14 @@
 """Questions about furnished rooms: settings, what is drawn, and what files say of it."""
 
 import json
-import subprocess
-import sys
 
 import h5py
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from perspective_splits import SETTINGS
 
+import cli
 from iqtt.files.reader import QuestionsFile
 from iqtt.perspective.rooms import LEAST_SHARE, LEAST_SHOWN, draw_question, make_rooms, room_rows
 from iqtt.perspective.specs import PerspectiveSpec, perspective_spec, split_spec
@@ -127,10 +127,8 @@ def test_too_full_a_request_is_given_up(monkeypatch):
     ],
 )
 def test_options_of_other_presets_are_refused_in_one_line(options, tmp_path):
-    code = "import cli; cli.iqtt()"
     words = ["make-split", *options, "--out", str(tmp_path / "split")]
-    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True)
-    assert done.returncode == 2
-    assert done.stdout == ""
-    assert done.stderr.count("\n") == 1
+    done = CliRunner().invoke(cli.iqtt, words)
+    assert done.exit_code == 2
+    assert done.output.count("\n") == 1
     assert not (tmp_path / "split").exists()

@@ -50,9 +50,7 @@ def test_only_what_is_in_play_and_what_it_carries_differs(drawn, difference):
             if (a.box, a.piece.name) != (b.box, b.piece.name)
         }
         assert set(found.in_play) <= moved
-        assert all(
-            n in found.in_play or first[1][n - 1].stands_on in moved for n in moved
-        )
+        assert all(n in found.in_play or first[1][n - 1].stands_on in moved for n in moved)
 
 
 @pytest.mark.parametrize("difference", DIFFERENCES)
@@ -68,7 +66,9 @@ def test_objects_are_apart_and_those_in_play_inside_the_room(drawn, difference):
 
 
 def test_moved_objects_are_far_enough_from_each_other_place(drawn):
-    places = [(b.x, b.z) for room in drawn["moved"].rooms for b in boxes(room, drawn["moved"].in_play)]
+    places = [
+        (b.x, b.z) for room in drawn["moved"].rooms for b in boxes(room, drawn["moved"].in_play)
+    ]
     assert all(math.dist(a, b) >= APART_ON_TOP for i, a in enumerate(places) for b in places[:i])
 
 
