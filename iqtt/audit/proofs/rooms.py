@@ -165,7 +165,8 @@ def _same_room(spec: PerspectiveSpec, q: Question) -> str:
     assert q.truth
     scenes, allowed = q.truth.scenes, spec.interior()
     names = {tuple((x.shape, x.scale, x.mesh) for x in scene.objects) for scene in scenes}
-    lights = {(s.interior.size, s.interior.hour, s.interior.lit) for s in scenes if s.interior}
+    inside = [s.interior for s in scenes if s.interior]
+    lights = {(one.size, round(abs(one.hour - 12), 9), one.lit) for one in inside}
     if len(scenes) != 1 + spec.answers or len(names) != 1 or len(lights) != 1:
         return "scenes of other rooms or objects"
     if any(len(s.cameras) != 1 or s.interior is None or s.index != scenes[0].index for s in scenes):
@@ -274,7 +275,8 @@ def _mirrored(options: Sequence[SceneSpec], poses: Array) -> str:
         for h in first.openings
     }
     found = {(h.kind, h.wall, h.bottom, h.top, h.left, h.right) for h in second.openings}
-    turned = (first.facing_degrees + second.facing_degrees) % 360 < SAME
+    turned = min((first.facing_degrees + second.facing_degrees) % 360, 1) < SAME
+    turned &= abs(first.hour + second.hour - 24) < SAME and first.mirrored != second.mirrored
     return (
         ""
         if expected == found and turned
@@ -313,7 +315,7 @@ def _apart(tables: Sequence[AuditTable], questions: Sequence[Sequence[Question]]
             if inside is None:
                 continue
             spans = sorted((h.kind, h.right - h.left, h.bottom, h.top) for h in inside.openings)
-            key = json.dumps([inside.size, inside.hour, inside.lit, spans])
+            key = json.dumps([inside.size, round(abs(inside.hour - 12), 9), inside.lit, spans])
             if key in seen:
                 wrong[t][row] = True
                 other = seen[key]

@@ -17,7 +17,6 @@ from scenegen.objects.catalogue import Objects
 from scenegen.objects.furniture.shapes import Piece
 from scenegen.sampling.interiors.arranging import Arranger, suits
 from scenegen.sampling.interiors.draws import Draws
-from scenegen.sampling.interiors.rooms import Room
 from scenegen.sampling.interiors.scenes import Drawn, furnished, item_room
 from scenegen.sampling.interiors.small_things import ON_TOP
 from scenegen.sampling.interiors.spaces import (
@@ -374,7 +373,14 @@ def _mirrored(drawn: Drawn) -> Drawn:
         else replace(hole, left=width - hole.right, right=width - hole.left)
         for hole in room.openings
     )
-    other = Room(room.size, openings, room.hour, -room.facing_degrees % 360, room.lit, room.kind)
+    # The sun is as high so many hours before noon as after.
+    other = replace(
+        room,
+        openings=openings,
+        hour=24 - room.hour,
+        facing_degrees=-room.facing_degrees % 360,
+        mirrored=True,
+    )
     boxes = [replace(t.box, x=width - t.box.x, turns=-t.box.turns) for t in things]
     moved = [replace(t, box=box) for t, box in zip(things, boxes, strict=True)]
     seen_from = [(width - x, y, z) for x, y, z in places]

@@ -2,11 +2,15 @@
 
 import math
 
+import mitsuba
 import numpy as np
 import pytest
 
+from scenegen.description.interiors import Interior
 from scenegen.description.presets import preset_spec
 from scenegen.objects.catalogue import objects_of
+from scenegen.rendering.backend import select_variant
+from scenegen.rendering.pictures.sky import outside
 from scenegen.sampling.interiors.alternatives import (
     APART_ON_TOP,
     DIFFERENCES,
@@ -107,6 +111,19 @@ def test_mirror_images_have_all_places_mirrored_but_no_object(drawn):
     assert {(swapped.get(w, w), s) for w, s in spans} == {
         (h.wall, h.right - h.left) for h in other.openings
     }
+
+
+def test_the_light_of_mirror_images_is_mirrored(drawn):
+    mitsuba.set_variant(select_variant("cpu"))
+    (room, things, *_), (other, *_) = drawn["mirror-pair"].rooms
+    first, second = (
+        outside(Interior(r.size, r.openings, (0,) * len(things), r.hour, r.facing_degrees, r.lit,
+                         r.mirrored))
+        for r in (room, other)
+    )  # fmt: skip
+    assert room.mirrored != other.mirrored
+    np.testing.assert_allclose(first.toward_sun * (-1, 1, 1), second.toward_sun, atol=1e-12)
+    np.testing.assert_allclose(first.radiance[:, ::-1], second.radiance, rtol=1e-5)
 
 
 @pytest.mark.parametrize("difference", DIFFERENCES)
