@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from iqtt.files.reader import open_questions
+from iqtt.files.reader import answers_beside, open_questions
 from iqtt.perspective.columns import RoomTruth
 from iqtt.perspective.specs import PerspectiveSpec
 from metrics.prediction_writer import write_answers
@@ -38,10 +38,13 @@ def write_warp(
 ) -> None:
     """Answer the questions of a file that tells its scenes, from their exact depth.
 
+    Scenes of test questions are read from the file of answers beside them.
+
     Raises FileFormatError for a file that does not tell scenes of rooms; else as `open_questions`
     and `write_answers`.
     """
-    with open_questions(data) as questions:
+    beside = answers_beside(data)
+    with open_questions(data, answers=beside) as questions:
         spec, count = questions.spec, len(questions)
         if not isinstance(spec, PerspectiveSpec) or not questions.has_truth:
             expected = "a file of iqtt make-split --preset perspective with its answers"
