@@ -2,7 +2,6 @@
 
 import math
 
-import mitsuba
 import numpy as np
 import pytest
 
@@ -10,7 +9,6 @@ from scenegen.description.interiors import Interior
 from scenegen.description.presets import preset_spec
 from scenegen.objects.catalogue import objects_of
 from scenegen.rendering.backend import select_variant
-from scenegen.rendering.pictures.sky import outside
 from scenegen.sampling.interiors.alternatives import (
     APART_ON_TOP,
     DIFFERENCES,
@@ -114,7 +112,12 @@ def test_mirror_images_have_all_places_mirrored_but_no_object(drawn):
 
 
 def test_the_light_of_mirror_images_is_mirrored(drawn):
-    mitsuba.set_variant(select_variant("cpu"))
+    variant = select_variant("cpu")
+    import mitsuba  # after LLVM is found
+
+    mitsuba.set_variant(variant)
+    from scenegen.rendering.pictures.sky import outside
+
     (room, things, *_), (other, *_) = drawn["mirror-pair"].rooms
     first, second = (
         outside(Interior(r.size, r.openings, (0,) * len(things), r.hour, r.facing_degrees, r.lit,
