@@ -8,24 +8,19 @@ PIP = $(BIN)/python -m pip install -q --disable-pip-version-check -c constraints
 
 .PHONY: demo demo-summary demo-model docs test test-all check bench gpu results torture harnesses dist clean
 
-demo: $(VENV)/.runtime
+demo: $(VENV)/.demo
 	mkdir -p demo
+	$(BIN)/scenegen render --preset interiors --n 2 --size 256 --denoise --out demo/interiors.h5 --overwrite
+	$(BIN)/scenegen preview demo/interiors.h5 --out demo/interiors.png --overwrite
 	$(BIN)/scenegen render --n 64 --out demo/rooms.h5 --overwrite
 	$(BIN)/scenegen preview demo/rooms.h5 --out demo/rooms.png --overwrite
 	$(BIN)/scenegen verify demo/rooms.h5
-	$(BIN)/scenegen info demo/rooms.h5
-	$(BIN)/scenegen render --n 4 --preset shapenet --views 0,35,80 --out demo/objects.h5 --overwrite
-	$(BIN)/scenegen preview demo/objects.h5 --out demo/objects.png --overwrite
 	$(BIN)/iqtt make-split --out demo/iqtt --overwrite
-	$(BIN)/iqtt audit demo/iqtt --json demo/audit.json --overwrite
-	$(BIN)/iqtt show demo/iqtt/iqtt-test.h5 --answers --out demo/questions.png --overwrite
+	$(BIN)/iqtt show demo/iqtt/iqtt-test.h5 --mark-correct --out demo/questions.png --overwrite
 	$(BIN)/scenegen render --n 64 --seed 1 --out demo/train.h5 --overwrite
-	$(BIN)/bench baseline constant --train demo/train.h5 --data demo/rooms.h5 --out demo/constant.h5 --overwrite
-	$(BIN)/bench baseline mean-depth --train demo/train.h5 --data demo/rooms.h5 --out demo/mean-depth.h5 --overwrite
-	$(BIN)/bench baseline nearest --train demo/train.h5 --data demo/rooms.h5 --out demo/nearest.h5 --overwrite
-	for name in constant mean-depth; do $(BIN)/bench score demo/$$name.h5 --truth demo/rooms.h5 --json demo/$$name.json --overwrite > /dev/null || exit 1; done
-	$(BIN)/bench score demo/nearest.h5 --truth demo/rooms.h5 --json demo/nearest.json --html demo/report.html --overwrite
-	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/nearest.json --no-paper --format text --no-intervals
+	for name in mean-depth nearest; do $(BIN)/bench baseline $$name --train demo/train.h5 --data demo/rooms.h5 --out demo/$$name.h5 --overwrite || exit 1; done
+	$(BIN)/bench score demo/nearest.h5 --truth demo/rooms.h5 --html demo/report.html --overwrite
+	$(BIN)/bench compare demo/mean-depth.h5 demo/nearest.h5 --truth demo/rooms.h5 --metric abs_rel
 	@$(MAKE) --no-print-directory demo-summary
 
 # What `make demo` leaves; it gets here only if all of it was made.
@@ -33,23 +28,14 @@ define DEMO_SUMMARY
 
 In $(CURDIR)/demo:
 
-  file            items                what it is
-  report.html     1 page               scores of the baseline nearest, with its best and worst rooms
-  rooms.png       12 rooms             image, depth, normals and object ids, of rooms.h5
-  objects.png     12 images            four scenes of everyday objects, each from three sides
-  questions.png   8 questions          mental rotation, with the right answers
-  rooms.h5        64 images            rooms with exact ground truth, to test on
-  train.h5        64 images            other rooms, to learn from
-  objects.h5      12 images            the everyday objects
-  iqtt            1,400 questions      1,000 for training, 200 for validation, 200 for test
-  audit.json      1 audit              what was proved and guessed of these questions
-  *.json, *.h5    3 of each            scores and predictions of constant, mean-depth and nearest
+  interiors.png   2 furnished rooms: image, depth, normals and object ids, of interiors.h5
+  rooms.png       12 of 64 simple rooms, of rooms.h5
+  questions.png   8 of 1,400 mental-rotation questions, with the correct option, of iqtt
+  report.html     scores of the baseline `nearest`, with its best and worst images
+  train.h5, mean-depth.h5, nearest.h5: what the baselines learned from, and their predictions
 
-Open first:  $(CURDIR)/demo/report.html
-Then try:    source $(VENV)/bin/activate
-             scenegen preview demo/rooms.h5 --random 6
-             bench compare demo/mean-depth.json demo/nearest.json
-Learn more:  $(CURDIR)/docs/tutorial.md, to scores of a model of your own in 15 minutes
+Open first:  $(CURDIR)/demo/interiors.png and report.html
+Learn more:  $(CURDIR)/docs/tutorial.md: from rendering to scores in 15 minutes
 endef
 export DEMO_SUMMARY
 
@@ -58,10 +44,11 @@ demo-summary:
 
 demo-model: demo $(VENV)/.model
 	$(BIN)/bench baseline pix2shape-rays --data demo/rooms.h5 --out demo/pix2shape.h5 --overwrite
-	$(BIN)/bench score demo/pix2shape.h5 --truth demo/rooms.h5 --json demo/pix2shape.json --html demo/pix2shape.html --overwrite
-	$(BIN)/bench leaderboard demo/constant.json demo/mean-depth.json demo/nearest.json demo/pix2shape.json --no-paper --format text --no-intervals
+	$(BIN)/bench score demo/pix2shape.h5 --truth demo/rooms.h5 --html demo/pix2shape.html --overwrite
+	$(BIN)/bench leaderboard demo/mean-depth.h5 demo/nearest.h5 demo/pix2shape.h5 --truth demo/rooms.h5 --no-paper --format text --no-intervals
 	$(BIN)/bench baseline pix2shape-views --data demo/iqtt/iqtt-test.h5 --out demo/answers.h5 --overwrite
 	$(BIN)/bench score demo/answers.h5 --truth demo/iqtt/iqtt-test-answers.h5
+	$(BIN)/scenegen render --n 4 --preset shapenet --views 0,35,80 --out demo/objects.h5 --overwrite
 	$(BIN)/pix2shape rotate --data demo/objects.h5 --items 0,3,6,9 --out demo/rotation.gif --overwrite
 	$(BIN)/pix2shape sample --out demo/samples.png --overwrite
 	@echo
@@ -130,6 +117,10 @@ $(BIN)/python:
 $(VENV)/.runtime: $(BIN)/python pyproject.toml constraints.txt
 	$(PIP) -e .
 	touch $@
+
+$(VENV)/.demo: $(BIN)/python pyproject.toml constraints.txt
+	$(PIP) -e '.[denoise]'
+	touch $@ $(VENV)/.runtime
 
 $(VENV)/.docs: $(BIN)/python pyproject.toml constraints.txt
 	$(PIP) -e '.[docs]'

@@ -5,7 +5,8 @@ import click
 from scenegen.command_line.groups import PackageCommands
 
 ROOMS = tuple(
-    f"scenegen.commands.{name}" for name in ("making", "rooms", "viewing", "sharing", "meshes")
+    f"scenegen.commands.{name}"
+    for name in ("making", "rooms", "viewing", "sharing", "checking", "meshes")
 )
 QUESTIONS = tuple(f"iqtt.commands.{name}" for name in ("making", "questions", "sharing", "quiz"))
 SCORES = (
@@ -20,19 +21,19 @@ SCORES = (
 @click.group(cls=PackageCommands, modules=ROOMS)
 @click.version_option(package_name="pix2shape-bench")
 def scenegen() -> None:
-    """Make rooms with objects, rendered with exact ground truth."""
+    """Render rooms with objects and exact ground truth: depth, normals, object ids, cameras."""
 
 
 @click.group(cls=PackageCommands, modules=QUESTIONS)
 @click.version_option(package_name="pix2shape-bench")
 def iqtt() -> None:
-    """Make 3D-IQTT mental-rotation questions that only the shapes can answer."""
+    """Make 3D-IQTT mental-rotation questions, check them, and export them."""
 
 
 @click.group(cls=PackageCommands, modules=SCORES)
 @click.version_option(package_name="pix2shape-bench")
 def bench() -> None:
-    """Score the predictions of any model, handed in as one file."""
+    """Evaluate models: run them, import and score their predictions, compare the scores."""
 
 
 @click.group(
@@ -41,4 +42,4 @@ def bench() -> None:
 )
 @click.version_option(package_name="pix2shape-bench")
 def pix2shape() -> None:
-    """Train the reference model, predict with it, and look at what it learned."""
+    """Train the reference model Pix2Shape, predict with it, and draw what it has learned."""

@@ -83,7 +83,7 @@ def iqtt(
     rows = pq.read_table(Path(path) / name).to_pylist()
     rows = [row for row in rows if not kind or row.get("kind") == kind]
     if not rows:
-        raise ValueError(f"{path}: no questions of the kind {kind!r}")
+        raise ValueError(f"{path}: no questions of distractor type {kind!r}")
     return _task(_sample_of_folder(row, layout) for row in rows[: limit or None])
 
 

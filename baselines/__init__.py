@@ -1,7 +1,7 @@
-"""Submissions of our own: trivial ones to beat, and the reference model `pix2shape`.
+"""Baselines: trivial ones, trained ones, and the reference model `pix2shape`.
 
-They meet the benchmark as anybody's model does: they read rooms or question files and write
-submission files. They may import all other packages, and nothing imports them. Start reading in
-`trivial.py`, which is short; `commands.py` is `bench baseline` and `bench train`, `pix2shape/` the
-reference model. The other folders are the paper's baselines; docs/baselines.md has them one by one.
+Baselines use the benchmark like any other model: they read files of rooms or questions, and write
+submissions. They may import all other packages, and no package imports them. `trivial.py` is a
+short start; `commands.py` has `bench baseline` and `bench train`; `pix2shape/` is the reference
+model. The other folders are baselines of the paper, which docs/baselines.md describes.
 """

@@ -38,26 +38,26 @@ if TYPE_CHECKING:
     from baselines.training.baseline import Baseline
 
 UNTRAINED = {
-    "constant": "rooms: one depth everywhere, the mean of the training rooms",
-    "mean-depth": "rooms: the mean depth of the training rooms at each pixel",
-    "empty-room": "rooms: the room's walls and floor, which it is told; no objects",
-    "cut-out": "rooms: true masks, flat, at each object's true distance",
-    "picture-outline": "rooms: a mask from the picture, lifted by one constant",
-    "balls": "rooms: a ball for each blob of that mask in the first view",
-    "outline-regression": "rooms: that mask, lifted by a regression, from --train",
-    "outline-relief": "rooms: that mask, lifted by trees, from --train",
-    "nearest": "rooms: the relief of the most similar picture of --train",
-    "oracle": "the truth itself, which must score perfectly",
-    "chance": "questions: random answers",
-    "oracle-warp": "questions: true depth of rooms, carried into the other camera",
-    "cubes": "questions: pictures decoded to cubes in 3D; nothing is learned",
-    "outline": "questions: the nearest outline, without labels or 3D",
-    "features": "questions: features of a frozen encoder, from --features",
-    "outline-trees": "questions: trees on outline features, from --train",
-    "pix2shape": "the reference model, trained by the paper's losses",
-    "pix2shape-compact": "the same, trained by other losses",
-    "pix2shape-rays": "rooms: the same, told walls; learned from several views",
-    "pix2shape-views": "questions: the same, with an encoder of its own",
+    "constant": "rooms: a constant depth, the mean over the images of --train",
+    "mean-depth": "rooms: the mean depth of --train at each pixel",
+    "empty-room": "rooms: ground-truth walls and ground, no objects",
+    "cut-out": "rooms: ground-truth masks, flat, at the true distance of each object",
+    "picture-outline": "rooms: a foreground mask from the image, at a constant height",
+    "balls": "rooms: a sphere proxy for each component of that mask in the first view",
+    "outline-regression": "rooms: that mask, heights by a regression learned from --train",
+    "outline-relief": "rooms: that mask, heights by trees learned from --train",
+    "nearest": "rooms: the heights of the most similar image of --train",
+    "oracle": "the ground truth, which scores perfectly",
+    "chance": "questions: random options",
+    "oracle-warp": "questions: true depth of rooms, warped into the other camera",
+    "cubes": "questions: images decoded to 3D cubes; nothing is learned",
+    "outline": "questions: the most similar silhouette, without labels or 3D",
+    "features": "questions: features of a frozen encoder, given by --features",
+    "outline-trees": "questions: trees on silhouette features, learned from --train",
+    "pix2shape": "rooms and questions: Pix2Shape, trained with the losses of the paper",
+    "pix2shape-compact": "rooms and questions: Pix2Shape, trained with other losses",
+    "pix2shape-rays": "rooms: Pix2Shape, given the walls, trained on several views",
+    "pix2shape-views": "questions: Pix2Shape with a separate encoder",
 }
 OF_SHAPES = (
     "cubes",
@@ -72,22 +72,28 @@ REFERENCE = ("pix2shape", "pix2shape-compact", "pix2shape-rays", "pix2shape-view
 # Baselines that are trained with `bench train NAME`: the modules of their `BASELINE`, and what they
 # are. A new one is a line here.
 HOMES = {
-    "cnn": ("resnets.cnn", "questions: ResNets and a softmax over the answers"),
-    "depth-completed": ("relief.depth_completed", "rooms: a network that completes the first view"),
+    "cnn": ("resnets.cnn", "questions: ResNets and a softmax over the options"),
+    "depth-completed": (
+        "relief.depth_completed",
+        "rooms: a network that completes the depth of the first view",
+    ),
     "depth-match": (
         "depth_match.training",
-        "questions: depth from a network, turned until views agree",
+        "questions: depth from a network, rotated until two views agree",
     ),
     "depth-supervised": (
         "relief.depth_supervised",
-        "rooms: a network trained with true depth",
+        "rooms: a network trained with ground-truth depth",
     ),
-    "ptn": ("ptn.training", "rooms and questions: voxels, learned from silhouettes"),
-    "rezende": ("rezende.training", "questions: meshes, by a renderer without gradients"),
-    "siamese": ("resnets.siamese", "questions: the answer whose features are nearest"),
+    "ptn": ("ptn.training", "rooms and questions: voxels, trained with silhouettes"),
+    "rezende": (
+        "rezende.training",
+        "questions: meshes, trained through a non-differentiable renderer",
+    ),
+    "siamese": ("resnets.siamese", "questions: the option with the most similar features"),
     "view-pairs": (
         "relief.view_pairs",
-        "rooms: a network trained with pairs of images, no depth",
+        "rooms: a network trained with pairs of images, without depth",
     ),
 }
 TRAINED = {name: text for name, (_, text) in HOMES.items()}
@@ -104,25 +110,30 @@ def _listed(baselines: Mapping[str, str]) -> str:
     epilog=f"{_listed(ALL)}{EXAMPLE}bench baseline empty-room --data rooms.h5 --out empty-room.h5"
 )
 @click.argument("name", type=click.Choice(list(ALL)), metavar="NAME")
-@click.option("--data", type=InputPath(), required=True, help="Rooms or questions to predict.")
+@click.option(
+    "--data", type=InputPath(), required=True, help="File of rooms or questions to predict."
+)
 @click.option(
     "--train",
     type=InputPath(),
-    help="What is learned from: rooms for constant, mean-depth, nearest, outline-regression and"
+    help="Training file: rooms for constant, mean-depth, nearest, outline-regression and"
     " outline-relief; questions for outline-trees and features.",
 )
 @click.option(
     "--labels",
     type=click.IntRange(1, LARGEST),
-    help="Labelled questions of --train that outline-trees and features learn from  [all].",
+    help="Number of labelled questions of --train for outline-trees and features [all].",
 )
 @click.option(
     "--features",
     type=InputPath(),
-    help="For features: a .npy file of (Q, 1 + K, D) numbers, for each picture of --data.",
+    help="For features: a .npy file of shape (Q, 1 + K, D), for the reference and the K options of"
+    " the Q questions of --data.",
 )
 @click.option(
-    "--train-features", type=InputPath(), help="The same for the labelled questions of --train."
+    "--train-features",
+    type=InputPath(),
+    help="Features of the labelled questions of --train, in the format of --features.",
 )
 @ALLOW_TEST_SET
 @SUBMISSION
@@ -131,13 +142,13 @@ def _listed(baselines: Mapping[str, str]) -> str:
     type=click.IntRange(0, LARGEST),
     default=0,
     show_default=True,
-    help="Seed of chance's answers.",
+    help="Random seed of chance.",
 )
 @click.option(
     "--weights",
     type=WEIGHTS_PATH,
-    help="Weights of a trained baseline: a .safetensors file, or for the reference model a bundled"
-    " name  [the bundled ones that suit the data].",
+    help="Weights of a trained baseline: a .safetensors file, or for pix2shape* the name of bundled"
+    " weights [the bundled weights for this kind of data].",
 )
 @OVERWRITE
 def baseline(
@@ -153,7 +164,7 @@ def baseline(
     allow_test_set: bool,
     overwrite: bool,
 ) -> None:
-    """Write the submission of a baseline for rooms or questions."""
+    """Predict rooms or questions with a baseline, and write the predictions."""
     from baselines.training.data import refuse_test_set
     from scenegen.files.sets.shards import OpenFile
 
@@ -167,7 +178,7 @@ def baseline(
     method = name
     if name in REFERENCE:
         used = predict_to(out, weights, data, method=name, overwrite=overwrite)
-        method += f", weights {used},"
+        method += f", weights {used}"
     elif name == "chance":
         from baselines.trivial import write_chance
 
@@ -201,7 +212,8 @@ def baseline(
                 from baselines.trivial import write_room_baseline
 
                 write_room_baseline(name, data, out, train=train, **how)
-    print_line(f"{out}: {method} on {data}; {how_to_score(out, data)}")
+    print_line(f"{out}: {method}, on {data}")
+    print_line(how_to_score(out, data))
 
 
 def _check_options(
@@ -212,14 +224,14 @@ def _check_options(
         raise click.UsageError(f"--weights: {name} has none")
     if train is not None and name in (*REFERENCE, *TRAINED):
         command = "pix2shape train" if name in REFERENCE else f"bench train {name}"
-        raise click.UsageError(f"--train: {name} is trained already; see {command}")
+        raise click.UsageError(f"--train: {name} takes trained weights; train with {command}")
     if name in ("outline", "outline-trees") and (train is None) == (name == "outline-trees"):
         wants = "needs" if train is None else "uses no"
         raise click.UsageError(f"--train: {name} {wants} labelled questions")
     if labels is not None and name not in ("outline-trees", "features"):
-        raise click.UsageError(f"--labels: {name} learns from none")
+        raise click.UsageError(f"--labels: {name} uses no labels")
     if (features is None) == (name == "features"):
-        how = "needs features of the pictures" if features is None else "takes none"
+        how = "needs features of the images" if features is None else "takes none"
         raise click.UsageError(f"--features: {name} {how}")
 
 
@@ -255,29 +267,30 @@ def _check_task(name: str, data: str) -> None:
     type=InputPath(),
     multiple=True,
     metavar="FILE...",
-    help="Rooms or questions to train on; networks of depth learn from several files.",
+    help="Training files of rooms or questions. Depth networks take several files.",
 )
 @STREAM
-@click.option("--out", type=OutputFolder(), required=True, help="Folder of the run.")
+@click.option("--out", type=OutputFolder(), required=True, help="Output folder of the run.")
 @click.option(
     "--labels",
     type=click.IntRange(0, LARGEST),
-    help="Labelled questions whose answers may be used  [the baseline's own].",
+    help="Number of labelled questions to use [the default of the baseline].",
 )
+@click.option("--seed", type=click.IntRange(0, LARGEST), help="Random seed [0].")
 @click.option(
-    "--seed", type=click.IntRange(0, LARGEST), help="Seed of every random choice  [the run's; 0]."
-)
-@click.option(
-    "--iterations", type=click.IntRange(1, LARGEST), help="Steps of training  [the baseline's own]."
+    "--iterations",
+    type=click.IntRange(1, LARGEST),
+    help="Number of training steps [the default of the baseline].",
 )
 @click.option(
     "--set",
     "settings",
     type=Setting(),
     multiple=True,
-    help="Change another setting of the baseline, such as depth=50; docs/baselines.md lists them.",
+    help="Another setting of the baseline, such as depth=50. docs/baselines.md lists the settings."
+    " Repeatable.",
 )
-@click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
+@click.option("--resume", is_flag=True, help="Resume from the checkpoint in --out.")
 @MINUTES
 @DEVICE
 @ALLOW_TEST_SET
@@ -296,17 +309,17 @@ def train_baseline(
     device: str,
     allow_test_set: bool,
 ) -> None:
-    """Train a baseline; weights and checkpoint are written to a folder."""
+    """Train a baseline, and write its weights and checkpoints to a folder."""
     options = {"labels": labels, "seed": seed, "iterations": iterations}
     chosen = {key: value for key, value in options.items() if value is not None}
     if resume and (chosen or settings):
-        message = "--resume goes on with the run's own --labels, --seed, --iterations and --set"
+        message = "--resume uses the --labels, --seed, --iterations and --set of the run"
         raise click.UsageError(f"{message}; leave them out")
     if minutes is not None and iterations is not None:
-        raise click.UsageError("--minutes decides --iterations; leave one of them out")
+        raise click.UsageError("--minutes sets --iterations: leave one of them out")
     home = _baseline(name)
     if stream is not None and home.streamed is None:
-        raise click.UsageError(f"--stream: {name} learns from files")
+        raise click.UsageError(f"--stream: {name} trains on files only: give --data")
     from baselines.training.baseline import train
     from baselines.training.machine import Machine
     from scenegen.common.records import check, from_json
@@ -336,7 +349,8 @@ def train_baseline(
         weights = train(home, files, out, made, machine, resume=resume, progress=remember, **how)
     reached = f" ({text})" if text else ""
     use = f"bench baseline {name} --weights {shlex.quote(str(weights))} --data ..."
-    print_line(f"{weights}: {name} trained on {files.where}{reached}; now `{use}`")
+    print_line(f"{weights}: {name} trained on {files.where}{reached}")
+    print_line(f"now: {use}")
 
 
 def _baseline(name: str) -> "Baseline":
@@ -348,18 +362,23 @@ def _baseline(name: str) -> "Baseline":
 
 @click.command(epilog=f"{EXAMPLE}bench probe hf:facebook/dinov2-base --data iqtt --out dinov2")
 @click.argument("model", metavar="hf:NAME")
-@click.option("--data", type=InputPath(), required=True, help="Folder of a split, with answers.")
-@click.option("--out", type=OutputFolder(), required=True, help="Folder to write, a new one.")
-@click.option("--device", default="cpu", show_default=True, help="Such as cuda.")
+@click.option(
+    "--data", type=InputPath(), required=True, help="Folder of a split, with its answer key."
+)
+@click.option("--out", type=OutputFolder(), required=True, help="Output folder, which must be new.")
+@click.option(
+    "--device", default="cpu", show_default=True, help="Device of the encoder, such as cuda."
+)
 @click.option(
     "--batch", type=click.IntRange(1, 4096), default=8, show_default=True,
-    help="Questions at a time.",
+    help="Number of questions per batch.",
 )  # fmt: skip
 def probe(model: str, data: str, out: str, device: str, batch: int) -> None:
-    """Ask every layer of an encoder which pictures show one shape.
+    """Measure how well each layer of a frozen encoder recognises a shape in two images.
 
-    The answer whose features have the greatest cosine with the reference's is taken; nothing is
-    learned. The folder gets answers and scores of each layer, and a curve, layers.png.
+    For each layer, the response is the option with the highest cosine similarity to the reference;
+    nothing is trained. The output folder holds predictions and scores of each layer, and layers.png
+    with the curve of accuracy over layers.
     """
     needs_torch("bench probe", ("torch", "transformers"))
     from baselines import features
@@ -379,10 +398,10 @@ def probe(model: str, data: str, out: str, device: str, batch: int) -> None:
     for i, layer in enumerate(scores):
         values = features.accuracies(layer).values()
         rows.append([str(i), *(" ".join(with_interval(v.value, v.low, v.high)) for v in values)])
-    rows.append(["floor", *(number(floors[k].accuracy) if k in floors else "" for k in kinds)])
+    rows.append(["baseline", *(number(floors[k].accuracy) if k in floors else "" for k in kinds)])
     for line in aligned(rows):
         print_line(line)
-    print_line(f"{out}: answers and scores of {len(scores)} layers, layers.png")
+    print_line(f"{out}: predictions and scores of {len(scores)} layers, layers.png")
 
 
 COMMANDS = (baseline, train_baseline, probe)

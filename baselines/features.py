@@ -75,7 +75,7 @@ def write_features(
             count = check_training(questions, labelled, labels, least=2 * FOLDS)
             learned = read_features(train_features, count, labelled)
             if learned.shape[2] != seen.shape[2]:
-                found, expected = (f"{one.shape[2]} numbers a picture" for one in (learned, seen))
+                found, expected = (f"{one.shape[2]} numbers per image" for one in (learned, seen))
                 raise FileFormatError(train_features, found, f"{expected}, as {features} has")
             right = labelled.read("answers", slice(0, count)).astype(int)
         scores, notes = probe_scores(learned, right, seen), f"a probe of {count} labels of {train}"
@@ -206,7 +206,7 @@ def probe(
     questions_path, answers_path = split_paths(data)
     with open_questions(questions_path) as questions:
         if not answers_path.exists():
-            raise SpecError("--data", f"no {answers_path}", "answers beside the questions")
+            raise SpecError("--data", f"no {answers_path}", "an answer key next to the questions")
         title, features = encoder(name, device)
         parts = list(_cosines(questions, features, batch, progress))
     Path(out).mkdir(parents=True)
@@ -261,5 +261,5 @@ def draw(scores: list[ScoreFile], out: Path, dpi: int = 150) -> None:
             axes.axhline(floors[kind].accuracy, color=colour, ls="--", lw=1)
     method = re.sub(r" layer \d+$", "", scores[0].method)
     axes.set(xlabel="layer", ylabel="accuracy", title=method, ylim=(0, 1))
-    axes.legend(fontsize=8, title="kind; dashed: floor")
+    axes.legend(fontsize=8, title="distractor type; dashed: baseline")
     figure.savefig(out, dpi=dpi, metadata={"Software": None})

@@ -117,13 +117,15 @@ def check_training(
     is the one to answer, and where it asks questions with another number of answers.
     """
     count, path = len(labelled), labelled.path
-    check(labelled.has_answers and count > 0, "train", path, "a file with answers")
+    check(labelled.has_answers and count > 0, "train", path, "a file with labels")
     chosen = count if labels is None else labels
     expected = f"from {least} to {count:,}, the labelled questions of {path}"
     check(least <= chosen <= count, "labels", chosen, expected)
     same = labelled.fingerprint is not None and labelled.fingerprint == questions.fingerprint
     if same or path.samefile(questions.path):
-        raise SpecError("train", path, "another file than the one to answer")
+        raise SpecError("train", path, "another file than --data")
     answers, expected = labelled.answers, f"{questions.answers}"
-    check(labelled.answers == questions.answers, "train", f"{answers} answers a question", expected)
+    check(
+        labelled.answers == questions.answers, "train", f"{answers} options per question", expected
+    )
     return chosen

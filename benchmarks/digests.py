@@ -86,7 +86,7 @@ def commands(folder: Path) -> Iterator[str]:
     yield "scenegen preview views.h5 --out views.png"
     for form in ("exr", "png", "ply", "obj"):
         yield f"scenegen export shapenet.h5 --items 0,2 --format {form} --out export"
-    yield "iqtt show iqtt-mixed-chain/iqtt-test.h5 --answers --out questions.png"
+    yield "iqtt show iqtt-mixed-chain/iqtt-test.h5 --mark-correct --out questions.png"
     yield "iqtt audit iqtt-mixed-chain iqtt-near-chain --json audit.json"
     yield "scenegen render --n 12 --seed 4 --views 0,35 --out truth.h5"
     for seed in (5, 6):

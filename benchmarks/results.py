@@ -1,10 +1,10 @@
-"""The commands behind the tables of docs/results.md and docs/results-rooms.md.
+"""The commands behind the tables of docs/results.md and of docs/data.
 
     python -m benchmarks.results [--help]
 
-`TABLES` lists them. They run in one folder, whose `done.txt` has a line for each that is done.
-These are passed over, and a training run that was stopped goes on, so this can be stopped and
-started again. Use another folder after a change of the code. The score files are in `scores/`;
+`TABLES` lists the tables. All commands run in one folder, whose `done.txt` names each finished one.
+Finished commands are skipped and an interrupted training resumes, so the same call continues. Use
+another folder after a change of the code. Score files are in `scores/`;
 `bench leaderboard scores/NAME-*.json` prints them.
 """
 
@@ -18,8 +18,9 @@ from benchmarks.commands import is_done, product, run
 Commands = Iterator[str]
 BASELINE = "bench baseline"
 
-# ---- questions: Table 3 of the paper, every method on every kind of question ----
+# ---- questions: Table 3 of the paper, every method on every distractor type ----
 
+BUNDLED = ("siamese", "ptn", "pix2shape-views", "depth-match")  # with weights in the package
 KINDS = ("matched", "mirror-pair", "mirror-pair-2", "other", "near", "mirror")
 MIXED, OTHER = "mixed/iqtt-train.h5", "other/iqtt-train.h5"
 SPLITS = {
@@ -34,7 +35,6 @@ TRAINED = {
     "siamese": ((200, 1000), MIXED, "bench train siamese", ""),
     "ptn": ((0, 200, 1000), MIXED, "bench train ptn", """--set 'networks="{start}"'"""),
     "rezende": ((0, 200, 1000), MIXED, "bench train rezende", """--set 'start="{start}"'"""),
-    "pix2shape-compact": ((0, 200, 1000), MIXED, "pix2shape train --set iterations=1500", ""),
     "pix2shape-views": (
         (0, 200, 1000),
         OTHER,
@@ -42,7 +42,14 @@ TRAINED = {
         "--start {start} --set iterations=1200 --set learning_rate=0.0005",
     ),
 }
-THREE_ANSWERS = ("outline-trees", "cnn")  # methods that choose among three answers only
+THREE_OPTIONS = ("outline-trees", "cnn")  # methods that choose among three options only
+
+
+def rotation(_seeds: int) -> Commands:
+    """Yield what scores methods without training, and bundled weights, on rotation-1."""
+    yield "bench sets make rotation-1 --out sets"
+    for name in ("chance", "outline", "cubes", *BUNDLED):
+        yield from _answers(name, [f"{BASELINE} {name}"], "sets")
 
 
 def questions(seeds: int) -> Commands:
@@ -67,12 +74,13 @@ def questions(seeds: int) -> Commands:
             yield from _answers(f"{name}-{labels}", predict)
 
 
-def _answers(name: str, predict: Sequence[str]) -> Commands:
+def _answers(name: str, predict: Sequence[str], folder: str = "suite") -> Commands:
+    table = "questions" if folder == "suite" else "rotation"
     for kind in KINDS:
-        if not kind.endswith("-2") or not name.startswith(THREE_ANSWERS):
-            test = f"suite/{kind}/iqtt-test"
+        if not kind.endswith("-2") or not name.startswith(THREE_OPTIONS):
+            test = f"{folder}/{kind}/iqtt-test"
             yield from _scored(
-                f"questions-{name}-{kind}", predict, f"{test}.h5", f"{test}-answers.h5"
+                f"{table}-{name}-{kind}", predict, f"{test}.h5", f"{test}-answers.h5"
             )
 
 
@@ -84,105 +92,96 @@ def _scored(name: str, predict: Sequence[str], test: str, truth: str) -> Command
     yield f"bench score {' '.join(submissions)} --truth {truth} --json scores/{name}.json"
 
 
-# ---- rooms: Tables 1 and 2, all methods on three kinds of rooms, one run each ----
+# ---- rooms: all methods on three named test sets, one run each ----
 
-PRESETS = ("shapes-single", "shapes", "shapenet")
-ROOMS = {"test": "--n 300 --views 0,5,35,55,80 --seed 1000", "train": "--n 20000 --seed 1"}
-METHODS = (
-    "oracle", "depth-supervised", "depth-completed", "view-pairs", "pix2shape-rays", "pix2shape",
-    "pix2shape-compact", "ptn", "empty-room", "mean-depth", "constant",
-)  # fmt: skip
-NOT_FOR = {"pix2shape-rays": "shapes-single", "pix2shape": "shapenet"}  # no weights are bundled
+FIVE_VIEWS = "--n 300 --views 0,5,35,55,80 --size 64"
+LEARNED = ("depth-supervised", "view-pairs", "balls", "ptn", "pix2shape-rays", "depth-completed")
+WITH_DEPTH = ("outline-regression", "outline-relief", "nearest", "mean-depth")  # of --train
+SETS = {  # methods, options of the rooms that WITH_DEPTH learn from
+    "rooms-1": ((*LEARNED, "cut-out", "picture-outline", "empty-room", *WITH_DEPTH), ""),
+    "rooms-shadows-1": (
+        (*LEARNED, "cut-out", "picture-outline", "outline-regression"),
+        "--shadows",
+    ),
+    "objects-1": (LEARNED, ""),
+}
 
 
 def rooms(_seeds: int) -> Commands:
-    """Yield what scores the bundled weights and the floors."""
-    for preset in PRESETS:
-        for split, options in ROOMS.items():
-            part = f" --object-split {split}" if preset == "shapenet" else ""
-            out = f"{split}-{preset}.h5"
-            yield f"scenegen render --preset {preset}{part} --size 64 {options} --out {out}"
-        for name in METHODS:
-            if NOT_FOR.get(name) != preset:
-                means = f" --train train-{preset}.h5" if name in ("mean-depth", "constant") else ""
-                test = f"test-{preset}.h5"
-                yield from _scored(
-                    f"rooms-{preset}-{name}", [f"{BASELINE} {name}{means}"], test, test
-                )
+    """Yield what scores the bundled weights and the baselines."""
+    for name, (methods, options) in SETS.items():
+        yield f"bench sets make {name} --out sets"
+        if set(methods) & set(WITH_DEPTH):
+            yield f"scenegen render {FIVE_VIEWS} --seed 7 {options} --out train-{name}.h5"
+        for method in methods:
+            learn = f" --train train-{name}.h5" if method in WITH_DEPTH else ""
+            test = f"sets/{name}.h5"
+            yield from _scored(f"{name}-{method}", [f"{BASELINE} {method}{learn}"], test, test)
 
 
-# ---- studies: the paper's ablations; settings of the reference model on one training file ----
+# ---- transfer: one network learned from shapes, one from interiors; both on both ----
 
-NO_LOSS = "reconstruction=0 code_reconstruction=0 mutual_information=0 contrast=0"
-RECONSTRUCTION = "reconstruction=1 code_reconstruction=1 absolute_differences=false"
-LOSSES = {
-    "adversarial": f"{NO_LOSS} adversarial=1",
-    "reconstruction": f"{NO_LOSS} {RECONSTRUCTION}",
-    "both": f"{NO_LOSS} adversarial=1 {RECONSTRUCTION}",
+ROOMS = {
+    "shapes": "--preset shapes",
+    "interiors": "--preset interiors --object-split {split} --size 128 --denoise",
 }
-INFORMATION = {str(weight): f"mutual_information={weight}" for weight in (0.1, 0.4, 0.6, 0.8, 1.0)}
-SHORT = "--set iterations=1000"
-PAPER = (
+
+
+def transfer(_seeds: int) -> Commands:
+    """Yield what trains and tests the two networks, and their baselines."""
+    for kind, options in ROOMS.items():
+        for split, size in (("train", "--n 1200 --seed 5500"), ("test", "--n 200 --seed 5501")):
+            render = f"scenegen render {options.format(split=split)} {size}"
+            yield f"{render} --out transfer-{split}-{kind}.h5"
+    networks = {}
+    for kind in ROOMS:
+        run = f"runs/transfer-{kind}"
+        learn = f"--data transfer-train-{kind}.h5 --set size=128 --minutes 28"
+        yield f"bench train depth-supervised {learn} --out {run}"
+        networks[f"learned-{kind}"] = f"depth-supervised --weights {run}/weights.safetensors"
+    for name, method in {"empty-room": "empty-room", "cut-out": "cut-out", **networks}.items():
+        for kind in ROOMS:
+            test = f"transfer-test-{kind}.h5"
+            yield from _scored(f"transfer-{kind}-{name}", [f"{BASELINE} {method}"], test, test)
+
+
+# ---- studies: parts of the paper's objective ----
+
+OBJECTIVE = {
+    "paper": "",
+    "one-step-of-the-critic": "critic_steps=1",
+    "no-reconstruction-of-codes": "code_reconstruction=0",
+    "no-reconstruction": "reconstruction=0 code_reconstruction=0",
+    "no-critic": "adversarial=0",
+}
+SHORT = (
     "--config paper --set networks.size=64 --set networks.width=0.125 --set learning_rate=0.0002"
     " --set iterations=3000 --workers 0"
 )
-STUDIED = {  # training and test files
-    "household": "scenegen render --preset shapenet --object-split {split} --size 64 {options}",
-    "shapes": "scenegen render --preset shapes --size 64 {options}",
-}
-STUDIED_QUESTIONS = "--distractors other --train 12000 --labeled 1000 --val 0 --test 2000"
-# The files, options of `pix2shape train` for all rows, and the settings of each row.
-STUDIES = {
-    "losses": ("household", SHORT, LOSSES),
-    "losses-questions": (
-        "",
-        f"{SHORT} --labels 200",
-        {**LOSSES, "both-and-information": f"{LOSSES['both']} mutual_information=1"},
-    ),
-    "objective": (
-        "shapes",
-        PAPER,
-        {
-            "paper": "",
-            "one-step-of-the-critic": "critic_steps=1",
-            "no-reconstruction-of-codes": "code_reconstruction=0",
-            "no-reconstruction": "reconstruction=0 code_reconstruction=0",
-            "no-critic": "adversarial=0",
-        },
-    ),
-    "depth": ("household", SHORT, {"compact": "", "compact-and-depth": "depth=300"}),
-    "information-0": ("", f"{SHORT} --labels 0", INFORMATION),
-    "information-200": ("", f"{SHORT} --labels 200", INFORMATION),
-}
 
 
 def studies(seeds: int) -> Commands:
-    """Yield what trains and scores each setting of each study, with these many seeds."""
-    sizes = {"train": "--n 8000 --seed 1", "test": ROOMS["test"]}
-    for name, command in STUDIED.items():
-        for split, size in sizes.items():
-            yield f"{command.format(split=split, options=size)} --out study-{name}-{split}.h5"
-    yield f"iqtt make-split {STUDIED_QUESTIONS} --out study-questions"
-    for study, (files, options, settings) in STUDIES.items():
-        stem = f"study-{files}-" if files else "study-questions/iqtt-"
-        test, truth = f"{stem}test.h5", f"{stem}test.h5" if files else f"{stem}test-answers.h5"
-        for floor in ("empty-room",) if files else ("chance", "outline"):
-            yield from _scored(f"studies-{study}-{floor}", [f"{BASELINE} {floor}"], test, truth)
-        for line, changes in settings.items():
-            predict = []
-            for seed in range(seeds):
-                run = f"runs/studies-{study}-{line}-{seed}"
-                changed = " ".join(f"--set {one}" for one in (*changes.split(), f"seed={seed}"))
-                yield f"pix2shape train --data {stem}train.h5 {options} {changed} --out {run}"
-                predict.append(f"pix2shape predict --weights {run}/weights.safetensors")
-            yield from _scored(f"studies-{study}-{line}", predict, test, truth)
+    """Yield what trains and scores each setting, with these many seeds."""
+    test, train = "sets/rooms-1.h5", "study-train.h5"
+    yield "bench sets make rooms-1 --out sets"
+    yield f"scenegen render --preset shapes --size 64 --n 8000 --seed 1 --out {train}"
+    for line, changes in OBJECTIVE.items():
+        predict = []
+        for seed in range(seeds):
+            run = f"runs/studies-{line}-{seed}"
+            changed = " ".join(f"--set {change}" for change in (*changes.split(), f"seed={seed}"))
+            yield f"pix2shape train --data {train} {SHORT} {changed} --out {run}"
+            predict.append(f"pix2shape predict --weights {run}/weights.safetensors")
+        yield from _scored(f"studies-{line}", predict, test, test)
 
 
 # What is made, and where docs/ shows it.
 TABLES = {
-    "questions": questions,  # results.md, "Questions"
-    "rooms": rooms,  # results-rooms.md
-    "studies": studies,  # results.md, "Ablations"
+    "rotation": rotation,  # results.md, "Questions"
+    "questions": questions,  # data/questions.csv
+    "rooms": rooms,  # results.md, "Rooms", and data/rooms.csv
+    "transfer": transfer,  # data/interiors-transfer.csv
+    "studies": studies,  # data/ablations.csv, study `objective`
 }
 
 

@@ -2,7 +2,7 @@
 
     bench run examples/run_numpy.py --data rooms.h5 --out predictions.h5
 
-Put your model in its place. The keys of the dict are listed in docs/your-model.md.
+Put your model in its place. The keys of the dict are listed in docs/evaluate.md.
 """
 
 import numpy as np

@@ -4,10 +4,9 @@ Read a file:    `with iqtt.open_questions("iqtt-split/iqtt-val.h5") as q: q[0].i
 Train on it:    `iqtt.QuestionsDataset("iqtt-split/iqtt-train.h5", "labeled")`
 Make a split:   `iqtt.make_split("iqtt-split", iqtt.preset_spec("small", seed=1))`
 
-A question passes through `shapes` (polycubes), `questions` (what it asks and shows), `render` (its
-images) and `files`; `audit` checks files, and `sharing` hands them on. Each may import those
-before it, and `scenegen`. These names are loaded when they are first used, so that importing the
-package is fast.
+Questions pass through `shapes` (polycubes), `questions` (reference, options and views), `render`
+(images) and `files`; `audit` checks files, and `sharing` publishes files. Each of these may import
+the ones before it, and `scenegen`. Names are loaded on first use, so importing the package is fast.
 """
 
 from typing import TYPE_CHECKING

@@ -18,7 +18,7 @@ from iqtt.questions.specs import QuestionSpec, SplitSpec
 from scenegen.common.records import check, from_json
 
 SHIPPED = "floors.json"
-CHANCE = "chance, which no probe beats"
+CHANCE = "chance, which no classifier beats"
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,13 @@
-"""Scores of predicted rooms and answers, and everything that is said about them.
+"""Metrics of predicted rooms and of responses to questions, with reports and comparisons.
 
 Score predictions in memory:   `metrics.evaluate(predictions, "rooms.h5").metrics["relief_iou"]`
-Those of one room:             `metrics.evaluate_room(depth, rooms[0])["relief_iou"]`
+Score one room:                `metrics.evaluate_room(depth, rooms[0])["relief_iou"]`
 
-`measures` turn arrays into numbers; `submissions` are the files that models hand in; `scoring`
-joins both; `views` and `viewing` show scores; `commands` are what `bench` runs. `intake` makes
-submissions of models and folders of files.
-Doors for other programs: `prediction_writer` writes submissions, `score_file` reads scores. Imports
-neither a renderer nor torch.
+`measures` turn arrays into numbers; `submissions` are the files of predictions; `scoring` joins
+both; `views` and `viewing` show scores; `commands` are the commands of `bench`. `intake` makes
+submissions from models and from folders of files.
+Entry points for other programs: `prediction_writer` writes submissions, `score_file` reads scores.
+The package imports neither a renderer nor torch.
 """
 
 from typing import TYPE_CHECKING

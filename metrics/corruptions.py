@@ -89,7 +89,7 @@ def _fog(image: Array, thickness: float, rng: Rng) -> Array:
         cloud += _bilinear(coarse, rows, columns) / step
     cloud = (cloud - cloud.min()) / max(float(np.ptp(cloud)), 1e-12)
     brightest = image.max()
-    return (image + thickness * cloud[..., None]) * brightest / (brightest + thickness)
+    return np.asarray((image + thickness * cloud[..., None]) * brightest / (brightest + thickness))
 
 
 def _bilinear(grid: Array, rows: Array, columns: Array) -> Array:
@@ -104,21 +104,20 @@ def _bilinear(grid: Array, rows: Array, columns: Array) -> Array:
 
 def _brightness(image: Array, more: float, _: Rng) -> Array:
     value = image.max(axis=-1, keepdims=True)
-    return np.where(value > 0.0, image / np.maximum(value, 1e-12), 1.0) * np.minimum(
-        value + more, 1
-    )
+    hue = np.where(value > 0.0, image / np.maximum(value, 1e-12), 1.0)
+    return np.asarray(hue * np.minimum(value + more, 1))
 
 
 def _dark(image: Array, level: tuple[float, float, float], rng: Rng) -> Array:
     brightest, photons, deviation = level
     span = max(float(np.ptp(image)), 1e-12)
     dim = brightest * np.square((image - image.min()) / span)
-    return rng.poisson(dim * photons) / photons + rng.normal(0.0, deviation, image.shape)
+    return np.asarray(rng.poisson(dim * photons) / photons + rng.normal(0, deviation, image.shape))
 
 
 def _contrast(image: Array, kept: float, _: Rng) -> Array:
     mean = image.mean(axis=(0, 1))
-    return (image - mean) * kept + mean
+    return np.asarray((image - mean) * kept + mean)
 
 
 def _pixelate(image: Array, kept: float, _: Rng) -> Array:

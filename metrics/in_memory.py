@@ -47,24 +47,24 @@ def evaluate_room(
     frame: Frame = "opencv",
     non_finite: NonFinite = "error",
 ) -> dict[str, float]:
-    """Return the scores of one prediction by name, those of this row in a file of scores.
+    """Return the values of all metrics for one prediction, by name, as in a score file.
 
-    Scores that compare with the relief of another scene need more than one room and are left out.
-    A score that this room does not have is NaN, and so are those of surfaces behind, which need the
-    scene's first view.
+    Metrics that compare with another scene need several rooms and are left out. Metrics that are
+    undefined for this room are NaN. So are metrics of hidden surfaces, which need the first view of
+    the scene.
 
     Args:
         prediction: depth or disparity (h, w), or points (h, w, 3); or a dict, as
-            `intake.outputs.read_output` describes it, which then says kind and alignment itself.
+            `intake.outputs.read_output` describes it, whose key sets kind and alignment.
         truth: a row of an open file of rooms, such as `rooms[0]`.
-        kind, alignment: of an array: one of `layout.KINDS` and what the method cannot know.
-        normal: (h, w, 3), beside an array.
+        kind, alignment: for an array: the prediction type, one of `layout.KINDS`, and the
+            alignment that it needs.
+        normal: (h, w, 3), if the prediction is an array.
         frame: of points and normals: "opencv" has x right, y down, z forward; "opengl" is ours.
         non_finite: "error", or "penalise" as `image_scores.score_view`.
 
-    Raises OutputError for what is no prediction, SpecError for kind or alignment, and
-    PredictionError for values that are not finite where the truth shows a surface, or that lie
-    behind the camera.
+    Raises OutputError for an invalid prediction, SpecError for kind or alignment, and
+    PredictionError for values on surfaces that are not finite, or are behind the camera.
     """
     height, width = truth.depth.shape
     geometry = _geometry(prediction, normal, height, width, kind, alignment, frame)
@@ -103,18 +103,18 @@ def evaluate(
     method: str = "in memory",
     settings: Settings | None = None,
 ) -> ScoreFile:
-    """Score predictions of the rooms of a file, and return what `bench score` writes.
+    """Score predictions for the rooms of a file, and return the content of a score file.
 
     `result.metrics["relief_iou"]` has a value and its interval; `score_file.write_scores` writes
     the result. This process does all of the work.
 
     Args:
-        predictions: one for each row, in order, each as for `evaluate_room`; such as an array
-            (N, H, W), or a generator, of which only the predictions are kept.
+        predictions: one per row, in order, each as for `evaluate_room`: an array (N, H, W), or a
+            generator.
         rooms: the file, or an open one.
-        items: the rows that are predicted; all by default. Scores of some are not comparable.
+        items: the predicted rows; all by default. Scores of a subset are not comparable.
         kind, alignment, frame: as for `evaluate_room`.
-        normals: one for each prediction, (N, H, W, 3), beside arrays.
+        normals: one per prediction, (N, H, W, 3), if predictions are arrays.
         settings: None for the defaults of `bench score`.
 
     Raises as `evaluate_room`; OSError and FileFormatError for the file; SpecError where there are
@@ -210,8 +210,8 @@ def _geometry(
 ) -> Geometry:
     if isinstance(prediction, Mapping):
         return read_output(prediction, height, width, frame=frame)
-    if kind not in KINDS:
-        raise SpecError("kind", repr(kind), " or ".join(KINDS))
+    if kind not in KINDS or kind == "layers":
+        raise SpecError("kind", repr(kind), "depth, disparity or points")
     alignment = alignment or KINDS[kind][0]  # type: ignore[assignment]
     if alignment not in KINDS[kind]:
         raise SpecError("alignment", repr(alignment), f"{' or '.join(KINDS[kind])}, for {kind}")

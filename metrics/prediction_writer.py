@@ -1,10 +1,10 @@
-"""Write submissions that cannot be invalid: every row is checked as it comes.
+"""Write valid submissions: every row is checked when it is added.
 
     with RoomPredictionWriter("predictions.h5", "rooms.h5", method="mine", run="seed 0") as out:
         for row in range(len(rooms)):
             out.add(row, depth, normal)
 
-`describe_format` says in words what is written.
+`describe_format` describes the file format.
 """
 
 from metrics.submissions.layout import describe_format

@@ -1,9 +1,8 @@
 """Score files: `bench score` writes them; `compare`, `leaderboard` and other programs read them.
 
-A file holds the scores of each item and where they come from. All other numbers follow from these
-and are computed by `ScoreFile` when they are asked for; the file's `summary` repeats some for
-people, and is not read. docs/scores.md describes the format. Numbers that are written here read
-back to the same bits.
+A file holds the scores of each item and their sources. `ScoreFile` computes all other numbers from
+these on demand; the `summary` of the file repeats some for people, and is not read.
+docs/score-file.md describes the format. Numbers that are written here read back to the same bits.
 """
 
 import json
@@ -124,8 +123,8 @@ def read_scores(path: str | Path) -> ScoreFile:
     """Read and check a score file.
 
     Raises:
-        OSError: it cannot be read.
-        JsonError: it is no score file, or a broken one.
+        OSError: the file cannot be read.
+        JsonError: the file is not a score file, or is damaged.
     """
     path = Path(path)
     with _naming(path):
@@ -137,8 +136,8 @@ def write_scores(scores: ScoreFile, path: str | Path, overwrite: bool = False) -
     """Write scores; the file appears when it is complete and has passed the reader's checks.
 
     Raises:
-        OSError: it cannot be written, or exists and may not be overwritten.
-        JsonError: the reader would refuse it.
+        OSError: the file cannot be written, or exists and must not be overwritten.
+        JsonError: the file would be invalid.
     """
     with written_beside(path, overwrite) as temporary, _naming(path):
         document = _document(scores)
@@ -382,7 +381,7 @@ def _known_metric(place: str, name: str, task: str) -> Metric:
     except UnknownMetricError:
         score = None
     if score is None or task not in score.tasks:
-        raise refusal(place, f"no score of task {task!r}", "a name listed in docs/scores.md")
+        raise refusal(place, f"no score of task {task!r}", "a name listed in docs/data/metrics.csv")
     return score
 
 
@@ -419,7 +418,9 @@ def _check_meta(scores: ScoreFile) -> None:
     ]
     if test is not None:
         if test.task != task:
-            raise refusal("meta.truth_digest", f"that of {test.name}", f"a truth of task {task!r}")
+            raise refusal(
+                "meta.truth_digest", f"that of {test.name}", f"ground truth of task {task!r}"
+            )
         rules.append((total, counts[total] == test.rows, f"{test.rows}, as {test.name} has"))
     for name, holds, expected in rules:
         if not holds:
@@ -446,7 +447,7 @@ def _check_groups(scores: ScoreFile) -> None:
             low, high = (value if end is None else end for end in ends)
             if ends.count(None) == 1 or not low - ROUNDING <= value <= high + ROUNDING:
                 found = f"{value} outside of {ends}"
-                raise refusal(f"{place}.{key}", found, "an interval that holds the accuracy")
+                raise refusal(f"{place}.{key}", found, "an interval that contains the accuracy")
         right = np.sum([group.right for group in groups.values()], axis=0)
         total = scores.columns[ACCURACY].sum(axis=1)
         questions = sum(group.n for group in groups.values())

@@ -31,7 +31,7 @@ SORTED_BY = tuple(
 def require_rooms(predictions: Predictions) -> RoomPredictions:
     """Return a submission of rooms. Raises ScoringError for answers to questions."""
     if not isinstance(predictions, RoomPredictions):
-        wrong, hint = f"answers to {predictions.task}", "only rooms are shown in 3D"
+        wrong, hint = f"responses to {predictions.task}", "rooms, which alone have a 3D view"
         raise ScoringError(predictions.path, wrong, "predictions of rooms", hint)
     return predictions
 

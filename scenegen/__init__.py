@@ -1,10 +1,10 @@
-"""Rooms holding objects, rendered with exact ground truth.
+"""Rooms with objects, rendered with exact ground truth.
 
 Read a file:    `with scenegen.open_rooms("rooms.h5") as rooms: rooms[0].depth`
 Train on it:    `scenegen.RoomsDataset("rooms.h5", fields=("image", "depth"))`
 Make one:       `scenegen.make_dataset("rooms.h5", scenegen.DatasetSpec(seed=1), count=1000)`
 
-Names are loaded when first used, so that importing the package costs nothing.
+Names are loaded on first use, so importing the package is fast.
 """
 
 from typing import TYPE_CHECKING

@@ -1,7 +1,7 @@
 """Cameras, rays of pixels and back-projection. The conventions of frames and pixels are:
 
 World: right-handed, y up; the room is the half-open unit box with floor y = 0 and walls x = 0 and
-z = 0; its edge is the unit of length ("scene unit").
+z = 0; its side length is the unit of length ("scene unit").
 Camera: x right, y up, looking along -z (OpenGL). `world_from_camera` maps camera to world points.
 Pixels: row 0 on top, column 0 on the left, centres at +0.5.
 Depth: planar, -z in the camera frame. A pixel's ray is (x, y, -1) in the camera frame, so the ray

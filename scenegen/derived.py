@@ -1,4 +1,4 @@
-"""Truth that follows from depth, cameras and poses, without rendering: arrays in, arrays out.
+"""Ground truth derived from depth, cameras and poses, without rendering: arrays in, arrays out.
 
 Frames and pixels are those of `scenegen.camera`.
 """
@@ -60,12 +60,12 @@ def seen_from(
     fov_y_degrees: float,
     tolerance: float = 0.75,
 ) -> NDArray[np.bool_]:
-    """Return whether surface points are visible in another view, which is known by its maps.
+    """Return whether surface points are visible in another view, given the maps of that view.
 
     The four nearest pixels of the other view vote, with the weights of bilinear interpolation. A
-    pixel says yes if it shows the same object, and the point is no farther behind the plane of its
-    surfel than `tolerance` pixels are wide there. More than half of the weight makes a point
-    visible. So the answer can be wrong within half a pixel of a silhouette.
+    pixel votes for visible if it shows the same object, and the point is at most `tolerance` pixel
+    widths behind the plane of its surfel. A point is visible with more than half of the weight. The
+    result can be wrong within half a pixel of a silhouette.
 
     Args:
         points: world, (..., 3); those with NaN are not visible.
@@ -102,9 +102,9 @@ def seen_from(
 def object_coordinates(
     points: Array, object_id: Array, world_from_object: Array
 ) -> NDArray[np.float64]:
-    """Return where each pixel's point lies in the frame of its object's unit shape, (H, W, 3).
+    """Return the point of each pixel in the frame of its object's unit shape, (H, W, 3).
 
-    Unit shapes have bounding radius 1 about 0, so (value + 1) / 2 lies in the unit cube, as the
+    Unit shapes have bounding radius 1 about 0, so (value + 1) / 2 is in the unit cube, as the
     coordinates of NOCS do (Wang et al., CVPR 2019). NaN where no object is hit.
 
     Args:
@@ -124,7 +124,7 @@ def object_coordinates(
 
 
 def albedo(object_id: Array, reflectance: Array) -> NDArray[np.float64]:
-    """Return the reflectance rho of each pixel's surface, (H, W, 3) RGB, linear; NaN for nothing.
+    """Return the reflectance rho of each pixel, (H, W, 3) linear RGB; NaN without a surface.
 
     Args:
         object_id: (H, W).

@@ -1,8 +1,10 @@
 """The HDF5 layout of a file of rooms, as a table: name, axes, type, unit, frame and meaning.
 
-`python -m scenegen.layout` prints it as the tables of `docs/rooms-file.md`.
+`python -m scenegen.layout > docs/data/rooms-columns.csv` writes it for `docs/rooms-file.md`.
 """
 
+import csv
+import io
 import re
 from collections.abc import Iterable
 from dataclasses import replace
@@ -70,8 +72,9 @@ SCORED = (
 )
 # Sizes of axes that are the same in all files; those of the others follow from the spec.
 FIXED = {"channel": 3, "offset": 2, "xyz": 3, "matrix_row": 4, "matrix_column": 4, "coefficient": 2,
-         "setting": 5}  # fmt: skip
+         "setting": 5, "layer": 16}  # fmt: skip
 MATRIX = ("matrix_row", "matrix_column")
+HEAD = ("dataset", "row", "type", "unit", "frame", "meaning")  # of tables of columns
 
 
 def _column(
@@ -174,6 +177,19 @@ FURTHER = {  # columns of `DatasetSpec.truth`, by its names
         _column("albedo", ("y", "x", "channel"), "float32", "1", "RGB",
                "rho of the surface, linear; NaN where nothing is hit", own_chunk=True),
     ),
+    "layers": (
+        _column("layers/depth", ("y", "x", "layer"), "float32", "scene unit", "camera",
+               "planar depth of the surfaces along the pixel's ray, in order; the first layer is"
+               " depth; NaN behind the last one", own_chunk=True, shuffle=False),
+        _column("layers/object_id", ("y", "x", "layer"), "int8", "1", "pixels: row 0 on top",
+               "whose surface it is: 0 the room, k the k-th object; -1 behind the last one",
+               own_chunk=True),
+        _column("layers/entering", ("y", "x", "layer"), "int8", "1", "pixels: row 0 on top",
+               "1 where the ray enters the object, -1 where it leaves, 0 at surfaces without inside"
+               " (the room, open parts) and behind the last one", own_chunk=True),
+        _column("object/closed", ("object_slot",), "uint8", "1", "-",
+               "1 if all parts of the object's mesh are closed; 0 also in unused slots"),
+    ),
 }
 # fmt: on
 
@@ -220,17 +236,29 @@ def columns(spec: Request) -> list[Column]:
     ]
 
 
-def markdown_table(fields: Iterable[Column] = FIELDS) -> str:
+def markdown_table(fields: Iterable[Column]) -> str:
     """Return the layout as a Markdown table."""
-    rows = [("dataset", "row", "type", "unit", "frame", "meaning")]
-    for field in fields:
-        row = ", ".join(str(FIXED.get(axis, axis)) for axis in field.axes or ())
-        dtype = {"image": "`--image-dtype`", "text": "UTF-8 string"}.get(field.dtype, field.dtype)
-        rows.append((f"`{field.name}`", f"({row})", dtype, field.unit, field.frame, field.meaning))
-    return "\n".join(piped(rows))
+    rows = [(f"`{name}`", *row) for name, *row in map(_row, fields)]
+    return "\n".join(piped([HEAD, *rows]))
+
+
+def csv_table() -> str:
+    """Return all columns as CSV, with the files that have them."""
+    groups = {"all": FIELDS, "interiors": INTERIOR}
+    groups |= {f"--with {name}": columns for name, columns in FURTHER.items()}
+    text = io.StringIO()
+    table = csv.writer(text, lineterminator="\n")
+    table.writerow((*HEAD, "files"))
+    for files, columns in groups.items():
+        table.writerows((*_row(column), files) for column in columns)
+    return text.getvalue()
+
+
+def _row(field: Column) -> tuple[str, ...]:
+    shape = ", ".join(str(FIXED.get(axis, axis)) for axis in field.axes or ())
+    dtype = {"image": "`--image-dtype`", "text": "UTF-8 string"}.get(field.dtype, field.dtype)
+    return field.name, f"({shape})", dtype, field.unit, field.frame, field.meaning
 
 
 if __name__ == "__main__":
-    print(markdown_table())
-    print("\nWith `--with`:\n")
-    print(markdown_table(column for some in FURTHER.values() for column in some))
+    print(csv_table(), end="")

@@ -30,8 +30,9 @@ from iqtt import QuestionsFile, SplitSpec
 INPUTS = 3 + 3  # colours, and their contrast
 BACKGROUND = 0.02  # largest difference from the corner's colour, of square roots of radiance
 NOTES = (
-    "told: in training, true depth and camera distances; the field of view, and that pictures of a"
-    " question have one camera distance and the shape's centre on their axis"
+    "given in training: ground-truth depth and camera distances; given as input: the field of view,"
+    " and that images of a question have one camera distance and the centre of the shape on their"
+    " axis"
 )
 POINTS = 300  # of each surface
 GRID = 4608  # rotations that are tried first

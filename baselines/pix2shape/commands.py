@@ -18,41 +18,42 @@ from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder, Output
 from scenegen.common.errors import SceneGenError
 
 PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
-A_MODEL = "A .safetensors file, or the name of bundled weights"
+A_MODEL = "Weights: a .safetensors file, or the name of bundled weights"
 
 WEIGHTS_PATH = InputPath()
 WEIGHTS = click.option(
-    "--weights", type=WEIGHTS_PATH, help=f"{A_MODEL}  [those that suit the data]."
+    "--weights", type=WEIGHTS_PATH, help=f"{A_MODEL} [the bundled weights for this kind of data]."
 )
 SUBMISSION = click.option(
     "--out",
     type=NewHdf5(),
     default="predictions.h5",
     show_default=True,
-    help="Submission to write.",
+    help="Output file of predictions.",
 )
 DEVICE = click.option(
     "--device",
     type=click.Choice(["auto", "cpu", "cuda"]),
     default="auto",
     show_default=True,
-    help="Where to compute; auto takes a GPU if there is one.",
+    help="Device to compute on. auto selects a GPU if there is one.",
 )
 MINUTES = click.option(
     "--minutes",
     type=click.FloatRange(0, 1e6, min_open=True),
-    help="End training so many minutes from now, with a schedule of as many iterations as fit.",
+    help="Duration of training in minutes. The schedule gets as many iterations as fit.",
 )
 STREAM = click.option(
     "--stream",
     metavar="NAME,...",
-    help="Instead of --data: presets of rooms, or kinds of questions, that are rendered meanwhile.",
+    help="Presets of rooms, or distractor types of questions, to render during training instead of"
+    " reading --data.",
 )
 ALLOW_TEST_SET = click.option(
-    "--allow-test-set", is_flag=True, help="Learn from a named test set, or from its scenes."
+    "--allow-test-set", is_flag=True, help="Allow training on a named benchmark or its scenes."
 )
 ROOMS = click.option(
-    "--data", type=InputPath(), required=True, help="Rooms whose images are encoded."
+    "--data", type=InputPath(), required=True, help="File of rooms whose images are encoded."
 )
 
 
@@ -94,58 +95,62 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
 
 @click.command(epilog=f"{EXAMPLE}pix2shape train --data rooms.h5 --out run")
 @ALLOW_TEST_SET
-@click.option("--data", type=InputPath(), help="Rooms, or iqtt-train.h5, to train on.")
+@click.option("--data", type=InputPath(), help="Training file: rooms, or iqtt-train.h5.")
 @STREAM
-@click.option("--out", type=OutputFolder(), required=True, help="Folder of the run.")
+@click.option("--out", type=OutputFolder(), required=True, help="Output folder of the run.")
 @click.option(
     "--config",
     type=click.Choice(["rays", "views", "paper"]),
-    help="rays trains rooms of several views in 40 minutes on a CPU: 64 pixels, an eighth of the"
-    " paper's width; it is told floor and walls. views is for questions alone: an encoder of its"
-    " own, and codes that are compared. paper has the paper's size and losses and needs a GPU"
-    "  [rays for rooms, views for questions].",
+    help="Configuration. rays: for rooms with several views, given ground and walls as input, at 64"
+    " pixels and an eighth of the paper's width, 40 minutes on a CPU. views: for questions, with a"
+    " separate encoder whose codes are compared. paper: the paper's size and losses, needs a GPU"
+    " [rays for rooms, views for questions].",
 )
 @click.option(
     "--set",
     "settings",
     type=Setting(),
     multiple=True,
-    help="Change one setting of the configuration, such as batch=8 or networks.size=128;"
-    " docs/pix2shape.md lists them.",
+    help="A setting of the configuration, such as batch=8 or networks.size=128. docs/pix2shape.md"
+    " lists the settings. Repeatable.",
 )
-@click.option("--seed", type=click.IntRange(0, LARGEST), help="Seed of every random choice  [0].")
-@number("--labels", least=0, default=0, text="Labelled questions whose answers may be used.")
+@click.option("--seed", type=click.IntRange(0, LARGEST), help="Random seed [0].")
+@number("--labels", least=0, default=0, text="Number of labelled questions to use.")
 @click.option(
     "--conditional",
     is_flag=True,
-    help="Tell the networks the class of the object, in rooms of one object each.",
+    help="Condition the networks on the category of the object. Each room must have one object.",
 )
 @click.option(
     "--start",
     type=WEIGHTS_PATH,
-    help="Weights of an earlier run of the same networks to begin from.",
+    help="Initial weights, from an earlier run of the same networks.",
 )
-@click.option("--resume", is_flag=True, help="Go on from the checkpoint of --out.")
-@number("--workers", least=0, most=MOST_PROCESSES, default=1, text="Processes that read the data.")
-@number("--every", least=1, default=500, text="Iterations between checkpoints.")
+@click.option("--resume", is_flag=True, help="Resume from the checkpoint in --out.")
+@number(
+    "--workers", least=0, most=MOST_PROCESSES, default=1, text="Number of data loading processes."
+)
+@number("--every", least=1, default=500, text="Number of iterations between checkpoints.")
 @MINUTES
 @DEVICE
 @click.option(
     "--devices",
     type=click.IntRange(1, MOST_PROCESSES),
-    help="Processes on each machine that share every batch: GPUs, or processes of the CPU  [1, or"
-    " as many as torchrun started].",
+    help="Number of GPUs, or CPU processes, per machine that share each batch [1, or the number"
+    " that"
+    " torchrun started].",
 )
 @click.option(
     "--nodes",
     type=click.IntRange(1, MOST_PROCESSES),
-    help="Machines that train together, see docs/pix2shape.md  [1, or as torchrun says].",
+    help="Number of machines, see docs/pix2shape.md [1, or the number given to torchrun].",
 )
 @click.option(
     "--precision",
     type=click.Choice(["32", "bf16"]),
-    help="Numbers of the networks; losses and the renderer always have 32 bits  [32, or that of the"
-    " run that --resume goes on with].",
+    help="Precision of the networks. Losses and renderer always use 32 bits [32; with --resume,"
+    " that"
+    " of the run].",
 )
 def train(
     data: str | None,
@@ -167,9 +172,9 @@ def train(
     precision: str | None,
     allow_test_set: bool,
 ) -> None:
-    """Train the model on rooms or questions; weights and checkpoint are written to a folder.
+    """Train the model on rooms or questions, and write weights and checkpoints to a folder.
 
-    OUT/pictures.png and `tensorboard --logdir OUT/logs` show how training goes.
+    OUT/pictures.png and `tensorboard --logdir OUT/logs` show the progress.
     """
     needs_torch()
     from baselines.pix2shape.network.config import model_config
@@ -184,7 +189,7 @@ def train(
     chosen = named_once(settings, **({} if seed is None else {"seed": seed}))
     if resume and (config or chosen or labels or conditional or start):
         options = "--config, --set, --seed, --labels, --conditional and --start"
-        raise click.UsageError(f"--resume goes on with the run's own {options}; leave them out")
+        raise click.UsageError(f"--resume uses the {options} of the run: leave them out")
     here, machines = torchrun_counts()
     machine = Machine(device, devices or here, nodes or machines, workers, every, minutes)
     try:
@@ -213,9 +218,8 @@ def train(
         raise
     if weights is not None:  # None in all processes but the first
         named = shlex.quote(str(weights))
-        print_line(
-            f"{weights}: trained on {files.where}; now `pix2shape predict --weights {named} ...`"
-        )
+        print_line(f"{weights}: trained on {files.where}")
+        print_line(f"now: pix2shape predict --weights {named} --data ...")
 
 
 def training_data(paths: tuple[str, ...], stream: str | None, allow_test_set: bool) -> Any:
@@ -227,7 +231,7 @@ def training_data(paths: tuple[str, ...], stream: str | None, allow_test_set: bo
     from baselines.training.streams import TrainingStreams
 
     if (stream is None) == (not paths):
-        raise click.UsageError("say where to learn from: --data or --stream, one of them")
+        raise click.UsageError("give one of --data and --stream to train on")
     if stream is not None:
         return nullcontext(TrainingStreams(stream, allow_test_set))
     with ExitStack() as stack:
@@ -269,7 +273,7 @@ def shown_training(
             click.echo()
             where = f" after {bar.n} of {bar.total} iterations of its schedule" if bar else ""
             print_line(
-                f"Stopped{where}; `--resume` goes on from {out}'s last checkpoint, if it got one."
+                f"stopped{where}; --resume continues from the last checkpoint in {out}, if any"
             )
         raise
     finally:
@@ -279,20 +283,23 @@ def shown_training(
 
 @click.command(epilog=f"{EXAMPLE}pix2shape predict --data rooms.h5 --out predictions.h5")
 @WEIGHTS
-@click.option("--data", type=InputPath(), required=True, help="Rooms or questions to predict.")
+@click.option(
+    "--data", type=InputPath(), required=True, help="File of rooms or questions to predict."
+)
 @SUBMISSION
-@click.option("--run", default="", help="Name of this run among several of the method.")
+@click.option("--run", default="", help="Name of the training run, such as its seed.")
 @DEVICE
 @OVERWRITE
 def predict(
     weights: str | None, data: str, out: str, run: str, device: str, overwrite: bool
 ) -> None:
-    """Write a submission: depth and normals of rooms, or answers to questions.
+    """Predict depth and normals of rooms, or responses to questions, and write the predictions.
 
-    Every view of a room is predicted from one image, the room's view 0, and the cameras.
+    All views of a room are predicted from its first view and the cameras.
     """
     weights = predict_to(out, weights, data, run=run, device=device, overwrite=overwrite)
-    print_line(f"{out}: {weights} on {data}; {how_to_score(out, data)}")
+    print_line(f"{out}: {weights} on {data}")
+    print_line(how_to_score(out, data))
 
 
 def predict_to(
@@ -327,8 +334,8 @@ def shown_rows() -> Iterator[Callable[[int, int], None]]:
 
 
 def how_to_score(out: str, data: str) -> str:
-    """Return what is said after a submission was written."""
-    return f"score it with `{shlex.join(['bench', 'score', out, '--truth', data])}`"
+    """Return the next command, which is printed after predictions."""
+    return f"now: {shlex.join(['bench', 'score', out, '--truth', data])}"
 
 
 def needs_torch(who: str = "pix2shape", packages: tuple[str, ...] = PACKAGES) -> None:
@@ -336,7 +343,7 @@ def needs_torch(who: str = "pix2shape", packages: tuple[str, ...] = PACKAGES) ->
     needs(who, packages, "model")
 
 
-def _picture(name: str, text: str = "Picture to write.") -> Any:
+def _picture(name: str, text: str = "Output image.") -> Any:
     """Return the option `--out` of a command that draws."""
     return click.option("--out", type=OutputPath(), default=name, show_default=True, help=text)
 
@@ -347,13 +354,15 @@ def _picture(name: str, text: str = "Picture to write.") -> Any:
 )
 @_picture("samples.png")
 @number("--n", "count", least=1, most=256, default=16, text="Number of samples.")
-@click.option("--class", "label", help="Class that a conditional model samples  [each in turn].")
+@click.option(
+    "--class", "label", help="Category to sample from a conditional model [each in turn]."
+)
 @number("--seed", least=0, default=0, text="Seed of codes, cameras and lights.")
 @OVERWRITE
 def sample(
     weights: str, out: str, count: int, label: str | None, seed: int, overwrite: bool
 ) -> None:
-    """Draw samples of the model's prior, as images, depths and normals."""
+    """Draw samples from the prior of the model: images, depths and normals."""
     needs_torch()
     from baselines.pix2shape.pictures import check_picture, sample_sheet, save_pictures
     from baselines.pix2shape.weights import open_weights
@@ -370,7 +379,11 @@ def sample(
 @WEIGHTS
 @ROOMS
 @click.option(
-    "--items", type=Items(), default="0,1", show_default=True, help="The two rows to go between."
+    "--items",
+    type=Items(),
+    default="0,1",
+    show_default=True,
+    help="The two images to interpolate between.",
 )
 @number("--steps", least=2, most=64, default=8, text="Number of codes.")
 @_picture("interpolation.png")
@@ -378,25 +391,31 @@ def sample(
 def interpolate(
     weights: str | None, data: str, items: list[int], steps: int, out: str, overwrite: bool
 ) -> None:
-    """Draw the way from one room's code to another's, seen from the first room's camera."""
+    """Draw an interpolation between the codes of two rooms, seen from the camera of the first."""
     if len(items) != 2:
-        raise click.UsageError(f"--items: found {len(items)} rows, expected two such as 0,1")
+        raise click.UsageError(f"--items: found {len(items)} images, expected two such as 0,1")
     model, rooms, items = _model_and_rooms(weights, data, items, out, overwrite)
     from baselines.pix2shape.pictures import interpolation_sheet, save_pictures
 
     save_pictures([interpolation_sheet(model, rooms, items[0], items[1], steps)], out, overwrite)
-    print_line(f"{out}: from row {items[0]} to row {items[1]} of {data}")
+    print_line(f"{out}: from image {items[0]} to image {items[1]} of {data}")
 
 
 @click.command(epilog=f"{EXAMPLE}pix2shape rotate --data rooms.h5 --items 0-5 --out rotation.gif")
 @WEIGHTS
 @ROOMS
 @click.option(
-    "--items", type=Items(), default="0-5", show_default=True, help="Rows of the rooms to turn."
+    "--items", type=Items(), default="0-5", show_default=True, help="Images of the rooms to rotate."
 )
-@number("--degrees", least=0, most=90, default=80, text="Camera's turn about the vertical axis.")
-@number("--frames", least=2, most=200, default=33, text="Number of pictures on the way there.")
-@_picture("rotation.gif", "GIF or WebP to write.")
+@number(
+    "--degrees",
+    least=0,
+    most=90,
+    default=80,
+    text="Rotation of the camera about the vertical axis.",
+)
+@number("--frames", least=2, most=200, default=33, text="Number of frames in each direction.")
+@_picture("rotation.gif", "Output GIF or WebP.")
 @OVERWRITE
 def rotate(
     weights: str | None,
@@ -407,13 +426,13 @@ def rotate(
     out: str,
     overwrite: bool,
 ) -> None:
-    """Draw an animation in which the camera turns around rooms that the model saw in one image."""
+    """Draw an animation of a camera that rotates around rooms, each predicted from one image."""
     model, rooms, items = _model_and_rooms(weights, data, items, out, overwrite, animated=True)
     from baselines.pix2shape.pictures import rotation_frames, save_pictures
 
     angles = [degrees * i / (frames - 1) for i in range(frames)]
     save_pictures(rotation_frames(model, rooms, items, angles), out, overwrite)
-    print_line(f"{out}: {len(items)} scenes turned by {degrees} degrees")
+    print_line(f"{out}: {len(items)} scenes, rotated by {degrees} degrees")
 
 
 def _model_and_rooms(

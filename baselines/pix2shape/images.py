@@ -141,7 +141,9 @@ class RoomImages(Dataset[dict[str, Any]]):
             expected = f"{networks.classes}, as the networks were made for"
             check(networks.classes == count, str(path), f"{count} classes", expected)
             if self.spec.objects != (1, 1):
-                raise SpecError(path, "rooms of several objects", "one object, whose class is told")
+                raise SpecError(
+                    path, "rooms of several objects", "one object, whose category is an input"
+                )
         self._relief: Array | None = None
         self._views_of = np.empty((0, 0), int)  # rows of the scene that were matched, for each row
 
@@ -171,7 +173,7 @@ class RoomImages(Dataset[dict[str, Any]]):
         shiny = rooms.read("material/specular", slice(None)).any()
         if shiny or ((every != every[:, :1]).any(axis=2) & used).any():
             expected = "one matte reflectance in each image"
-            hint = "the model is told the material; --set material=true learns it instead"
+            hint = "the material is an input of the model; --set material=true learns it instead"
             raise SpecError(rooms.path, "rooms of several materials", expected, hint)
         return every[:, 0]
 
@@ -241,7 +243,7 @@ class QuestionImages(Dataset[dict[str, Any]]):
         """Check an open file. Raises FileFormatError, and SpecError where it tells no lights."""
         questions, size = opened.file, config.networks.size
         if config.networks.condition:
-            raise SpecError("networks", "a camera or class to be told", "neither, for questions")
+            raise SpecError("networks", "a camera or category as input", "neither, for questions")
         check_reducible(questions.path, questions.height, questions.width, size)
         check_truth(questions)
         assert questions.spec is not None, "check_truth asks for it"
@@ -281,7 +283,7 @@ def check_background(questions: QuestionsFile, config: ModelConfig) -> None:
     """Raise SpecError where the polar encoder would take a background for part of the shape."""
     spec = questions.spec
     if config.networks.encoder == "polar" and spec is not None and min(spec.background) < BRIGHT:
-        expected = "white, by which the polar encoder tells shape from background"
+        expected = "white, because the polar encoder detects the shape by a white background"
         raise SpecError(questions.path, f"a background of {spec.background}", expected)
 
 
@@ -295,8 +297,10 @@ def for_questions(config: ModelConfig, questions: QuestionsFile) -> ModelConfig:
     Raises SpecError for settings that do not suit, and for a file of the paper's authors.
     """
     check(config.depth == 0, "depth", config.depth, "0 for questions, which have no depth maps")
-    check(not config.material, "material", config.material, "false for questions, which tell it")
-    check(not config.lights, "lights", config.lights, "0 for questions, which tell them")
+    check(
+        not config.material, "material", config.material, "false for questions, where it is given"
+    )
+    check(not config.lights, "lights", config.lights, "0 for questions, where lights are given")
     spec = config.networks
     check(spec.z_view in (0, Z_VIEW), "z view", spec.z_view, f"{Z_VIEW}, for questions")
     check(spec.z > Z_VIEW, "z scene", spec.z, f"{Z_VIEW + 1} or more, for questions")

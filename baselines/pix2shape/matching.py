@@ -80,7 +80,7 @@ def reliefs(like: Tensor) -> Tensor:
 def paper_rooms_only(room_size: Tensor | None) -> None:
     """Raise SpecError for closed rooms, where more relief than STEPS * STEP is to be expected."""
     if room_size is not None and room_size.isfinite().any():
-        expected = "the paper's rooms, for whose relief this search was made"
+        expected = "box rooms, which this search supports"
         raise SpecError("rooms", "closed rooms in metres", expected)
 
 

@@ -47,7 +47,7 @@ def drawn(model: Pix2Shape, code: Tensor, views: Views) -> tuple[Tiles, Tiles, T
     depth, opacity = surfels.depth, surfels.opacity
     image = shaded(surfels, model.lit(code, views))
     if not (depth.isfinite().all() and image.isfinite().all()):
-        hint = "these weights do not suit these rooms"
+        hint = "these weights are for other rooms"
         raise SceneGenError("picture", "depth or radiance that is not finite", hint=hint)
     normals = normals_from_depth(depth, views.scene.fov_y_degrees)
     if opacity is not None:
@@ -216,7 +216,7 @@ def check_picture(path: str | Path, animated: bool, overwrite: bool) -> None:
     if not animated:
         check_picture_name(path)
     elif path.suffix.lower() not in (".gif", ".webp"):
-        raise SpecError("out", repr(path.name), "an animation's name such as turn.gif")
+        raise SpecError("out", repr(path.name), "the name of an animation, such as turn.gif")
     check_writable(path, overwrite)
 
 

@@ -30,9 +30,11 @@ from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
 
 BATCH = 64  # images at a time
-TOLD = "told: one image of each scene, the cameras, and where the empty room's floor and walls are"
-DEPTH = "told: in training, true depth maps"
-TAUGHT = "told: in training, the lights of its images and the answers of {} questions"
+TOLD = (
+    "given as input: one image of each scene, the cameras, and ground and walls of the empty room"
+)
+DEPTH = "given in training: ground-truth depth maps"
+TAUGHT = "given in training: the lights of its images and the labels of {} questions"
 
 
 def predict_file(
@@ -59,7 +61,7 @@ def predict_file(
     """
     model, card = open_weights(weights)
     if method not in (None, card.submission):
-        hint = "names tell what a model was told and taught; `pix2shape predict` takes any weights"
+        hint = "the name states inputs and supervision; `pix2shape predict` takes any weights"
         raise SpecError("weights", f"{weights}, whose method is {card.submission}", method, hint)
     model.to(chosen_device(device))
     predict = (
@@ -86,8 +88,12 @@ def views_of(model: Pix2Shape, earlier_depth: bool, run: str, rooms: RoomsFile) 
     """
     spec = model.config.networks
     if not spec.camera or spec.classes:
-        what = "is told classes, which are part of the truth" if spec.classes else "is not told it"
-        raise SpecError("weights", f"a model that {what}", "one that is told the camera alone")
+        what = (
+            "takes categories as input, which are part of the ground truth"
+            if spec.classes
+            else "does not take it as input"
+        )
+        raise SpecError("weights", f"a model that {what}", "one that takes the camera only")
     device = next(model.parameters()).device
     method = TAUGHT_DEPTH if earlier_depth else model.config.method
     notes = "; ".join([TOLD] * spec.rays + [DEPTH] * (method == TAUGHT_DEPTH))
@@ -121,7 +127,7 @@ def answers_of(model: Pix2Shape, labels: int, run: str, questions: QuestionsFile
     """
     spec, device = model.config.networks, next(model.parameters()).device
     if spec.condition:
-        raise SpecError("weights", "a model that is told the camera", "one for questions")
+        raise SpecError("weights", "a model that takes the camera as input", "one for questions")
     check_background(questions, model.config)
 
     def scores(images: Tensor) -> Tensor:

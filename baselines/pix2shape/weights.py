@@ -106,7 +106,7 @@ def suited(data: str | Path, method: str | None = None) -> str:
     if method is None and bundled:
         return next(iter(bundled.values()))
     if method not in bundled:
-        expected = f"some{f' of {method}' if method else ''} that suit {data}"
+        expected = f"some{f' of {method}' if method else ''} for {data}"
         others = f"; weights of {' and '.join(sorted(bundled))} are bundled" if bundled else ""
         hint = f"train some with `pix2shape train` and name them with --weights{others}"
         raise SpecError("weights", "none bundled", expected, hint)

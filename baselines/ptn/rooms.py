@@ -146,7 +146,7 @@ class TrainingRooms:
         single = [rows[0] for rows in self._images.rows_of if len(rows) < 2]
         if single:
             scene = int(rooms.read("scene_index", int(single[0])))
-            expected = "two or more of every scene, as silhouettes of one view tell no shape"
+            expected = "two or more per scene, because silhouettes of one view determine no shape"
             hint = "scenegen render --views 0,35,80 makes them"
             raise SpecError(f"{rooms.path}: scene {scene}", "one view", expected, hint)
         self.fingerprint, self.data = rooms.fingerprint, rooms.spec.to_json()

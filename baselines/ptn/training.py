@@ -127,7 +127,7 @@ def lesson(run: Run, *, labels: int = 0, networks: str | None = None) -> Lesson:
         unlabelled = only(run.data.questions(UNLABELED), run.method)
         source, task, box = TrainingShapes(unlabelled, card.settings), "questions", BOX
     else:
-        check(card.labels == 0, "labels", card.labels, "0 for rooms, which ask no questions")
+        check(card.labels == 0, "labels", card.labels, "0 for rooms, which have no labels")
         rooms = only(run.data.rooms(), run.method)
         source, task, box = TrainingRooms(rooms, card.settings), "rooms", room_box(rooms.spec)
     trained = run.earlier is not None or model is not None

@@ -89,7 +89,7 @@ def lesson(run: Run, *, start: str | None = None) -> Lesson:
     Raises SpecError where its size or width is another one, too.
     """
     new = run.earlier is None
-    check(start is None or new, "start", start, "none, as --resume goes on with a run")
+    check(start is None or new, "start", start, "none, because --resume continues a run")
 
     def begin(network: Completion) -> None:
         path = start or bundled(FILES, depth_supervised.METHOD)

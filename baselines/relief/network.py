@@ -128,7 +128,7 @@ class UNet(Relief):
     def channels(self, image: Tensor, cameras: Cameras, targets: Cameras) -> Tensor:
         """As `Relief` says; only the image's own camera can be asked for."""
         if targets is not cameras:
-            raise ValueError("a unet gives the relief at the image's own camera alone")
+            raise ValueError("a unet predicts at the camera of the input image only")
         planes = planes_of(cameras, image.shape[-1])
         return torch.cat([image, contrast(image), planes], dim=1)
 

@@ -35,7 +35,7 @@ WARM_UP = 200  # iterations
 SLOPE = 2.0  # weight of differences between neighbours, in the loss of shape
 WHOLE = 0.2  # of training, its end: whole images are shown; before that, windows around objects
 FILES = Path(__file__).with_name("files")
-TOLD = "told: the camera, and where the empty room's floor and walls are"
+TOLD = "given as input: the camera, and ground and walls of the empty room"
 FROM = "each view is predicted from its own image"
 FROM_FIRST = "each view is predicted from the image of the scene's first one"
 

@@ -184,9 +184,9 @@ def answers_of(
     if count != card.answers and not any_number:
         raise SpecError(
             questions.path,
-            f"questions of {count} answers",
+            f"questions with {count} options",
             f"{card.answers}, as those that {card.method} was trained on",
-            f"its last layer has an output for each answer; train it on questions of {count}",
+            f"its last layer has one output per option; train it on questions with {count}",
         )
     device = chosen_device("auto")
     network.to(device)

@@ -163,7 +163,7 @@ def lesson(run: Run, *, labels: int = 0, start: str | None = None) -> Lesson:
             head is trained. So runs with different labels can share them.
     """
     new = run.earlier is None
-    check(start is None or new, "start", start, "none, as --resume goes on with a run")
+    check(start is None or new, "start", start, "none, because --resume continues a run")
     labelled = only(run.data.questions(LABELED), run.method)
     model, card = None, Card(run.method, run.settings, labels=labels if new else run.earlier.labels)
     if start is not None:

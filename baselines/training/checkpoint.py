@@ -247,7 +247,7 @@ def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
     if path.exists() and not path.is_file() and not path.is_dir():
         raise FileFormatError(path, "a pipe or a device", "a regular file")  # it may have no end
     if not path.exists() and path.suffix != ".safetensors":
-        text = "no such file; name a .safetensors file, or leave it out for bundled weights"
+        text = "no such file; give a .safetensors file, or leave out --weights for bundled weights"
         raise FileNotFoundError(errno.ENOENT, text, str(path))
     with path.open("rb"):  # raises Python's own errors for a missing file or a folder
         pass
@@ -297,7 +297,7 @@ def _load(
     """Return tensors and card of a file. Raises OSError, FileFormatError."""
     tensors, notes = load_tensors(path)
     if content not in notes:
-        hint = f"name {WEIGHTS} beside it" if CONTENTS[1] in notes else ""
+        hint = f"use {WEIGHTS} next to it" if CONTENTS[1] in notes else ""
         stored = ", ".join(notes) or "no card"
         raise FileFormatError(path, f"{stored:.40}", f"{content} of {method.name}", hint)
     text = notes[content]
@@ -333,7 +333,7 @@ def alone_in(folder: Path) -> Iterator[None]:
 def check_new(folder: Path) -> None:
     """Raise FileExistsError where a new run would replace a checkpoint or weights."""
     if (folder / CHECKPOINT).exists():
-        message = "holds a checkpoint; say --resume, or name another folder"
+        message = "holds a checkpoint; use --resume, or another folder"
         raise FileExistsError(errno.EEXIST, message, str(folder))
     if (folder / WEIGHTS).exists():
         message = "is there, and a new run would replace it; name another folder"
@@ -373,7 +373,7 @@ def begun(
     trained_on, mark = state.card.fingerprint, card.fingerprint
     if mark != trained_on:
         expected = f"{trained_on[:12]}, on which the run was trained"
-        raise SpecError(where, f"fingerprint {mark[:12]}", expected, "resume with the same data")
+        raise SpecError(where, f"recipe hash {mark[:12]}", expected, "resume with the same data")
     if device is not None:
         state.to(device)
     return state

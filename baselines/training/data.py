@@ -82,7 +82,7 @@ class TrainingFiles:
 def only(files: Sequence[FileT], method: str) -> FileT:
     """Return the one file. Raises SpecError where there are several."""
     if len(files) != 1:
-        raise SpecError("data", f"{len(files)} files", f"one, as {method} learns from one file")
+        raise SpecError("data", f"{len(files)} files", f"one, because {method} trains on one file")
     return files[0]
 
 
@@ -141,8 +141,8 @@ def refuse_request(where: object, spec: str, test: KnownTest | None = None) -> N
     """Raise SpecError for a named test set, or a request for rooms of its seed and objects."""
     test = test or _like(spec)
     if test:
-        hint = "take another --seed for training, or say --allow-test-set"
-        found = f"the seed and the objects of the test set {test.name}"
+        hint = "use another --seed for training, or --allow-test-set"
+        found = f"the seed and the objects of the benchmark {test.name}"
         raise SpecError(where, found, "training data", hint)
 
 

@@ -110,7 +110,7 @@ def fit(
                 _step(state.optimisers[loss.optimiser], loss, clip, reported, number)
         except torch.OutOfMemoryError as error:
             message = f"no memory left on the GPU for a batch of {state.card.settings.batch}"
-            raise TrainingError("training", message, hint="--set batch=N asks for less") from error
+            raise TrainingError("training", message, hint="--set batch=N needs less") from error
         done, seconds = number + 1, round(before + time.monotonic() - started, 1)
         state.card = replace(state.card, iteration=done, seconds=seconds, rows=done * rows)
         if plan is not None:

@@ -54,7 +54,7 @@ def chosen_device(name: str, count: int = 1) -> torch.device:
     Raises SpecError where there are fewer than `count`.
     """
     if name == "cuda" and not torch.cuda.is_available():
-        raise SpecError("device", "no GPU that this torch can use", hint="say --device cpu")
+        raise SpecError("device", "no GPU that this torch can use", hint="use --device cpu")
     if name == "cpu" or not torch.cuda.is_available():
         return torch.device("cpu")
     check(count <= torch.cuda.device_count(), "devices", count, str(torch.cuda.device_count()))

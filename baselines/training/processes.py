@@ -48,8 +48,8 @@ def _add_up(values: Tensor) -> None:
     try:
         distributed.all_reduce(values)
     except RuntimeError as error:  # gloo and NCCL have no narrower one in common
-        message = "that another process of this run ended or cannot be reached"
-        hint = "see its own message, if it had time for one; `--resume` goes on from the checkpoint"
+        message = "that another process of this run exited or is unreachable"
+        hint = "see the message of that process; `--resume` continues from the checkpoint"
         raise LostProcessError("training", message, hint=hint) from error
 
 

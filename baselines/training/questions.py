@@ -33,12 +33,12 @@ def open_test(path: str | Path, size: int) -> QuestionsFile:
     try:
         questions = open_questions(path)
     except SpecError as error:
-        expected = "questions to answer, such as iqtt-test.h5"
+        expected = "questions to predict, such as iqtt-test.h5"
         raise SpecError(path, "training questions", expected) from error
     try:
         check_reducible(path, questions.height, questions.width, size)
         if not len(questions):
-            raise SpecError(path, "no questions", "one or more to answer")
+            raise SpecError(path, "no questions", "one or more to predict")
     except BaseException:
         questions.close()
         raise
@@ -49,7 +49,7 @@ def check_labels(labelled: QuestionsFile, labels: int, least: int = 0) -> None:
     """Raise SpecError unless a file tells the answers of as many questions."""
     count = len(labelled) if labelled.has_answers else 0
     if not least <= labels <= count:
-        expected = f"{least} to {count}, as many answers as {labelled.path} tells"
+        expected = f"{least} to {count}, the number of labels in {labelled.path}"
         raise SpecError("labels", labels, expected, "`iqtt make-split --labeled N` makes more")
 
 
@@ -58,7 +58,7 @@ def check_truth(questions: QuestionsFile) -> None:
     if questions.spec is None or not questions.has_truth or not len(questions):
         truth = "with" if questions.has_truth else "without"
         message = f"{len(questions)} questions {truth} the group `truth`"
-        expected = "some, with that group, which tells shapes and lights"
+        expected = "questions with that group, which holds shapes and lights"
         raise SpecError(questions.path, message, expected, "`iqtt make-split` writes it")
 
 

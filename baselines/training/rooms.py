@@ -168,7 +168,7 @@ def bounded(rooms: RoomsFile, name: str, most: float) -> Array:
     """Return what the networks are told of all rows. Raises FileFormatError beyond +-`most`."""
     values: Array = rooms.read(name, slice(None))
     fine = np.abs(values.reshape(len(values), -1)) <= most  # NaN is not
-    expected = f"finite numbers of at most {most:g}, as the networks are told them"
+    expected = f"finite numbers of at most {most:g}, because the networks take them as input"
     refuse_rows(rooms, name, ~fine.all(axis=1), "numbers that are not finite, or huge", expected)
     return values
 

@@ -76,7 +76,7 @@ class TrainingStreams:
             if not self.allow_test_set:
                 refuse_request(self.where, specs[-1].to_json())
         if len({getattr(spec, "interior", False) for spec in specs}) > 1:
-            raise SpecError("stream", self.names, "closed rooms alone, or none of them")
+            raise SpecError("stream", self.names, "only closed rooms, or none")
         return Shown(tuple(specs))
 
 
@@ -88,7 +88,7 @@ class Shown:
 
     def whole(self, batch: int) -> int:
         """Return how many rows are shown for a batch: of whole scenes, so perhaps more."""
-        views = len(getattr(self.specs[0], "views", (0,)))
+        views = len(getattr(self.specs[0], "view_angles", (0,)))
         return -(-batch // views) * views
 
     def card(self) -> dict[str, Any]:
@@ -110,7 +110,7 @@ class Shown:
             how |= {"fields": fields, "start": MAX_QUESTIONS + before}
             stream: Any = QuestionStream(requests, **how)
         else:
-            first = MAX_COUNT * len(self.specs[0].views)
+            first = MAX_COUNT * len(self.specs[0].view_angles)
             fields = ROOM_FIELDS + ["room/size"] * self.specs[0].interior
             stream = RoomStream(requests, fields=fields, start=first + before, **how)
         mark = self.card()["fingerprint"]

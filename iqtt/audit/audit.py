@@ -32,9 +32,9 @@ PROBED = 20_000  # questions that probes look at, by default
 CAST = 48  # questions whose images are ray-cast again
 EXPLAINED = 2_000  # questions whose wrong answers are laid on the reference
 _BY_CUBES = (
-    *("shapes", "one right answer", "answers differ", "labels", "mirror images", "matched"),
-    *("stored ids", "splits apart", "splits for ever", "rotations", "angles", "lines of sight"),
-    *("visibility", "cast again", "one explanation"),
+    *("shapes", "one correct option", "options differ", "labels", "mirror images", "matched"),
+    *("stored ids", "disjoint splits", "split by hash", "rotations", "angles", "lines of sight"),
+    *("visibility", "ray-cast images", "unique solution"),
 )
 
 
@@ -197,7 +197,7 @@ def _prove(
         explanations.no_other_explanation(with_cubes, shapes, _spread(counts, EXPLAINED)),
     ]
     untold = [table.name for table in tables if not table.truth]
-    note = f"; not told of {', '.join(untold)}" if untold else ""
+    note = f"; not stored in {', '.join(untold)}" if untold else ""
     return [replace(proof, detail=proof.detail + note) for proof in by_cubes] + proofs
 
 

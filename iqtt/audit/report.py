@@ -7,34 +7,38 @@ from iqtt.audit.probes.rules import ERROR_RATE, FRAMES, LIGHT, MIRRORED, OUTLINE
 from scenegen.common.text_table import aligned, piped, printable
 
 _BLOCKS = (
-    (WITHOUT, "answers alone", ("largest", "smallest", "most typical", "odd one out")),
-    (WITHOUT, "answers alone, learned and cross-validated", ("learned",)),
-    (WITHOUT, "where right answers stand, cross-validated", ("commonest", "after the last")),
-    (LIGHT, "next to the reference, by light", ("nearest", "farthest")),
+    (WITHOUT, "options only", ("largest", "smallest", "most typical", "odd one out")),
+    (WITHOUT, "options only, learned and cross-validated", ("learned",)),
+    (
+        WITHOUT,
+        "position of the correct option, cross-validated",
+        ("most frequent", "after the last"),
+    ),
+    (LIGHT, "option and reference, by light", ("nearest", "farthest")),
     (
         MIRRORED,
-        "the right answer or its mirror image, next to the reference",
+        "correct option or its mirror image",
         ("nearest", "farthest"),
     ),
-    (FRAMES, "by the frames in which shapes are stored", ("nearest", "farthest", "learned")),
-    (OUTLINE, "next to the reference, by outline", ("nearest", "farthest", "learned")),
+    (FRAMES, "stored rotations and cube orders", ("nearest", "farthest", "learned")),
+    (OUTLINE, "option and reference, by silhouette", ("nearest", "farthest", "learned")),
 )
 
 
 def table(audit: Audit) -> str:
-    """Return proofs and probes as text with aligned columns."""
+    """Return the verdict, proofs and shortcut classifiers as text with aligned columns."""
     files = [(t.name, f"{t.questions:,} questions", t.split or "released") for t in audit.tables]
-    lines = [*aligned(files), *audit.lacking, ""]
+    lines = [*_conclusion(audit), "", *aligned(files), *audit.lacking, ""]
     lines += aligned([(p.status, p.name, p.detail) for p in audit.proofs])
     for title, rows in _blocks(audit.probes):
         lines += ["", title, *("  " + line for line in aligned(rows))]
-    return "\n".join(map(printable, [*lines, "", *_conclusion(audit)]))
+    return "\n".join(map(printable, [*lines, *_legend(audit)]))
 
 
 def markdown(audit: Audit) -> str:
-    """Return proofs and probes as Markdown tables."""
+    """Return the verdict, proofs and shortcut classifiers as Markdown tables."""
     files = [(t.name, f"{t.questions:,}", f"{t.probed:,}") for t in audit.tables]
-    lines = piped([("table", "questions", "probed"), *files])
+    lines = [*_conclusion(audit), "", *piped([("table", "questions", "classified"), *files])]
     lines += [*(f"\n{line}" for line in audit.lacking)]
     lines += [
         "",
@@ -42,11 +46,11 @@ def markdown(audit: Audit) -> str:
     ]
     for title, rows in _blocks(audit.probes):
         lines += ["", f"{title[0].upper()}{title[1:]}:", "", *piped(rows)]
-    return "\n".join(map(printable, [*lines, "", *_conclusion(audit)]))
+    return "\n".join(map(printable, [*lines, *_legend(audit)]))
 
 
 def _blocks(probes: Sequence[Probe]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
-    """Yield for each kind of probes a title and a table: statistics in rows, rules in columns."""
+    """Yield a title and a table for each kind of classifiers: statistics by rules."""
     for sees, title, rules in _BLOCKS:
         by_rule = {(p.statistic, p.rule): p for p in probes if p.sees == sees and p.rule in rules}
         if not by_rule:
@@ -55,7 +59,7 @@ def _blocks(probes: Sequence[Probe]) -> Iterator[tuple[str, list[tuple[str, ...]
         rows = [(name, *(_cell(by_rule.get((name, rule))) for rule in rules)) for name in names]
         chance = next(iter(by_rule.values())).chance
         counts = sorted({p.n for p in by_rule.values()})
-        may = "sees some shape, so may beat" if sees == OUTLINE else "must not beat"
+        may = "may exceed" if sees == OUTLINE else "must not exceed"
         numbers = " to ".join(f"{n:,}" for n in dict.fromkeys((counts[0], counts[-1])))
         full = f"{title}: {may} chance, {100 * chance:.1f}% ({numbers} questions)"
         yield full, [("", *rules), *rows]
@@ -70,18 +74,22 @@ def _cell(probe: Probe | None) -> str:
 
 def _conclusion(audit: Audit) -> list[str]:
     failed = [proof.name for proof in audit.proofs if proof.status == "FAIL"]
-    lines = [f"FAILED: {', '.join(failed)}." if failed else "No proof failed."]
+    passed = sum(proof.status == "ok" for proof in audit.proofs)
+    proofs = f"{passed} proofs passed, 0 failed"
+    if failed:
+        proofs = f"FAILED proofs: {', '.join(failed)}"
     if not audit.questions:
-        lines = ["FAILED: there are no questions."]
-    if audit.probes:
-        tried = sum(probe.sees != OUTLINE for probe in audit.probes)
-        shortcuts = [f"{p.statistic}, {p.rule} ({p.sees})" for p in audit.shortcuts]
-        verdict = f"{len(shortcuts)} did: {'; '.join(shortcuts)}" if shortcuts else "none did"
-        lines.append(
-            "Percent right with 95% Wilson intervals; * beats chance at the"
-            f" {100 * ERROR_RATE:g}% level, corrected for the number of probes (Holm)."
-            f" Of {tried} probes that must not beat chance, {verdict}."
-        )
-    else:
-        lines.append("No probes: no right answers are known.")
-    return lines
+        proofs = "FAILED: there are no questions"
+    if not audit.probes:
+        return [proofs, "no shortcut classifiers: the correct options are unknown"]
+    tried = sum(probe.sees != OUTLINE for probe in audit.probes)
+    shortcuts = [f"{p.statistic}, {p.rule} ({p.sees})" for p in audit.shortcuts]
+    names = f": {'; '.join(shortcuts)}" if shortcuts else ""
+    return [proofs, f"{len(shortcuts)} of {tried} shortcut classifiers beat chance{names}"]
+
+
+def _legend(audit: Audit) -> list[str]:
+    """Return how to read the tables of classifiers."""
+    level = f"* beats chance at the {100 * ERROR_RATE:g}% level (Holm-corrected)"
+    text = f"accuracy in percent with its 95% Wilson interval; {level}"
+    return ["", text] if audit.probes else []

@@ -31,8 +31,8 @@ SHIFT = 1e-6  # moves rays off the edges of cubes that lie along the axes
 MOST_BYTES = 256 * 2**20
 AS_IT_LIES = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 RULES = (
-    "hidden cube", "no right answer", "more than one right answer", "wrong key",
-    "unlike cube counts", "equal pictures", "more than one piece",
+    "hidden cube", "no correct option", "more than one correct option", "wrong key",
+    "different cube counts", "equal images", "more than one piece",
 )  # fmt: skip
 
 
@@ -99,11 +99,11 @@ def audit_strangers(path: str | Path, progress: Callable[[int], Any]) -> dict[st
 
 def _faults(question: Question, distance: float) -> dict[str, str]:
     views = {"the reference": question.reference}
-    views |= {f"answer {k}": view for k, view in enumerate(question.answers)}
+    views |= {f"option {k}": view for k, view in enumerate(question.answers)}
     shapes = {name: np.array(view.cubes) for name, view in views.items()}
     faults: dict[str, str] = {}
     if len({len(cubes) for cubes in shapes.values()}) > 1:
-        faults["unlike cube counts"] = ", ".join(str(len(cubes)) for cubes in shapes.values())
+        faults["different cube counts"] = ", ".join(str(len(cubes)) for cubes in shapes.values())
     reference, *answers = shapes.values()
 
     def same(cubes: Array) -> bool:
@@ -111,11 +111,11 @@ def _faults(question: Question, distance: float) -> dict[str, str]:
 
     right = [k for k, cubes in enumerate(answers) if same(cubes)]
     if not right:
-        faults["no right answer"] = "none is the reference turned"
+        faults["no correct option"] = "no option is the rotated reference"
     if len(right) > 1:
-        faults["more than one right answer"] = f"answers {right}"
+        faults["more than one correct option"] = f"options {right}"
     if right and question.key not in (None, *right):
-        faults["wrong key"] = f"{question.key}, where {right} is right"
+        faults["wrong key"] = f"{question.key}, but the correct option is {right}"
     pictures = {}
     for name, cubes in shapes.items():
         if not whole_and_count(cubes[None, None])[0][0]:
@@ -126,7 +126,7 @@ def _faults(question: Question, distance: float) -> dict[str, str]:
             faults.setdefault("hidden cube", f"{name}, cube {hidden}")
     for (first, depth), (second, other) in itertools.combinations(pictures.items(), 2):
         if (~np.isclose(depth, other, rtol=0, atol=NEAR, equal_nan=True)).mean() < SAME:
-            faults.setdefault("equal pictures", f"{first} and {second}")
+            faults.setdefault("equal images", f"{first} and {second}")
     return faults
 
 

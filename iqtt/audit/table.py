@@ -123,7 +123,7 @@ def open_paths(paths: Sequence[str | Path]) -> Iterator[dict[str, QuestionsFile]
                 tables[f"{shown} {part}".rstrip()] = stack.enter_context(table)
         counts = sorted({table.answers for table in tables.values()})
         expected = "the same number in every file; audit the others apart"
-        check(len(counts) == 1, "answers of a question", " and ".join(map(str, counts)), expected)
+        check(len(counts) == 1, "options of a question", " and ".join(map(str, counts)), expected)
         yield tables
 
 
@@ -226,7 +226,7 @@ def content_problems(tables: Sequence[AuditTable]) -> list[str]:
 
     Raises FileFormatError where a file cannot be read.
     """
-    wrong = "the answers, and what else scores depend on, are not those of its truth_digest"
+    wrong = "the ground truth does not match its truth_digest"
     problems = [f"{table.name}: {wrong}" for table in tables if table.truth_changed]
     files = {Path(opened.file.filename): opened for table in tables for opened in _opened(table)}
     contents = {place: digest for table in tables for place, digest in table.contents.items()}

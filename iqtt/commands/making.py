@@ -14,7 +14,7 @@ import click
 from iqtt.questions.kinds import DISTRACTORS, QUESTION_KINDS, ROOM_KINDS
 from scenegen.command_line import groups, options, output
 from scenegen.command_line.groups import EXAMPLE
-from scenegen.command_line.options import Color, Range
+from scenegen.command_line.options import Color, Range, Renamed
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import (
     InputPath,
@@ -24,13 +24,13 @@ from scenegen.command_line.paths import (
 )
 
 KNOWN_SEED = (
-    "note: anyone who knows the seed can recreate the test answers. For a private test set, run"
+    "note: anyone who knows the seed can recreate the answer key. For a private test set, run"
     " `openssl rand -hex 32 > secret.txt` and pass --secret-seed secret.txt."
 )
 
 
 def _with_answers(path: Path) -> list[Path]:
-    """Return where the questions and the answers lie that belong to one file of either."""
+    """Return the paths of the questions and of the answer key, given one of the two."""
     questions = path.stem.removesuffix("-answers")
     return [path.with_name(f"{stem}{path.suffix}") for stem in (questions, f"{questions}-answers")]
 
@@ -46,60 +46,64 @@ option = partial(click.option, show_default=True)
     "--out",
     type=OutputFolder(),
     default="iqtt-split",
-    help="Folder for the four files, or a URL such as s3://bucket/iqtt.",
+    help="Output folder for the four files, or a URL such as s3://bucket/iqtt.",
 )
 @option(
     "--preset",
     type=click.Choice(["small", "v2", "paper", "suite", "perspective", "perspective-suite"]),
     default="small",
-    help="Numbers of questions. small: 1,000 for training (100 with answers), 200 for validation,"
-    " 200 for testing; v2: as in the released data, in float32; paper: as in the paper; suite: a"
-    " folder for each kind of questions, 5,000 (1,000), 500 and 2,000 in each; perspective:"
-    " furnished rooms, 100, 40 and 60; perspective-suite: a folder for each of their kinds.",
+    help="Numbers of questions. small: 1,000 for training (100 of them labelled), 200 for"
+    " validation, 200 for testing; v2: as in the released data, in float32; paper: as in the paper;"
+    " suite: one folder per distractor type, each with 5,000 for training (1,000 labelled), 500 and"
+    " 2,000; perspective: furnished rooms, 100, 40 and 60; perspective-suite: one folder per"
+    " distractor type of rooms.",
 )
-@option("--train", type=int, help="Number of training questions, with and without answers.")
+@option("--train", type=int, help="Number of training questions, labelled and unlabelled.")
 @option(
     "--labeled",
     type=int,
-    help="How many training questions have answers [default: the preset's share].",
+    help="Number of labelled training questions [default: the fraction of the preset].",
 )
 @option("--val", type=int, help="Number of validation questions.")
-@option("--test", type=int, help="Number of test questions; their answers are in a separate file.")
+@option("--test", type=int, help="Number of test questions. Their answer key is a separate file.")
 @options.SEED
 @option(
     "--secret-seed",
     type=InputPath(),
     metavar="FILE",
-    help="File whose content is the seed, for a private test set. No file that is written holds the"
-    " seed.",
+    help="File with the seed of a private test set. The seed is stored in no output file.",
 )
 @option("--cubes", type=Range(int), default="8-11", help="Number of cubes of a shape.")
 @option(
     "--shapes",
     type=click.Choice(["chain", "tree"]),
     default="chain",
-    help="chain: self-avoiding chains of cubes; tree: shapes that may branch.",
+    help="chain: self-avoiding chains of cubes; tree: branching shapes as well.",
 )
 @option(
     "--distractors",
     type=click.Choice(list(dict.fromkeys((*DISTRACTORS, *ROOM_KINDS)))),
     default="mixed",
-    help="Wrong options. "
+    help="Distractor type: what the wrong options show. "
     + "".join(f"{name}: {kind.meaning}; " for name, kind in QUESTION_KINDS.items())
     + "of rooms "
     + "".join(f"{name}: {kind.meaning}; " for name, kind in ROOM_KINDS.items())
-    + "mixed: each question one of these.",
+    + "mixed: one of these types per question.",
 )
 @option(
-    "--answers",
+    "--options",
+    "answers",
+    cls=Renamed,
+    former="--answers",
     type=int,
     default=3,
-    help="Number of answers, 3 or 2; one of them is right. It is 2 for mirror images of rooms.",
+    help="Number of options per question, 3 or 2. One option is correct. A mirror-pair of rooms has"
+    " 2.",
 )
 @click.option(
     "--angle",
     type=Range(float),
-    help="Degrees between the views of reference and answers, of rooms [default: 20-120].",
+    help="Degrees between the views of reference and options, of rooms [default: 20-120].",
 )
 @click.option("--objects", type=Range(int), help="Number of objects of a room [default: 12-40].")
 @click.option(
@@ -118,44 +122,46 @@ option = partial(click.option, show_default=True)
     "min_angle_degrees",
     type=float,
     default=30,
-    help="Smallest rotation between the reference's view and an answer's, and between two views of"
-    " one shape, in degrees.",
+    help="Minimum rotation, in degrees, between the views of the reference and of each option, and"
+    " between two views of the same shape.",
 )
 @option(
     "--min-sight-angle",
     "min_sight_angle_degrees",
     type=float,
-    help="Smallest angle between the lines of sight of these views, in degrees: nearer views, and"
-    " views from behind, have outlines that are alike [default: 40; 0 with v2 and paper].",
+    help="Minimum angle, in degrees, between the viewing directions of these views. Close or"
+    " opposite"
+    " viewing directions give similar silhouettes [default: 40; 0 with v2 and paper].",
 )
 @option(
     "--min-cube-pixels",
     type=int,
-    help="Smallest number of pixels that show a cube [default: 30 at 128x128 and radius 3.5].",
+    help="Minimum number of visible pixels of each cube [default: 30 at 128x128 and radius 3.5].",
 )
-@option("--max-radius", type=float, help="Largest radius of a shape, in cube edges [default: 3.5].")
+@option("--max-radius", type=float, help="Maximum radius of a shape, in cube edges [default: 3.5].")
 @options.SIZE
 @option("--background", type=Color(), default="white", help="Background colour.")
 @option("--lights", type=Range(int), default="2", help="Number of lights.")
 @option(
     "--image-dtype",
     type=click.Choice(["uint8", "float16", "float32"]),
-    help="Type of stored radiance [default: uint8; float32 with --preset v2].",
+    help="Data type of the stored radiance [default: uint8; float32 with --preset v2].",
 )
-@option("--with-depth", is_flag=True, help="Store planar depth as well.")
+@option("--with-depth", is_flag=True, help="Also store planar depth.")
 @options.COMPRESSION
 @option(
     "--batch",
     type=click.IntRange(1, 4096),
     default=64,
-    help="Questions that a process renders at once.",
+    help="Number of questions that a process renders at once.",
 )
 @options.WORKERS
 @option(
     "--shard-size",
     type=int,
     default=10_000,
-    help="Most questions of one file; more go to files beside it, which it shows as one.",
+    help="Maximum number of questions per file. Larger parts are split into shards that read as one"
+    " file.",
 )
 @options.SCHEDULER
 @options.DEVICE
@@ -174,11 +180,12 @@ def make_split(
     secret_seed: str | None,
     **settings: Any,
 ) -> None:
-    """Make a split of mental-rotation questions for training, validation and testing.
+    """Make mental-rotation questions for training, validation and testing.
 
-    A question has a reference and answers, one of which shows the same shape. Every cube of a shape
-    shows in every picture. No shape, nor its mirror image, is in two of training, validation and
-    test, whatever the settings. Where a run with shards was ended, the same command goes on.
+    Each question has a reference and options. One option shows the shape of the reference. All
+    cubes of a shape are visible in every image. No shape and no mirror image of a shape is shared
+    between training, validation and test. Re-run the same command to resume an interrupted run with
+    shards.
     """
     from iqtt.files import make
     from iqtt.files.split import ALL_FILES
@@ -194,13 +201,7 @@ def make_split(
     given = {x for x in context.params if context.get_parameter_source(x) is not default}
     kind = rooms.PerspectiveSpec if of_rooms else specs.SplitSpec
     known = {field.name for field in fields(kind)}
-    for name in settings:
-        option = f"--{name.removesuffix('_degrees').replace('_', '-')}"
-        if name in given and name not in known:
-            which = "--preset perspective" if of_rooms else "a preset other than perspective"
-            raise SpecError(option, f"{which} as well", "one of the two")
-        if name in given and suite and name in ("distractors", "answers"):
-            raise SpecError(option, f"--preset {preset} as well", "only one of the two")
+    _refuse_others(given & settings.keys(), known, preset, of_rooms)
     if secret_seed is not None and "seed" in given:
         raise SpecError("--secret-seed", "--seed as well", "only one of the two")
     chosen = {x: v for x, v in settings.items() if x in known and v is not None}
@@ -249,21 +250,33 @@ def make_split(
         f" questions ({spec.labeled} of training labelled), {megabytes:.1f} MB,"
         f" {rate:.{0 if rate >= 10 else 2}f} questions/s"
     )
-    refused = "rooms were refused" if of_rooms else "views hid a cube and were refused"
+    refused = "rooms were rejected" if of_rooms else "views hid a cube and were rejected"
     print_line(
-        f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} proposed"
-        f" {refused}"
+        f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} sampled {refused}"
     )
     if spec.test and secret_seed is None:
         click.echo(KNOWN_SEED, err=True)
 
 
+def _refuse_others(given: set[str], known: set[str], preset: str, of_rooms: bool) -> None:
+    """Raise SpecError for a setting that a preset does not have."""
+    from scenegen.common.errors import SpecError
+
+    for name in sorted(given):
+        flag = {"answers": "options"}.get(name, name.removesuffix("_degrees").replace("_", "-"))
+        if name not in known:
+            which = "--preset perspective" if of_rooms else "a preset other than perspective"
+            raise SpecError(f"--{flag}", f"{which} as well", "only one of the two")
+        if preset.endswith("suite") and name in ("distractors", "answers"):
+            raise SpecError(f"--{flag}", f"--preset {preset} as well", "only one of the two")
+
+
 @click.command(epilog=f"{EXAMPLE}iqtt merge iqtt-split/iqtt-train.h5 --out iqtt-train.h5")
 @click.argument("file", type=QUESTIONS)
-@click.option("--out", type=NewHdf5(), required=True, help="File to write.")
+@click.option("--out", type=NewHdf5(), required=True, help="Output file.")
 @options.OVERWRITE
 def merge(file: str, out: str, overwrite: bool) -> None:
-    """Make one file of questions that were written to several."""
+    """Merge the shards of a file of questions into one file."""
     from iqtt.files.make import merge_questions
     from iqtt.files.reader import open_tables
 

@@ -13,7 +13,7 @@ import click
 from iqtt.commands.making import QUESTIONS
 from scenegen.command_line import options
 from scenegen.command_line.groups import EXAMPLE
-from scenegen.command_line.options import Items
+from scenegen.command_line.options import Items, Renamed
 from scenegen.command_line.output import on_scheduler, print_checks, print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputPath
 
@@ -24,19 +24,25 @@ option = partial(click.option, show_default=True)
 
 
 @click.command(
-    epilog=f"{EXAMPLE}iqtt show iqtt-split/iqtt-val.h5 --items 0-3 --answers --out questions.png"
+    epilog=f"{EXAMPLE}iqtt show iqtt-split/iqtt-val.h5 --items 0-3 --mark-correct --out"
+    " questions.png"
 )
 @click.argument("file", type=QUESTIONS)
 @option(
     "--out",
     type=OutputPath(),
     default="questions.png",
-    help="Picture to write; its suffix names the format.",
+    help="Output image. The suffix selects the format.",
 )
 @option("--items", type=Items(), help="Questions to show [default: the first 8].")
 @option("--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file.")
 @option(
-    "--answers", is_flag=True, help="Mark the right answers, and name the kinds of the wrong ones."
+    "--mark-correct",
+    "answers",
+    cls=Renamed,
+    former="--answers",
+    is_flag=True,
+    help="Mark the correct option, and label the wrong options with their distractor type.",
 )
 @options.OVERWRITE
 def show(
@@ -47,7 +53,7 @@ def show(
     answers: bool,
     overwrite: bool,
 ) -> None:
-    """Draw questions of FILE: the reference on the left, its answers beside it."""
+    """Draw questions of FILE: the reference on the left, the options next to it."""
     from iqtt.files.preview import question_sheet
     from iqtt.files.reader import QuestionsFile, answers_beside, open_tables
     from scenegen.common.errors import SpecError
@@ -56,19 +62,19 @@ def show(
     beside, first = answers_beside(file) if answers else None, open_tables(file)[0]
     with first, QuestionsFile(first.opened, part or first.part, beside) as questions:
         if answers and not (questions.has_answers or questions.has_truth):
-            raise SpecError(file, "no answers, and no file of answers beside it", "answers")
+            raise SpecError(file, "no answer key, and no file with one next to it", "an answer key")
         rows = pick_rows(len(questions), items, default=SHOWN)
         task = questions.attributes.get("task", "")
         sheet = question_sheet([questions[row] for row in rows], answers, task)
         count = len(questions)
     save_picture(sheet, out, overwrite)
-    print_line(f"{out}: {len(rows)} of {file}'s {count} questions")
+    print_line(f"{out}: {len(rows)} of {count} questions of {file}")
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt info iqtt-split/iqtt-val.h5")
 @click.argument("file", type=QUESTIONS)
 def info(file: str) -> None:
-    """Describe FILE: its questions, settings, versions, fingerprints and sizes."""
+    """Print the contents of FILE: questions, settings, versions, hashes and sizes."""
     from iqtt.files.info import describe
 
     click.echo(describe(file))
@@ -80,15 +86,18 @@ def info(file: str) -> None:
     "--cubes",
     type=InputPath(),
     metavar="SHAPES.json",
-    help="Audit questions of other people instead, told as cubes and rotations.",
+    help="Audit the questions of a JSON file of cubes and rotations instead.",
 )
-@option("--json", "json_path", type=OutputPath(), help="Write all numbers to this JSON file.")
+@option("--json", "json_path", type=OutputPath(), help="Write all numbers to a JSON file.")
 @option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 @option(
-    "--probed",
+    "--classifier-questions",
+    "probed",
+    cls=Renamed,
+    former="--probed",
     type=click.IntRange(0),
     default=20_000,
-    help="Largest number of questions that probes try to guess.",
+    help="Maximum number of questions that the shortcut classifiers are run on.",
 )
 @options.SCHEDULER
 @options.OVERWRITE
@@ -103,14 +112,14 @@ def audit(
     scheduler: str | None,
     overwrite: bool,
 ) -> None:
-    """Prove that the questions of files or folders are right, and try to guess their answers.
+    """Check that questions are correct, and search them for shortcuts.
 
-    SPLIT is a question file, a folder of them, also the released ones, or a folder of such folders,
-    each of which is then audited alone.
+    SPLIT is a question file, a folder of question files (the released ones included), or a folder
+    of such folders, which are audited one by one.
 
-    Proofs recompute what must hold, with code that is independent of the generator. Probes try to
-    find the right answers without comparing shapes. The exit code is 1 if a proof
-    fails, or if there are no questions.
+    Proofs recompute each property of the questions with code that is independent of the generator.
+    Shortcut classifiers try to select the correct option without comparing shapes. The exit code is
+    1 if a proof fails, or if there are no questions.
     """
     from iqtt.audit import report
     from iqtt.audit.audit import audit as audit_files
@@ -168,12 +177,17 @@ def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
 
 @click.command(epilog=f"{EXAMPLE}iqtt floors iqtt-split/iqtt-test.h5 --out floors.json")
 @click.argument("splits", nargs=-1, required=True, metavar="SPLIT.h5...", type=QUESTIONS)
-@option("--out", type=OutputPath(), default="floors.json", help="File of floors to write.")
+@option(
+    "--out",
+    type=OutputPath(),
+    default="floors.json",
+    help="Output file with the baseline accuracies.",
+)
 @option(
     "--questions",
     type=click.IntRange(200, 1_000_000),
     default=6_000,
-    help="Questions of each kind to measure on.",
+    help="Number of questions per distractor type.",
 )
 @options.WORKERS
 @options.DEVICE
@@ -181,11 +195,12 @@ def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
 def floors(
     splits: tuple[str, ...], out: str, questions: int, workers: int, device: str, overwrite: bool
 ) -> None:
-    """Measure what methods without 3D reach on questions with the settings of SPLIT.h5.
+    """Measure the accuracy of 2D-only baselines for the settings of SPLIT.h5.
 
-    New questions about shapes of the training split are made, which takes minutes, and answered by
-    all probes of `iqtt audit` that see pictures alone. The best is the floor of skill, for `bench
-    score --floors`. The floors of the presets come with the package.
+    The command makes new questions about shapes of the training split, which takes minutes, and
+    answers them with all shortcut classifiers of `iqtt audit` that use the images alone. The best
+    accuracy is the zero of the skill score in `bench score --baselines`. The baselines of the
+    presets are part of the package.
     """
     from iqtt.files.reader import open_tables
     from iqtt.floor_probes import floor_specs, measure_floors
@@ -212,7 +227,9 @@ def floors(
         for floor, tried in zip(measured.floors, probes, strict=True):
             best = sorted(tried, key=lambda probe: -probe.accuracy)[:3]
             shown = "; ".join(f"{p.statistic}, {p.rule} {p.accuracy:.3f}" for p in best)
-            print_line(f"{floor.kind}: {floor.accuracy:.3f}, {floor.probe} (best: {shown})")
+            print_line(
+                f"{floor.kind}: {floor.accuracy:.3f}, {floor.probe}; best classifiers: {shown}"
+            )
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt verify iqtt-split --items 20")
@@ -221,13 +238,13 @@ def floors(
     "--items",
     type=click.IntRange(0),
     default=8,
-    help="Questions of each part to make again from the seed.",
+    help="Number of questions per part to make again from the seed.",
 )
 @option(
     "--secret-seed",
     type=InputPath(),
     metavar="FILE",
-    help="File whose content is the seed of a private test set, which the files do not tell.",
+    help="File with the seed of a private test set.",
 )
 @options.DEVICE
 @click.pass_context
@@ -236,7 +253,7 @@ def verify(
 ) -> None:
     """Check all files of a split in FOLDER, and make some questions again from the seed.
 
-    Exits with 1 if a check fails. `iqtt audit` proves that the answers are right.
+    Exits with 1 if a check fails. `iqtt audit` proves that the answer key is correct.
     """
     from iqtt.files.verify import verify_split
     from iqtt.questions.specs import secret_seed as read_seed

@@ -1,4 +1,4 @@
-"""The command that writes the page on which people answer the questions of a file."""
+"""The command that writes a page on which people answer the questions of a file."""
 
 from functools import partial
 from pathlib import Path
@@ -16,25 +16,29 @@ option = partial(click.option, show_default=True)
 # fmt: off
 @click.command(epilog=f"{EXAMPLE}iqtt quiz iqtt-split/iqtt-test.h5 --out quiz.html")
 @click.argument("file", type=InputPath(), metavar="QUESTIONS.h5")
-@option("--out", type=OutputPath(), default="quiz.html", help="Page to write.")
-@option("--questions", type=int, default=20, help="Questions that count, the same for everyone.")
+@option("--out", type=OutputPath(), default="quiz.html", help="Output page.")
+@option("--questions", type=int, default=20, help="Number of scored questions. All participants"
+                                                  " get the same.")
 @option("--practice", type=int, default=2,
-        help="Questions before them whose right answers are told. The paper had 1.")
-@option("--seed", type=click.IntRange(0, LARGEST), default=0, help="Seed of the draw.")
-@click.option("--contact", default="", help="Who runs the study; the first page shows it.")
+        help="Number of practice questions with feedback before them. The paper used 1.")
+@option("--seed", type=click.IntRange(0, LARGEST), default=0, help="Seed of the choice of"
+                                                                   " questions.")
+@click.option("--contact", default="", help="Contact of the study, shown on the first page.")
 @click.option("--post", default="", metavar="URL",
-              help="Send each participant's answers there [default: they save a file].")
+              help="URL that receives the responses of each participant [default: participants"
+                   " save a"
+              " file].")
 @OVERWRITE
 def quiz(
     file: str, out: str, questions: int, practice: int, seed: int, contact: str, post: str,
     overwrite: bool,
 ) -> None:
-    """Write one page that asks people questions of QUESTIONS.h5, without a server.
+    """Write one HTML page that asks people the questions of QUESTIONS.h5, without a server.
 
-    Open it, or put it on any web host. Each participant answers a few questions for practice, and
-    then those that count, in a random order. The browser keeps the answers, and saves them as a
-    JSON file at the end, for `bench import --quiz`. The right answers are not in the page, but for
-    practice.
+    Open the page locally, or upload it to any web host. Each participant answers a few practice
+    questions, then the scored questions in random order. At the end, the browser saves the
+    responses as a JSON file for `bench import --quiz`. The page holds the correct options of the
+    practice questions only.
     """
     from iqtt.quiz.page import Study, write_quiz
 

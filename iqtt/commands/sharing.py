@@ -1,4 +1,4 @@
-"""The commands that hand on questions: a data card of a split, and files for data loaders."""
+"""The commands that publish questions: a data card of a split, and files for data loaders."""
 
 from pathlib import Path
 from typing import Any
@@ -7,7 +7,7 @@ import click
 
 from iqtt.commands.models import model_options
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import ENCODING, OVERWRITE
+from scenegen.command_line.options import ENCODING, OVERWRITE, Renamed
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputFolder
 from scenegen.commands.sharing import SHARE, publication_options
@@ -17,11 +17,14 @@ from scenegen.rooms.export.formats import DATA_FORMATS
 @click.command(epilog=f"{EXAMPLE}iqtt card iqtt-split --creator 'A. Person'")
 @click.argument("folder", type=InputPath(within=(".h5",)))
 @click.option(
-    "--with-answers",
+    "--with-answer-key",
+    "with_answers",
+    cls=Renamed,
+    former="--with-answers",
     is_flag=True,
-    help="Hand out the answers of the test questions too, and the seed if their file tells it.",
+    help="Release the answer key of the test questions as well, and the seed if the file has it.",
 )
-@publication_options(title="that of the folder", license_="CC-BY-4.0")
+@publication_options(title="the name of the folder", license_="CC-BY-4.0")
 @OVERWRITE
 def card(
     folder: str,
@@ -32,10 +35,10 @@ def card(
     out: str,
     overwrite: bool,
 ) -> None:
-    """Write a data card of the split in FOLDER: a page with the header that Hugging Face reads.
+    """Write a data card for the split in FOLDER, with the metadata header of Hugging Face.
 
-    Hand it on with the files that it lists: those of the test answers are not among them, and a
-    file that tells an answer of a test question is refused.
+    Publish the card with the files that it lists. The answer key of the test questions is not
+    listed, and a file that reveals a correct option of a test question is an error.
     """
     needs("iqtt card", SHARE, "share")
     from iqtt.sharing.published import open_split
@@ -57,14 +60,14 @@ def card(
 @click.argument("file", type=InputPath())
 @click.option("--format", "form", type=click.Choice([*DATA_FORMATS, "vlm"]),
               required=True,
-              help="parquet and webdataset are for data loaders. vlm is for models that read"
-              " pictures and text: Parquet, VLMEvalKit and lmms-eval.")
+              help="parquet, webdataset: for data loaders; vlm: for vision-language models, in the"
+              " layouts of Parquet, VLMEvalKit and lmms-eval.")
 @click.option("--part", type=click.Choice(["labeled", "unlabeled"]),
               help="Part of a training file.")
 @click.option("--out", type=OutputFolder(),
-              help="Folder to make [iqtt-val-parquet of iqtt-val.h5; iqtt-train-labeled-parquet].")
+              help="Output folder [such as iqtt-val-parquet for iqtt-val.h5].")
 @click.option("--rows-per-file", type=click.IntRange(1), default=1000, show_default=True,
-              help="Most questions of a file; not for vlm.")
+              help="Maximum number of questions per file; not for vlm.")
 @ENCODING
 @model_options
 @OVERWRITE
@@ -78,10 +81,10 @@ def export(
     overwrite: bool,
     **how: Any,
 ) -> None:
-    """Write the questions of FILE in a format of data loaders or of models.
+    """Export the questions of FILE for data loaders or for vision-language models.
 
-    Images of 8 bits become PNG files, sRGB unless --encoding linear. The answers to test questions
-    are in another file. They are not written, unless --with-answers asks for it.
+    8-bit images become PNG files in sRGB, or in linear radiance with --encoding linear. The answer
+    key of test questions is exported only with --with-answer-key.
     """
     if form != "webdataset":
         needs(f"iqtt export --format {form}", SHARE, "share")
@@ -114,7 +117,8 @@ def _export_for_models(
     with progress_bar(count, "question") as bar:
         written = export_for_models(asked, folder, overwrite=overwrite, progress=bar.update)
     megabytes = sum(path.stat().st_size for path in written) / 1e6
-    print_line(f"{folder}: {count} rows, {megabytes:.1f} MB: {', '.join(p.name for p in written)}")
+    names = ", ".join(path.name for path in written)
+    print_line(f"{folder}: {count} prompts, {megabytes:.1f} MB: {names}")
 
 
 # fmt: on

@@ -40,7 +40,7 @@ def describe(path: str | Path) -> str:
 
 def _facts_of_file(path: Path, tables: Sequence[QuestionsFile]) -> dict[str, str]:
     first, texts = tables[0], tables[0].attributes
-    facts = {"answers": _answers_told(path, tables)}
+    facts = {"answer key": _answer_key(path, tables)}
     if first.spec is None:
         return {**facts, "format": "none, as in the released 3D-IQTT"}
     return {
@@ -52,7 +52,7 @@ def _facts_of_file(path: Path, tables: Sequence[QuestionsFile]) -> dict[str, str
         "split": texts["split"],
         "task": texts["task"],
         "conventions": texts["conventions"],
-        "content": texts[CONTENT_DIGEST],
+        "content hash": texts[CONTENT_DIGEST],
     }
 
 
@@ -62,13 +62,13 @@ def _size(path: Path) -> int:
     return sum(file.stat().st_size for file in (path, *shards))
 
 
-def _answers_told(path: Path, tables: Sequence[QuestionsFile]) -> str:
+def _answer_key(path: Path, tables: Sequence[QuestionsFile]) -> str:
     total = sum(map(len, tables))
     labelled = sum(len(table) for table in tables if table.has_answers)
     if not tables[0].has_images:
-        return "to all of them; the images lie in another file"
+        return "for all questions; the images are in another file"
     if labelled:
-        return f"to {labelled} of them ({labelled / total:.1%})"
+        return f"for {labelled} of {total} questions ({labelled / total:.1%})"
     beside = answers_beside(path)
     return f"in {beside.name}" if beside else "none"
 
@@ -84,7 +84,7 @@ def _heading(table: QuestionsFile) -> str:
 
 def _facts(table: QuestionsFile) -> dict[str, str]:
     """Return counts and ranges of the values of a table, by name."""
-    identity = {"fingerprint": table.fingerprint, "truth digest": table.stored_truth_digest}
+    identity = {"recipe hash": table.fingerprint, "truth hash": table.stored_truth_digest}
     facts = {name: text for name, text in identity.items() if text}
     if len(table) == 0:
         return facts
@@ -95,15 +95,15 @@ def _facts(table: QuestionsFile) -> dict[str, str]:
         low, high = min(i.min() for i in images), max(i.max() for i in images)
         facts["radiance"] = f"{low:.4g} to {high:.4g} over {len(rows)} questions"
     if table.has_answers:
-        facts["answers"] = _counts(table.read("answers", everything))
+        facts["correct option"] = _counts(table.read("answers", everything))
     if table.has_truth:
         kinds = table.read("distractor_kind", everything)
         facts["distractors"] = _counts(kinds[kinds != -1], dict(enumerate(DISTRACTOR_KINDS)))
         quantiles = np.quantile(table.read("angle_degrees", everything), np.linspace(0, 1, 5))
         shown = ", ".join(f"{q:.0f}" for q in quantiles)
-        facts["angle"] = f"{shown} degrees: least, quartiles, most"
+        facts["rotation"] = f"{shown} degrees (minimum, quartiles, maximum)"
     if "cube_count" in table.fields:
-        facts["cubes a shape"] = _counts(table.read("cube_count", everything))
+        facts["cubes"] = _counts(table.read("cube_count", everything))
     return facts
 
 

@@ -38,8 +38,8 @@ CONVENTIONS = (
     " reference, the others the answers; pixels: row 0 on top"
 )
 TASK = (
-    "One answer shows the shape of the reference, turned. Which one? Every cube of a shape shows in"
-    " every picture."
+    "One option shows the shape of the reference, rotated. Which one? Every cube of a shape is"
+    " visible in every image."
 )
 # Fingerprints, and digests of truth, are root attributes too: one of each table (`named`).
 FORMAT = Format(

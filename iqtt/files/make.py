@@ -46,25 +46,25 @@ def make_split(
 ) -> Tally:
     """Write the files of a split to a folder, where they appear when all are complete.
 
-    The same call goes on where an earlier one was killed. Seed and command would reveal the test
-    answers, so only the file of the test answers has them.
+    The same call resumes an interrupted one. Seed and command would reveal the answer key of the
+    test questions, so only the file of the answer key stores them.
 
     Args:
         folder: is made if it is not there; other files in it are left alone.
-        suite: write a split of each kind of questions to a folder of its own in `folder`, with the
-            settings of `spec` but its kind and number of answers: see `SUITE`.
+        suite: write one split per distractor type to sub-folders of `folder`, with the settings of
+            `spec` except distractor type and number of options: see `SUITE`.
         batch: questions in one wavefront; bounds the memory, never changes a byte of the files.
         workers: processes that render, as in `rooms.make.make_dataset`.
-        shard_size: files with more questions are cut into shards of so many, which the file shows
-            as one.
+        shard_size: maximum number of questions per file; larger files are split into shards that
+            read as one file.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         overwrite: replace older files of a split.
         command: what to record as the command that made the files.
-        secret: keep the seed out of the file of the test answers too.
+        secret: store the seed in no file, not even in the answer key.
         cluster: whose workers make the files; all of them must see the folder, or it is a URL.
         progress: is called with the number of questions that were written since the last call.
 
-    Returns how many views were proposed and refused.
+    Returns how many views were sampled and rejected.
 
     Raises:
         SpecError, TooFewShapesError: a setting, before anything is rendered.

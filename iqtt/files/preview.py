@@ -94,7 +94,9 @@ def _right_answer(record: QuestionRecord) -> int | None:
 def _note(record: QuestionRecord, k: int, right: bool) -> str:
     """Return the text below answer k: whether it is right, or its kind."""
     if right:
-        return "   right" + (f", turned {record.truth.angle_degrees:.0f}°" if record.truth else "")
+        return "   correct" + (
+            f", rotated {record.truth.angle_degrees:.0f}°" if record.truth else ""
+        )
     kind = record.truth.distractor_kind[k] if record.truth else None
     return f"   {kind}" if kind else ""
 

@@ -56,10 +56,9 @@ class QuestionRecord:
 
     Attributes:
         index: row of the question.
-        images: the reference, then K answers, (1 + K, H, W, 3), as stored.
-        answer: which of these shows the reference's shape, 0 to K - 1; None if the file does not
-            tell.
-        truth: shapes, views and lights, or rooms; None if the file does not tell them.
+        images: the reference, then K options, (1 + K, H, W, 3), as stored.
+        answer: index of the correct option, 0 to K - 1; None if the file has no answer key.
+        truth: shapes, views and lights, or rooms; None if the file does not have them.
         is_developed: whether images are developed, not radiance.
     """
 
@@ -131,15 +130,15 @@ class QuestionsFile(RowFile):
     Attributes, besides those of `RowFile`:
         part: "labeled" or "unlabeled", or "" for the only table of a file.
         tables: the names of all tables of the file.
-        spec: the settings it was made with, without the seed unless it is a file of answers; None
-            for a released file.
-        split: "train", "val" or "test"; None for a released file.
-        answers: how many answers a question has, 2 or 3.
-        fingerprint: SHA-256 of settings, shapes, views and answers of this table; None for a
+        spec: the settings of the file; the seed is included only in an answer key; None for a
             released file.
-        height, width, image_dtype: of an image: pixels, and "uint8", "float16" or "float32"; 0
-            and "" for a file of answers.
-        beside: the file with the answers, if it is another one.
+        split: "train", "val" or "test"; None for a released file.
+        answers: number of options per question, 2 or 3.
+        fingerprint: recipe hash: SHA-256 of settings, shapes, views and answer key of this table;
+            None for a released file.
+        height, width, image_dtype: image size in pixels, and "uint8", "float16" or "float32"; 0
+            and "" for an answer key.
+        beside: the file with the answer key, if it is separate.
     """
 
     CONTENT: ClassVar[str] = "questions"  # the column that every table has
@@ -210,7 +209,7 @@ class QuestionsFile(RowFile):
         if part is None and len(self.tables) == 1:
             return self.tables[0]
         if part is None or part not in self.tables:
-            expected = " or ".join(self.tables) or "none, as there is one table only"
+            expected = " or ".join(self.tables) or "none, because the file has one table only"
             raise SpecError(f"{self.path}: part", part or "none", expected)
         return part
 
@@ -256,7 +255,7 @@ class QuestionsFile(RowFile):
             self._schema["answers"] = self.opened.file[self.part or "/"], answer_column()
 
     def join(self, answers: "str | Path | QuestionsFile") -> None:
-        """Add answers and truth of another file, which is closed with this one.
+        """Add answer key and ground truth of another file, which is closed with this one.
 
         Raises SpecError where this file has its own, and FileFormatError where they belong to the
         questions of another one.
@@ -277,17 +276,17 @@ class QuestionsFile(RowFile):
 
     @property
     def has_images(self) -> bool:
-        """Whether the file holds images; a file of answers may lack them."""
+        """Whether the file has images; an answer key may have none."""
         return "questions" in self._stored
 
     @property
     def has_answers(self) -> bool:
-        """Whether the file tells which answers are right."""
+        """Whether the file has the answer key."""
         return self._known_answers is not None
 
     @property
     def has_truth(self) -> bool:
-        """Whether the file tells shapes, views and lights."""
+        """Whether the file has shapes, views and lights, or rooms."""
         return "distractor_kind" in self._stored
 
     def table(self, part: str) -> Self:
@@ -323,14 +322,14 @@ class QuestionsFile(RowFile):
     def read(self, name: str, rows: int | slice) -> Any:
         """Read rows of one column, such as "questions", "answers" or "cubes", as `RowFile.read`.
 
-        Answers come as uint8, whatever integers the file has.
+        Answers are returned as uint8, for any integer type of the file.
         """
         if name == "answers" and self._known_answers is not None:
             return self._known_answers[rows]
         return super().read(name, rows)
 
     def truth(self, row: int) -> QuestionTruth | RoomTruth | None:
-        """Return what the file tells of one question beside images and answer; None if nothing.
+        """Return the ground truth of a question, apart from the correct option; or None.
 
         Raises as `read`.
         """
@@ -402,15 +401,15 @@ def table_names(opened: OpenFile, content: str) -> tuple[str, ...]:
     if content == "questions" and any(name in file for name in ("answers", "labeled/answers")):
         images = path.name.replace("-answers", "")
         what = images if images != path.name else "the file of questions"
-        hint = f"open {what} instead, with this file for answers"
-        raise NoImagesError(path, "answers but no images", "questions", hint)
+        hint = f"open {what} instead, with this file as the answer key"
+        raise NoImagesError(path, "an answer key without images", "questions", hint)
     if content == "answers" and "questions" in file:
-        hint = "ask those who made the questions for the file of answers"
-        raise NoAnswersError(path, "questions but no answers", "answers", hint)
+        hint = "ask the creators of the questions for the answer key"
+        raise NoAnswersError(path, "questions without an answer key", "answers", hint)
     expected = f"a dataset {content!r}, 'labeled/{content}' or 'unlabeled/{content}'"
     raise FileFormatError(path, "no question file", expected)
 
 
 def _identity(file: QuestionsFile) -> str:
-    mark = f"fingerprint {file.fingerprint[:12]}" if file.fingerprint else "no fingerprint"
+    mark = f"recipe hash {file.fingerprint[:12]}" if file.fingerprint else "no recipe hash"
     return f"{len(file)} questions, {mark}"

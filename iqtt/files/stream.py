@@ -29,11 +29,11 @@ ON_DEVICE = {"questions": "image", "depth": "depth"}  # columns that may stay th
 
 
 class QuestionStream(RowStream):
-    """Batches of questions, rendered while somebody learns from them.
+    """Batches of questions, rendered during training.
 
     Row i is, bit for bit, question i of the file that `iqtt make-split` makes of the same request:
-    in training the labelled ones, then the unlabelled ones. Each of these groups has its right
-    answers at all positions equally often, and so has each block of 1,200 questions that follows.
+    in training, first the labelled and then the unlabelled questions. In each of these groups, and
+    in each later block of 1,200 questions, the correct option is at all positions equally often.
     Names, types and units are those of the file's columns (`files.layout`).
 
         stream = iqtt.QuestionStream("matched", fields=("questions", "answers"), batch=64)

@@ -52,13 +52,13 @@ def verify_split(
             stack.enter_context(tables[0])
             problems = [problem for table in tables for problem in table.problems()]
             problems += content_problems(tables[0].opened, {})
-            checks.append(listed_check(name, "every value and attribute, by SHA-256", problems))
+            checks.append(listed_check(name, "all values match their SHA-256", problems))
             spec = tables[0].spec
             if spec is None:
                 raise FileFormatError(folder / name, "a released file", "one of iqtt make-split")
         assert spec is not None
         gaps = list(_gaps(opened, spec))
-        checks.append(listed_check("rows", "each question once", gaps))
+        checks.append(listed_check("rows", "no question is missing or repeated", gaps))
         again = spec if seed is None else replace(spec, seed=seed)
         return [*checks, _made_again(opened, again, items, device)]
 
@@ -84,7 +84,9 @@ def _made_again(
     """Make some questions of each file again; `opened` are the tables of each, by its name."""
     title = "made again from the seed"
     if spec == spec.public():
-        return Check(title, True, "not checked: the files do not tell the seed")
+        return Check(
+            title, True, "not checked: the files do not store the seed; give --secret-seed"
+        )
     here = {"format_version": FORMAT_VERSION, **exact_kind(select_variant(device))}
     told = [tables[0].attributes for tables in opened.values()]
     others = made_elsewhere(told[-1], here)

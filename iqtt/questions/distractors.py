@@ -103,7 +103,7 @@ def make_pools(spec: SplitSpec) -> Pools:
         TooFewShapesError: no number of cubes allows the distractors in every split.
         SpecError: the spec has no seed, as in files that do not tell it.
     """
-    check(spec.seed is not None, "seed", "none, as in files that do not tell it", "a number")
+    check(spec.seed is not None, "seed", "none, as in files without a seed", "a number")
     classes = {}
     for n in range(spec.cubes[0], spec.cubes[1] + 1):
         rng = item_rng(spec.seed or 0, n, Purpose.CATALOGUE)
@@ -195,7 +195,7 @@ def draw_shapes(pools: Pools, split: str, requests: Sequence[tuple[int, int]]) -
                 f"{split} question {requests[rows[0]][0]}",
                 f"none of {SHAPE_ATTEMPTS} {pools.spec.shapes} shapes of {cubes} cubes to have"
                 f" {kind!r} distractors that no other split may use",
-                hint="take more --cubes, or another kind of --distractors",
+                hint="use more --cubes, or another distractor type (--distractors)",
             )
     return [shapes for shapes in drawn if shapes is not None]
 

@@ -30,11 +30,11 @@ class QuestionKind:
 
 QUESTION_KINDS = {  # `mixed` draws from them in this order
     "other": QuestionKind("different shapes"),
-    "near": QuestionKind("one cube moved"),
+    "near": QuestionKind("the same shape with one cube moved"),
     # With two options a `mirror` question would be a `mirror-pair` question.
-    "mirror": QuestionKind("a mirror image and a near shape", options=(3,)),
-    "matched": QuestionKind("different shapes with like silhouettes"),
-    "mirror-pair": QuestionKind("two views of the mirror image"),
+    "mirror": QuestionKind("the mirror image and a shape with one cube moved", options=(3,)),
+    "matched": QuestionKind("different shapes with similar silhouettes"),
+    "mirror-pair": QuestionKind("the mirror image only"),
 }
 ROOM_KINDS = {  # of furnished rooms; `mixed` draws from those with three options
     "moved": QuestionKind("one object at other places", options=(3,)),
@@ -56,7 +56,7 @@ def question_kind(kinds: Sequence[int]) -> str:
     """
     wrong = sorted({DISTRACTOR_KINDS[kind] for kind in kinds if kind >= 0})
     if not wrong:
-        raise ValueError("a question has a wrong answer")
+        raise ValueError("a question has a wrong option")
     kind = "mirror" if {"mirror", "near-mirror"} & set(wrong) else wrong[0]
     if wrong == ["mirror"]:
         kind = "mirror-pair"

@@ -40,19 +40,18 @@ SUITE = {  # the splits of the suite: the kind and the number of answers of each
 
 @dataclass(frozen=True)
 class QuestionSpec:
-    """What the settings of all splits share; with a seed they decide every bit of its files.
+    """What the settings of all splits share. With a seed, they determine every bit of its files.
 
     Attributes:
-        seed: seed of every random choice, 0 to 2**256 - 1; None in files that must not tell it
-            (see `public`).
+        seed: random seed, 0 to 2**256 - 1; None in files that must not reveal it (see `public`).
         train, val, test: numbers of questions; at least one question in all.
-        labeled: how many of the training questions have answers.
-        distractors: kind of the questions, one of `KINDS`, or "mixed", where every question draws
-            one of those that have so many answers.
-        answers: number of answers, 3 or 2; one of them is right.
+        labeled: number of labelled training questions.
+        distractors: distractor type, one of `KINDS`, or "mixed", where each question samples one of
+            those that have so many options.
+        answers: number of options, 3 or 2; one option is correct.
         height, width: size of an image, pixels.
         image_dtype: "uint8", "float16" or "float32".
-        with_depth: whether the files hold planar depth too.
+        with_depth: whether the files also hold planar depth.
     """
 
     KINDS: ClassVar[Mapping[str, QuestionKind]]
@@ -101,7 +100,7 @@ class QuestionSpec:
         return tuple(name for name, it in kinds if it.mixed and self.answers in it.options)
 
     def public(self) -> Self:
-        """Return the spec without its seed: with it, the test answers could be made again."""
+        """Return the spec without its seed, which would reveal the answer key."""
         return replace(self, seed=None)
 
     def to_json(self) -> str:
@@ -121,17 +120,17 @@ class SplitSpec(QuestionSpec):
     Attributes:
         cubes: fewest and most cubes of a shape; every number in between is equally likely.
         shapes: "chain" for self-avoiding chains of cubes, "tree" for shapes that may branch.
-        min_angle_degrees: smallest rotation allowed between the reference's view and an answer's,
-            and between the views of two answers that show the same shape.
-        min_sight_angle_degrees: smallest angle allowed between the lines of sight of these views,
-            seen as axes, in the frame of the shape; for a mirror image, mirrored. Nearer views have
-            outlines that are much alike.
-        min_cube_pixels: number of pixels that every cube shows at least, in every image.
+        min_angle_degrees: minimum rotation between the views of the reference and of each option,
+            and between the views of two options with the same shape.
+        min_sight_angle_degrees: minimum angle between the viewing directions of these views, as
+            axes in the frame of the shape (mirrored for a mirror image). Closer views have similar
+            silhouettes.
+        min_cube_pixels: minimum number of visible pixels of each cube in each image.
         max_radius: largest bounding sphere of a shape, cube edges.
         lights: fewest and most point lights.
         background, ambient, reflectance: RGB, 0..1.
-        light_level: radiance that all lights together give a white surface at the origin that
-            faces them. With the defaults every surface stays darker than the background.
+        light_level: radiance of a white surface at the origin that faces all lights. With the
+            defaults, every surface is darker than the background.
         fov_degrees: field of view across the shorter side of the image.
     """
 
@@ -229,7 +228,7 @@ def secret_seed(path: str | Path) -> int:
 
 
 def preset_spec(preset: str, **settings: Any) -> SplitSpec:
-    """Return the spec of a preset, some settings replaced.
+    """Return the spec of a preset, with some settings replaced.
 
     Two settings that are not given follow from others: `labeled` is the preset's share of `train`,
     and `min_cube_pixels` the default's share of a cube's face.

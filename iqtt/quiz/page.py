@@ -158,9 +158,9 @@ def _answers(path: Path, own: bool) -> Path | None:
     """
     answers = answers_beside(path) if own else None
     if own and answers is None:
-        expected = f"{path.stem}-answers{path.suffix} beside it"
-        hint = "--practice 0 asks no questions for practice"
-        raise NoAnswersError(path, "questions for practice without answers", expected, hint)
+        expected = f"{path.stem}-answers{path.suffix} next to it"
+        hint = "--practice 0 leaves out practice"
+        raise NoAnswersError(path, "practice questions without an answer key", expected, hint)
     return answers
 
 

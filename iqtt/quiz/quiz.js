@@ -5,20 +5,20 @@
 const FORMAT = "pix2shape-bench/quiz-answers";
 const WORDS = {
   cubes: {
-    title: "Which one is it, turned? A quiz about shapes",
+    title: "Which shape is the same, rotated? A quiz",
     thing: "a shape made of cubes",
-    task: "One answer is the same shape, seen from another side. The others are different shapes, and" +
-      " some may be mirror images. Which answer is the same shape?",
-    rule: "Every cube of a shape shows in every picture.",
-    ask: "Which answer is the same shape as the reference, turned?",
+    task: "One option is the same shape, seen from another side. The other options are different" +
+      " shapes, and some may be mirror images. Which option is the same shape?",
+    rule: "All cubes of a shape are visible in every image.",
+    ask: "Which option is the same shape as the reference, rotated?",
   },
   rooms: {
-    title: "Which room is it? A quiz about rooms",
+    title: "Which room is the same? A quiz",
     thing: "a furnished room",
-    task: "One answer is the same room, seen from another place. In the others some furniture stands" +
-      " elsewhere or faces another way, or the room is mirrored. Which answer is the same room?",
-    rule: "All answers are seen from one place.",
-    ask: "Which answer is the same room as the reference?",
+    task: "One option is the same room, seen from another place. In the other options, furniture" +
+      " stands elsewhere or faces another way, or the room is mirrored. Which option is the same room?",
+    rule: "All options are seen from one place.",
+    ask: "Which option is the same room as the reference?",
   },
 };
 const LETTERS = "ABC";
@@ -118,34 +118,34 @@ function consent() {
     next();
   };
   const sent = quiz.post
-    ? "At the end they are sent to those who run the study, and you can keep a copy."
-    : "At the end you save them as a file, and hand it to those who run the study.";
+    ? "At the end, your responses are sent to the organisers of the study. You can keep a copy."
+    : "At the end, you save your responses as a file and send it to the organisers of the study.";
   const rules = [
     words.rule,
-    `Choose an answer by clicking it, or with the keys 1 to ${quiz.answers}.`,
-    "Work as fast as you can without mistakes. Guess where you do not know. There is no way back" +
-      " to an earlier question.",
-    "If you close or reload the page, you go on where you were.",
+    `Click an option, or press a key from 1 to ${quiz.answers}.`,
+    "Work as fast as you can without mistakes. Guess if you do not know. You cannot return to an" +
+      " earlier question.",
+    "If you close or reload the page, the quiz resumes at the same question.",
   ];
-  rules.unshift(`${count(quiz.questions.length, "question")} that count.`);
+  rules.unshift(`Then ${count(quiz.questions.length, "scored question")}.`);
   if (quiz.practice.length) {
     const first = count(quiz.practice.length, "question");
-    rules.unshift(`First ${first} to practise. You are told the right answer after each.`);
+    rules.unshift(`First ${first} for practice. The correct option is shown after each.`);
   }
   show(
     words.title,
     make("h1", {}, words.title.split("?")[0] + "?"),
     make("p", {}, `Every question shows ${words.thing}, the `, make("strong", {}, "reference"),
-      `, and ${quiz.answers} answers. ${words.task}`),
+      `, and ${quiz.answers} options. ${words.task}`),
     make("ul", {}, ...rules.map((rule) => make("li", {}, rule))),
     make("h2", {}, "What is recorded"),
-    make("p", {}, "Your answers, and how long each took, under a random number. No name, no network" +
-      " address and nothing about your browser or your device are recorded. Your browser keeps them," +
-      ` so that you can go on after a reload. ${sent} They may publish them. You may stop at any` +
-      " time by closing the page."),
+    make("p", {}, "Your responses and the time of each are recorded under a random number. No name, no" +
+      " network address and nothing about your browser or device are recorded. Your browser stores" +
+      ` the responses, so that you can resume after a reload. ${sent} The organisers may publish the` +
+      " responses. You may stop at any time by closing the page."),
     ...(quiz.contact ? [make("p", {}, `This study is run by: ${quiz.contact}`)] : []),
     ...(storage ? [] : [make("p", { class: "missing" },
-      "Your browser keeps nothing for this page: do not reload it, or your answers are lost.")]),
+      "Your browser stores nothing for this page: a reload loses your responses.")]),
     make("p", { class: "agree" }, box,
       make("label", { for: "consent" }, "I have read this, and I want to take part.")),
     missing,
@@ -191,12 +191,12 @@ async function ask(question, title, done, answered) {
   };
   buttons = images.map((image, k) => make("button",
     { type: "button", "aria-keyshortcuts": `${k + 1} ${LETTERS[k]}`, onclick: () => answer(k) },
-    image, make("span", {}, `Answer ${k + 1}`)));
+    image, make("span", {}, `Option ${k + 1}`)));
   show(title, progress(title, done),
     make("h1", { class: "ask", id: "ask" }, words.ask),
     make("div", { class: `shapes shapes-${quiz.answers}`, role: "group", "aria-labelledby": "ask" },
       reference(first), ...buttons),
-    make("p", { class: "hint" }, `Click an answer, or press a key from 1 to ${quiz.answers}.`));
+    make("p", { class: "hint" }, `Click an option, or press a key from 1 to ${quiz.answers}.`));
   requestAnimationFrame(() => {
     shown = performance.now();
   });
@@ -207,16 +207,16 @@ async function feedback(question, title, done) {
   const right = question.right;
   const [first, ...images] = await picturesOf(question);
   const figures = images.map((image, k) => {
-    const [kind, text] = k === right ? ["right", ": right"]
-      : k === answer ? ["wrong", ": yours, wrong"] : ["", ""];
+    const [kind, text] = k === right ? ["right", ": correct"]
+      : k === answer ? ["wrong", ": your choice, wrong"] : ["", ""];
     image.alt = words.thing;
     return make("figure", { class: kind }, image,
-      make("figcaption", {}, `Answer ${k + 1}${text}`));
+      make("figcaption", {}, `Option ${k + 1}${text}`));
   });
-  const told = answer === right ? `Right: it is answer ${right + 1}.`
-    : `Not right: it is answer ${right + 1}, not ${answer + 1}.`;
+  const told = answer === right ? `Correct: option ${right + 1}.`
+    : `Wrong: the correct option is ${right + 1}, not ${answer + 1}.`;
   const last = state.practice.length === quiz.practice.length;
-  const onward = last ? `Start the ${count(quiz.questions.length, "question")} that count`
+  const onward = last ? `Start the ${count(quiz.questions.length, "scored question")}`
     : "Next practice question";
   const seen = () => {
     state.seen += 1;
@@ -245,7 +245,7 @@ function download() {
 }
 
 async function send(status) {
-  status.textContent = "Your answers are being sent ...";
+  status.textContent = "Sending your responses ...";
   try {
     const answer = await fetch(quiz.post, {
       method: "POST", body: answersFile(), headers: { "Content-Type": "application/json" },
@@ -255,8 +255,8 @@ async function send(status) {
     keep();
     end();
   } catch (error) {
-    status.textContent = `Your answers could not be sent (${error.message}). Please try again, or` +
-      " save them as a file and hand it to those who run the study.";
+    status.textContent = `Your responses could not be sent (${error.message}). Please try again, or` +
+      " save the responses as a file and send it to the organisers of the study.";
     status.classList.add("missing");
     status.after(make("p", {}, go("Try again", () => end())));
   }
@@ -274,14 +274,14 @@ function end() {
     next();
   };
   const sent = quiz.post && !state.saved;
-  const text = state.saved ? "Your answers are saved. You can close this page."
-    : quiz.post ? "" : "Please save your answers, and hand the file to those who run the study.";
+  const text = state.saved ? "Your responses are saved. You can close this page."
+    : quiz.post ? "" : "Please save your responses, and send the file to the organisers of the study.";
   show("Thank you", make("h1", {}, "Thank you. All questions are answered."),
     ...(text ? [make("p", {}, text)] : []), status,
     make("p", {}, make("button", { type: "button", class: quiz.post ? "go quiet" : "go",
-      onclick: download }, "Save my answers as a file")),
+      onclick: download }, "Save my responses as a file")),
     ...(state.saved ? [make("p", {}, make("button", { type: "button", class: "go quiet",
-      onclick: leave }, "Hand over to another person at this computer"))] : []));
+      onclick: leave }, "Start again for another participant"))] : []));
   if (sent) send(status);
 }
 

@@ -47,7 +47,7 @@ def open_split(folder: str | Path, with_answers: bool = False) -> Iterator[list[
         raise FileNotFoundError(2, "holds no question files of iqtt make-split", str(folder))
     answers = folder / ANSWERS if with_answers else None
     if answers is not None and not ("test" in paths and answers.is_file()):
-        raise FileNotFoundError(2, "no test questions with their answers", str(answers))
+        raise FileNotFoundError(2, "no test questions with an answer key", str(answers))
     tables: list[QuestionsFile] = []
     with ExitStack() as stack:
         for split, path in paths.items():
@@ -90,7 +90,7 @@ def check_withheld(opened: OpenFile, is_test: bool) -> None:
         leaks += ["the command that made it"] if COMMAND in file.attrs else []
         leaks += _beside_images(file) if is_test else []
     if leaks:
-        expected = "a file that does not tell the test answers, or --with-answers"
+        expected = "a file that does not reveal the answer key, or --with-answer-key"
         raise SpecError(path, and_more(leaks), expected)
 
 
@@ -111,7 +111,7 @@ def handed_out(tables: Sequence[QuestionsFile]) -> list[tuple[Path, str]]:
     """Return the files of the tables of a split, and what each of them holds."""
     answers = [table.beside.opened for table in tables if table.beside is not None]
     holds = {table.opened: f"questions: {table.split}" for table in tables}
-    holds |= dict.fromkeys(answers, "answers to the test questions")
+    holds |= dict.fromkeys(answers, "answer key of the test questions")
     files: list[tuple[Path, str]] = []
     for opened, meaning in holds.items():
         files += with_shards(opened, meaning)

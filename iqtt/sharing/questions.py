@@ -43,7 +43,7 @@ def write_questions_card(
             "part": table.part,
             "split": str(table.split),
             "questions": str(len(table)),
-            "answers told": "yes" if table.has_answers else "no",
+            "labelled": "yes" if table.has_answers else "no",
             "image": f"{table.height}x{table.width}, {table.image_dtype}",
             "fingerprint": table.fingerprint or "",
         }

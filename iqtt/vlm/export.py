@@ -19,21 +19,22 @@ from scenegen.common.records import check
 from scenegen.files.new_file import folder_written_beside
 
 COLUMNS = {
-    "id": "name of the row: question and rotation",
-    "question_index": "row of the question in its file, from 0",
-    "rotation": "letter k shows the answer (k + rotation) mod K of the file",
-    "image": "sRGB PNG: the reference above, the answers below with their letters",
-    "images": "sRGB PNGs: the reference, then the answers in the order of their letters",
-    "question": "the text to ask",
-    "choices": "names of the answers",
-    "answer": "the right letter; left out of a withheld test, as are the facts below",
-    "kind": "kind of the question, such as matched",
-    "angle": "smallest rotation from the reference's view to the right answer's, degrees",
+    "id": "name of the row: question and rotation of the options",
+    "question_index": "index of the question in its file, from 0",
+    "rotation": "letter k shows option (k + rotation) mod K of the file",
+    "image": "sRGB PNG: the reference on top, the options below with their letters",
+    "images": "sRGB PNGs: the reference, then the options in the order of their letters",
+    "question": "text of the prompt",
+    "choices": "names of the options",
+    "answer": "letter of the correct option; not in held-out tests, nor are kind to floor",
+    "kind": "distractor type, such as matched",
+    "angle": "smallest rotation from the reference to the correct option, degrees",
     "cubes": "number of cubes of each shape; null for rooms",
-    "shape": "cluster for intervals: questions about one shape, or its mirror image, share it",
-    "floor": "accuracy that is reached on this kind without any idea of 3D; null if not known",
-    "canary": "mark of test data; do not train on text or pictures that carry it",
-    "digest": "fingerprint of the table of questions; answers are only taken for the same one",
+    "shape": "cluster for confidence intervals: shared by questions about one shape or its mirror"
+    " image",
+    "floor": "accuracy of the best 2D-only baseline on this distractor type; null if unknown",
+    "canary": "marker of test data; do not train on text or images with this marker",
+    "digest": "recipe hash of the questions; responses are accepted only for the same hash",
 }
 FACTS = ("answer", "kind", "angle", "cubes", "shape", "floor")
 CIRCULAR = 1_000_000  # VLMEvalKit: index + k * CIRCULAR is rotation k of a question
@@ -183,11 +184,14 @@ def _card(name: str, row: Row) -> str:
         for column, text in COLUMNS.items()
         if not (row.answer is None and column in FACTS)
     )
-    shows = "One answer shows the same shape,\nturned. A program drew all pictures from cubes."
-    report = "on `matched` and on `mirror-pair` with two answers, beside their floors"
+    shows = "One option shows the same shape,\nrotated. All images are rendered from cubes."
+    report = (
+        "on `matched` and on `mirror-pair` with two options, next to their 2D-only\nbaselines, with"
+        " confidence intervals clustered by `shape`"
+    )
     if row.of_rooms:
-        shows = "One answer shows the same room,\nseen from elsewhere. A program drew all pictures."
-        report = "on each kind, and from 60 degrees on"
+        shows = "One option shows the same room,\nseen from elsewhere."
+        report = "on each type, from 60 degrees on"
     return f"""---
 license: cc-by-4.0
 task_categories: [visual-question-answering]
@@ -201,18 +205,18 @@ configs:
 
 # {name}: mental-rotation questions for models
 
-Each question shows a reference and {len(row.letters)} answers. {shows} `iqtt audit`
-of pix2shape-bench checks that each question has one right answer.
+Each question shows a reference and {len(row.letters)} options. {shows} `iqtt audit` of
+pix2shape-bench checks that each question has exactly one correct option.
 
-`{CONTROL}` asks the same questions without the reference. A model scores at the floor there, or
-it has learned something else than mental rotation.
+`{CONTROL}` is the blind control: the same questions without the reference. A model that scores
+above chance on the control uses a shortcut.
 
-| column | what it holds |
+| column | content |
 | --- | --- |
 {columns}
 
-Report the accuracy {report}, with
-intervals by `shape`. Circular accuracy counts a question as right if every rotation is right.
+Report the accuracy {report}. CircularEval accuracy counts a question as correct if the response
+is correct in every rotation of the options.
 
 {CANARY}
 """

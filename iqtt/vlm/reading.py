@@ -84,10 +84,10 @@ def unread_note(unread: Sequence[tuple[str, str]], rows: int) -> str:
         rows: how many replies there are.
     """
     if not unread:
-        return f"all of {rows} replies name a letter"
+        return f"all {rows} replies name a letter"
     quoted = [f"{name}: {_quoted(text)}" for name, text in unread[:QUOTED]]
     share = f"{len(unread)} of {rows} replies name no letter ({len(unread) / rows:.0%})"
-    return f"{share}, such as {'; '.join(quoted)}"
+    return f"{share} and count as no response, such as {'; '.join(quoted)}"
 
 
 def _quoted(text: str) -> str:

@@ -168,8 +168,8 @@ def _opened(asked: Asked) -> QuestionsFile:
         questions.close()
         path = asked.answers or answers_beside(asked.path)
         if path is None:
-            hint = "give the file of answers with --answers: it tells the cubes"
-            raise FileFormatError(asked.path, "pictures alone", "cubes and poses to draw", hint)
+            hint = "give the answer key, which holds the cubes, with --answer-key"
+            raise FileFormatError(asked.path, "images only", "cubes and poses to draw", hint)
         questions = QuestionsFile(asked.path, asked.part, path)
     if not questions.has_truth or not questions.has_answers:
         questions.close()

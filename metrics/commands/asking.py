@@ -1,5 +1,6 @@
-"""`bench ask`: put the questions of a file to a model, with Inspect."""
+"""`bench ask`: ask a vision-language model the questions of a file, with Inspect."""
 
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,7 @@ import click
 
 from iqtt.commands.models import model_options
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import OVERWRITE
+from scenegen.command_line.options import OVERWRITE, Renamed
 from scenegen.command_line.output import print_line
 from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder
 
@@ -18,23 +19,25 @@ from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder
 )
 @click.argument("file", type=InputPath())
 @click.option("--model", required=True, metavar="PROVIDER/NAME",
-              help="Model, as Inspect names it: openai/NAME, vllm/NAME, ollama/NAME,"
-              " openai-api/SERVICE/NAME for a server that speaks OpenAI's protocol.")
+              help="Model name in Inspect: openai/NAME, vllm/NAME, ollama/NAME, or"
+              " openai-api/SERVICE/NAME for another server with the OpenAI API.")
 @click.option("--base-url", metavar="URL",
-              help="Address of the server [default: the provider's own].")
+              help="URL of the server [default: the URL of the provider].")
 @click.option("--log-dir", type=OutputFolder(), default="logs", show_default=True,
-              help="Folder of Inspect's logs. The same command goes on where it stopped.")
-@click.option("--out", type=NewHdf5(), required=True, help="Submission to write.")
-@click.option("--control", is_flag=True, help="Leave the reference out: a model must then guess.")
-@click.option("--temperature", type=click.FloatRange(0, 2), default=0.0, show_default=True)
+              help="Folder of the Inspect logs. Re-run the same command to resume from them.")
+@click.option("--out", type=NewHdf5(), required=True, help="Output file of predictions.")
+@click.option("--blind", "control", cls=Renamed, former="--control", is_flag=True,
+              help="Blind control: leave out the reference, so that models can only guess.")
+@click.option("--temperature", type=click.FloatRange(0, 2), default=0.0, show_default=True,
+              help="Sampling temperature.")
 @click.option("--max-tokens", type=click.IntRange(1, 1_000_000), default=1024, show_default=True,
-              help="Most tokens of a reply, with its thoughts.")
+              help="Maximum number of tokens per reply, including reasoning.")
 @click.option("--timeout", type=click.IntRange(1, 3600), default=120, show_default=True,
-              help="Seconds that a reply may take.")
+              help="Maximum time per reply, in seconds.")
 @click.option("--tries", type=click.IntRange(1, 100), default=6, show_default=True,
-              help="Most requests for one row, with growing pauses.")
+              help="Maximum number of attempts per question, with increasing pauses.")
 @click.option("--concurrency", type=click.IntRange(1, 256), default=4, show_default=True,
-              help="Requests at the same time.")
+              help="Number of concurrent requests.")
 @model_options
 @OVERWRITE
 def ask(
@@ -42,11 +45,12 @@ def ask(
     temperature: float, max_tokens: int, timeout: int, tries: int, concurrency: int,
     overwrite: bool, **asked: Any,
 ) -> None:
-    """Ask the questions of FILE to a model, and write its answers as a submission.
+    """Ask a vision-language model the questions of FILE, and write its responses as predictions.
 
-    Pictures are drawn anew from the cubes of FILE, in sRGB, with letters. Inspect asks, and keeps
-    every reply in a log, which `inspect view` shows. A row that failed is left out, and asked again
-    by the same command. A reply without a letter counts as no answer.
+    The images are rendered again from the cubes of FILE, in sRGB, with letters on the options.
+    Inspect sends the requests and logs every reply; `inspect view` shows the log. Failed requests
+    are left out of the output. Re-run the same command to repeat the failed requests. A reply
+    without a letter counts as no response.
     """
     needs("bench ask", ("inspect_ai",), "vlm")
     from iqtt.vlm.rows import Asked, count_rows
@@ -66,7 +70,8 @@ def ask(
     for note in log.notes:
         print_line(f"{log.path}: {note}")
     write_returned(out, file, log, overwrite=overwrite)
-    print_line(f"{out}: answers of {log.model}; next: bench score {out}")
+    print_line(f"{out}: responses of {log.model}")
+    print_line(f"now: {shlex.join(['bench', 'score', out])}")
 
 
 # fmt: on

@@ -5,30 +5,39 @@ from pathlib import Path
 import click
 
 from scenegen.command_line.groups import EXAMPLE
-from scenegen.command_line.options import OVERWRITE, Items
+from scenegen.command_line.options import OVERWRITE, Items, Renamed
 from scenegen.command_line.output import print_line
 from scenegen.command_line.paths import InputPath, OutputPath
 
 
 @click.command(
     epilog=f"{EXAMPLE}bench figure mine.json other.json --out scores.pdf\n"
-    "  bench figure mine.json other.json --by angle --score chamfer --out angles.svg\n"
+    "  bench figure mine.json other.json --by angle --metric chamfer --out angles.svg\n"
     "  bench figure mine.h5 other.h5 --truth rooms.h5 --items 0,5 --out grid.pdf"
 )
 @click.argument("files", nargs=-1, required=True, type=InputPath(), metavar="FILES...")
-@click.option("--out", type=OutputPath(), required=True, help="Figure to write: .pdf, .svg, .png.")
-@click.option("--score", default="", help="Score to show [default: the first of the headline].")
+@click.option("--out", type=OutputPath(), required=True, help="Output figure: .pdf, .svg, .png.")
+@click.option(
+    "--metric",
+    "score",
+    cls=Renamed,
+    former="--score",
+    default="",
+    help="Metric to draw [default: the first main metric].",
+)
 @click.option(
     "--by",
     type=click.Choice(["angle", "kind", "size"]),
-    help="Show the score by angle, by kind of question or shape, or by size of objects.",
+    help="Group by angle, by size of objects, or by kind: distractor type, or category of objects.",
 )
-@click.option("--truth", type=InputPath(), help="Rooms file: FILES are then predictions of it.")
-@click.option("--items", type=Items(), help="Rows of a grid of pictures [default: 0-3].")
+@click.option(
+    "--truth", type=InputPath(), help="File of rooms. FILES are then predictions of this file."
+)
+@click.option("--items", type=Items(), help="Images of the grid, with --truth [default: 0-3].")
 @click.option(
     "--width",
     type=click.Choice(["column", "page"]),
-    help="Of a two-column paper [default: column; page for a grid].",
+    help="Width of the figure in a two-column paper [default: column; page with --truth].",
 )
 @OVERWRITE
 def figure(
@@ -41,10 +50,10 @@ def figure(
     width: str | None,
     overwrite: bool,
 ) -> None:
-    """Draw a figure for a paper, with embedded fonts, as wide as a column or a page.
+    """Draw a figure for a paper, with embedded fonts, at the width of a column or a page.
 
-    FILES are score files: their scores are drawn with intervals and floors. With --truth, FILES are
-    predictions: rows are drawn as pictures with depth and error.
+    FILES are score files, whose values are drawn with confidence intervals and baselines. With
+    --truth, FILES are predictions, and the figure is a grid of images with depth and error.
     """
     from metrics.score_file import read_scores
     from metrics.scoring.aligned import aligned
@@ -55,7 +64,7 @@ def figure(
     wide = figures.PAGE if width == "page" or (truth and not width) else figures.COLUMN
     if truth:
         if by or score:
-            raise click.UsageError("--by and --score are for score files, not for --truth")
+            raise click.UsageError("--by and --metric are for score files, not for --truth")
         rows = [0, 1, 2, 3] if items is None else items
         figures.draw_grid(out, truth, files, rows, wide, overwrite)
     elif items is not None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from scenegen.command_line.groups import EXAMPLE
-from scenegen.command_line.options import ENCODING, OVERWRITE, Command, together
+from scenegen.command_line.options import ENCODING, OVERWRITE, Command, Renamed, together
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, NewHdf5
 
@@ -47,44 +47,53 @@ ALIGNMENTS = ("none", "median_scale", "scale", "scale_shift")
 DEPTH_KINDS = ("depth", "disparity", "distance")
 DATA = click.option(
     "--data", "truth", type=InputPath(), required=True, metavar="ROOMS.h5",
-    help="The file of rooms or questions that is predicted.",
+    help="File of rooms or questions to predict.",
 )  # fmt: skip
 OUT = click.option(
-    "--out", type=NewHdf5(), required=True, metavar="PREDICTIONS.h5", help="File to write."
+    "--out", type=NewHdf5(), required=True, metavar="PREDICTIONS.h5", help="Output file."
 )
-METHOD = click.option("--method", help="Name of the method in tables [default: taken from files].")
-RUN = click.option("--run", "run_name", default="", help="Which training run, such as its seed.")
-NOTES = click.option("--notes", default="", help="A note to keep in the file.")
+METHOD = click.option(
+    "--method", help="Name of the method in tables [default: the name of the model or folder]."
+)
+RUN = click.option(
+    "--run", "run_name", default="", help="Name of the training run, such as its seed."
+)
+NOTES = click.option("--notes", default="", help="Note to store in the file.")
 FRAME = click.option(
     "--frame", type=click.Choice(["opencv", "opengl"]), default="opencv", show_default=True,
-    help="Axes of points and normals: x right, y down, z forward; or y up, z towards the viewer.",
+    help="Axes of points and normals. opencv: x right, y down, z forward; opengl: x right, y up, z"
+    " towards the viewer.",
 )  # fmt: skip
 MISSING = click.option(
     "--missing", type=click.Choice(["refuse", "nearest"]), default="refuse", show_default=True,
-    help="Pixels without a value: refuse them, or fill them from the nearest pixel that has one.",
+    help="Pixels without a value. refuse: report an error; nearest: copy the nearest valid pixel.",
 )  # fmt: skip
 
 
 def reading_options(*kinds: str) -> Callable[[Command], Command]:
-    """Return the options that say what the numbers of files are, of `bench import` and `truth`."""
+    """Return the options of `bench import` and `truth` that describe the values in files."""
+    points = "; points: x, y, z" if "points" in kinds else ""
     return together(
         click.option(
             "--kind", type=click.Choice(kinds), default="depth", show_default=True,
-            help="What the numbers are: planar depth, disparity (large where near; 1 / depth of"
-            " truth), distance along the ray, or points x, y, z."),
+            help="Prediction type. depth: planar depth; disparity: 1 / depth, larger for closer"
+            " pixels; distance: distance along the ray" + points + "."),
         click.option("--unit", type=click.Choice(["m", "cm", "mm"]),
-                     help="Unit of the numbers; the edge of a room is 1 m."),
+                     help="Unit of the values. One scene unit counts as 1 m."),
         click.option("--scale", type=Factor(),
-                     help="Metres for each step, such as 1/256; of disparity 1 / metres."),
+                     help="Factor from stored values to metres, such as 1/256; for disparity, to"
+                     " 1 / metres."),
         click.option("--invalid", type=float, multiple=True,
-                     help="Stored number that stands for no value, such as 0; may be repeated."),
+                     help="Stored value that marks invalid pixels, such as 0. Repeatable."),
         click.option("--normals", metavar="FILES",
-                     help="Normals, as --depth; whole numbers are -1 to 1."),
+                     help="Normals, in the formats of --depth. Integers are mapped to -1 to 1."),
         FRAME,
-        click.option("--array", help="Name of the array in NPZ, or of the channel in EXR files."),
+        click.option("--array", help="Name of the array in NPZ files, or of the channel in EXR"
+                                     " files."),
         click.option("--match", type=click.Choice(["number", "name"]), default="number",
-                     show_default=True, help="How files belong to rows: by the names of pictures"
-                     " or the number in their names, or in the order of their names."),
+                     show_default=True, help="Assignment of files to images. number: by the name"
+                     " of the image, or by the number in the file name; name: in alphabetical"
+                     " order."),
     )  # fmt: skip
 
 
@@ -105,28 +114,36 @@ def read_as(
 @click.command("import", epilog=f"{EXAMPLE}bench import --depth 'out/*.png' --unit mm"
                                 " --invalid 0 --data rooms.h5 --out mine.h5")
 @click.option("--depth", "pattern", metavar="FILES",
-              help="A folder, a pattern in quotes such as 'out/*.png', or one NPY or NPZ file with"
-              " an image for each row. PNG, TIFF, EXR, PFM, NPY and NPZ are read.")
+              help="Predictions: a folder, a quoted pattern such as 'out/*.png', or one NPY or NPZ"
+              " file with all images. Formats: PNG, TIFF, EXR, PFM, NPY and NPZ.")
+@click.option("--layers", metavar="FILES",
+              help="Predictions of hidden surfaces, too: NPY or NPZ files with depths (h, w, L) or"
+              " points (h, w, L, 3), nearest first, NaN behind the last layer.")
+@click.option("--meshes", metavar="FILES",
+              help="Predictions of whole objects: a GLB, PLY or OBJ file per image, in the frame of"
+              " the camera. They are cast along the rays of the pixels.")
 @reading_options(*DEPTH_KINDS, "points")
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
-              help="What the method cannot know [default: none; scale_shift of disparity]."
-              " Disparity with none or scale is 1 / depth.")
+              help="Alignment that the predictions need: what the method cannot determine [default:"
+              " none; scale_shift for disparity]. With none or scale, disparity is 1 / depth.")
 @click.option("--confidence", metavar="FILES",
-              help="Images of how sure the method is of each pixel, as --depth; any scale.")
+              help="Confidence per pixel, in the formats of --depth and on any scale.")
 @click.option("--confidence-is", type=click.Choice(["confidence", "error"]), default="confidence",
-              show_default=True, help="Whether these are larger where the method is surer, or where"
-              " it expects a larger error.")
+              show_default=True, help="Meaning of larger values of --confidence. confidence: more"
+              " certain; error: a larger expected error.")
 @MISSING
-@click.option("--shown", type=click.Choice(["scored_view", "first_view", "no_view"]),
-              default="scored_view", show_default=True, help="Image of the scene that the method"
-              " was shown to predict a view.")
-@click.option("--answers", type=InputPath(), metavar="ANSWERS",
-              help="Answers to questions instead: .csv, .json or .jsonl; or a harness's log:"
-              " Inspect (.eval), lmms-eval (.jsonl), VLMEvalKit (.tsv, .xlsx).")
+@click.option("--input-view", "shown", cls=Renamed, former="--shown",
+              type=click.Choice(["scored_view", "first_view", "no_view"]), default="scored_view",
+              show_default=True, help="Input image of each prediction. scored_view: the view that"
+              " is scored; first_view: the first view of the scene; no_view: no image.")
+@click.option("--responses", "answers", cls=Renamed, former="--answers", type=InputPath(),
+              metavar="FILE",
+              help="Responses to questions instead of --depth: .csv, .json or .jsonl, or the log of"
+              " a harness: Inspect (.eval), lmms-eval (.jsonl), VLMEvalKit (.tsv, .xlsx).")
 @click.option("--quiz", "people", metavar="FILES",
-              help="People's answers instead, a folder or a pattern in quotes such as"
-              " 'answers/*.json', as the page of `iqtt quiz` saves them. --out is then a folder of"
-              " submissions, a run for each person.")
+              help="Responses of people instead of --depth: the JSON files that the page of `iqtt"
+              " quiz` saves, as a folder or a quoted pattern. --out is then a folder with one"
+              " submission per person.")
 @DATA
 @OUT
 @METHOD
@@ -138,21 +155,23 @@ def import_(
     pattern: str | None, alignment: Any, missing: Any, normals: str | None, shown: Any,
     answers: str | None, people: str | None, truth: str, out: str, method: str | None,
     run_name: str, notes: str, overwrite: bool, expanded: tuple[str, ...],
-    confidence: str | None, confidence_is: str, **numbers: Any,
+    confidence: str | None, confidence_is: str, layers: str | None, meshes: str | None,
+    **numbers: Any,
 ) -> None:
-    """Make a submission of predictions that lie in files.
+    """Import predictions from files.
 
-    Files belong to rows by the number in their names. A missing, extra or doubled file is an error.
-    Images of another size are resampled to that of the truth.
+    Files are assigned to images by the numbers in their names. A missing, extra or duplicate file
+    is an error. Predictions of another size are resampled to the size of the ground truth.
     """
     from scenegen.files.new_file import check_writable
 
     texts: dict[str, Any] = {"run": run_name, "notes": notes, "overwrite": overwrite}
     if expanded:
-        found = f"{expanded[0]} beside the options, as where a shell expands a pattern"
-        raise click.UsageError(f"found {found}; put patterns in quotes, such as 'out/*.png'")
-    if sum(source is not None for source in (pattern, answers, people)) != 1:
-        raise click.UsageError("give --depth for rooms, or --answers or --quiz for questions")
+        found = f"{expanded[0]} after the options: the shell has expanded a pattern"
+        raise click.UsageError(f"found {found}; quote patterns, such as 'out/*.png'")
+    if sum(source is not None for source in (pattern, layers, meshes, answers, people)) != 1:
+        ways = "--depth, --layers or --meshes for rooms"
+        raise click.UsageError(f"give {ways}, or --responses or --quiz for questions")
     if people is not None:
         from metrics.intake.answers.quiz_answers import import_quiz
         from metrics.intake.folders import files_of
@@ -161,25 +180,31 @@ def import_(
             files_of(people, (".json",)), truth, out,
             method=method or "people", notes=notes, overwrite=overwrite,
         )
-        print_line(f"{out}: answers of {len(made)} people")
+        print_line(f"{out}: responses of {len(made)} people")
         score = f"bench score {shlex.quote(out.rstrip('/'))}/*.h5 --allow-partial --truth"
-        print_line(f"now: {score} ANSWERS.h5")
+        print_line(f"now: {score} ANSWER_KEY.h5")
         return
     check_writable(Path(out), overwrite)
     if answers is not None:
         _import_answers(answers, truth, out, method, texts)
         return
+    pattern = pattern or layers or meshes
     assert pattern is not None
     from metrics.intake.importing import import_rooms
+    from metrics.intake.meshes import import_meshes
     from metrics.measured.reader import open_images
 
     numbers["surer"] = "less" if confidence_is == "error" else "more"
-    reading = read_as(alignment=alignment, missing=missing, **numbers)
+    reading = read_as(alignment=alignment, missing=missing, layered=layers is not None, **numbers)
+    importing: Callable[..., str] = import_rooms
+    more = {"normals": normals, "confidence": confidence}
+    if meshes is not None:
+        importing, more = import_meshes, {}
     with open_images(truth) as rooms:
         with progress_bar(len(rooms), "image") as bar:
-            how = import_rooms(
+            how = importing(
                 pattern, rooms, out, method=method or _name_of(pattern), reading=reading,
-                normals=normals, confidence=confidence, shown=shown, progress=bar.update, **texts,
+                shown=shown, progress=bar.update, **more, **texts,
             )
         print_line(f"{out}: {how}")
         _print_hints(out, rooms)
@@ -189,7 +214,7 @@ def import_(
 def _import_answers(
     answers: str, truth: str, out: str, method: str | None, texts: dict[str, Any]
 ) -> None:
-    """Make a submission of a list of answers, or of the log of a harness."""
+    """Make a submission of a list of responses, or of the log of a harness."""
     from iqtt.files.reader import open_questions
     from metrics.intake.answers.answer_files import import_answers
     from metrics.intake.answers.harness_logs import is_log, read_returned, write_returned
@@ -205,7 +230,7 @@ def _import_answers(
             name = method or Path(answers).stem
             count = import_answers(answers, questions, out, method=name, **texts)
         of_all = f" of {len(questions)}" if count < len(questions) else ""
-    print_line(f"{out}: answers to {count}{of_all} questions")
+    print_line(f"{out}: responses to {count}{of_all} questions")
 
 
 def _name_of(pattern: str) -> str:
@@ -242,29 +267,32 @@ def _print_hints(out: str, data: Any) -> None:
 @METHOD
 @RUN
 @NOTES
-@click.option("--device", help="Handed to the model's load(), such as cuda.")
-@click.option("--dtype", help="Handed to the model's load(), such as bfloat16.")
+@click.option("--device", help="Argument of the model's load(), such as cuda.")
+@click.option("--dtype", help="Argument of the model's load(), such as bfloat16.")
 @click.option("--python", type=InputPath(), metavar="PROGRAM",
-              help="The Python that runs the model, of another environment, such as"
-              " ~/envs/da3/bin/python. It needs Python 3.9 or newer, NumPy and nothing of this"
-              " project.")
+              help="Python interpreter of another environment to run the model in, such as"
+              " ~/envs/da3/bin/python. The environment needs Python 3.9 or newer and NumPy, but not"
+              " this package.")
 @click.option("--batch", type=click.IntRange(1, 4096),
-              help="Images for each call of the model's infer_batch [default: 8]; handed to its"
-              " load(), too.")
+              help="Images per call of the model's infer_batch, also an argument of its load()"
+              " [default: 8].")
 @click.option("--intrinsics", is_flag=True,
-              help="Tell the model the true camera; the file notes that.")
+              help="Give the model the true camera intrinsics. The output file records this.")
 @ENCODING
 @click.option("--exposure", type=Factor(), default=1.0, show_default=True,
-              help="Factor of radiance; 1 is the brightest value of an image.")
-@click.option("--key", help="Which key of the model's output to take [default: the best known].")
+              help="Factor on the radiance of the input images. A result above 1 is an error.")
+@click.option("--key", help="Key of the model output to use [default: the first of the keys"
+              " above that the model returns].")
 @FRAME
 @MISSING
 @click.option("--resume", "keep", flag_value="resume",
-              help="Keep rows that another model, other weights or other options made.")
-@click.option("--restart", "keep", flag_value="restart", help="Begin anew.")
+              help="Keep finished predictions although the model, its weights or options have"
+                   " changed.")
+@click.option("--restart", "keep", flag_value="restart", help="Discard finished predictions, and"
+                                                              " start again.")
 @click.option("--timeout", type=click.FloatRange(0, min_open=True), metavar="SECONDS",
-              help="End the run where one call of the model takes longer.")
-@click.option("--traceback", is_flag=True, help="Show all of an error that the model raises.")
+              help="Abort the run if one call of the model takes longer.")
+@click.option("--traceback", is_flag=True, help="Show the full traceback of an error in the model.")
 @OVERWRITE
 def run(
     model: str, words: tuple[str, ...], truth: str, out: str, method: str | None, run_name: str,
@@ -272,22 +300,27 @@ def run(
     intrinsics: bool, curve: str, exposure: float, key: str | None, frame: Any, missing: Any,
     keep: str | None, timeout: float | None, traceback: bool, overwrite: bool,
 ) -> None:
-    r"""Run a model on every image of a file and write its predictions.
+    """Run a model on every image of a file and write its predictions.
 
-    MODEL is a public depth model by its name, hf:NAME for what transformers loads, moge:NAME for
-    MoGe; or a Python file. That holds infer(image, intrinsics=None), which returns a dict with one
-    of the keys below; for questions infer(reference, answers), which returns an index or scores. It
-    may be a class, what load() returns, or a Baseline of MoGe's evaluation, whose load gets what
-    stands after --. docs/your-model.md has examples.
+    MODEL is a public depth model, as hf:NAME (loaded by transformers) or moge:NAME (MoGe), or a
+    Python file.
+
+    For rooms, the file defines infer(image, intrinsics=None), which returns a dict with one of the
+    keys below. For questions, it defines infer(reference, answers), which returns the index of an
+    option or one score per option. infer may also be a method of a class or of the object that
+    load() returns. A class of MoGe's evaluation works as well; OPTIONS after -- are passed to its
+    load(). docs/evaluate.md has examples.
 
     \b
-    depth_metric, points_metric: in metres, in scene units of open rooms
-    depth_scale_invariant, points_scale_invariant: times an unknown factor
-    depth_affine_invariant, points_affine_invariant: and plus an unknown term
-    disparity_affine_invariant: 1 / depth, times a factor and plus a term
+    points_metric, depth_metric: metres; scene units in box rooms
+    points_scale_invariant, depth_scale_invariant: up to a factor
+    points_affine_invariant, depth_affine_invariant: up to a factor and a shift
+    disparity_affine_invariant: 1 / depth, up to a factor and a shift
+    layers_metric, layers_scale_invariant, layers_affine_invariant: depths of all surfaces along
+    each ray, (h, w, L), or points (h, w, L, 3)
 
-    A killed run loses nothing: the same command goes on where it stopped.
-    """
+    Re-run the same command to resume an interrupted run.
+    """  # noqa: D301 - \b is click's mark: lines stay as they are
     from metrics.intake.model_file import LIBRARIES, ModelError, opened_model
     from metrics.intake.outputs import KEYS
     from metrics.intake.running import DEFAULT_BATCH, Call, run_model
@@ -330,7 +363,7 @@ def run(
         raise
     except KeyboardInterrupt:
         at = f" at {loaded.calls[0]}" if loaded is not None and loaded.calls else ""
-        print_line(f"stopped{at}; the same command goes on with the rows in {out}.rows", err=True)
+        print_line(f"stopped{at}; re-run the same command to resume with {out}.rows", err=True)
         raise
 
 

@@ -1,4 +1,4 @@
-"""`bench sets`: the named test sets, and making them."""
+"""`bench sets`: the named benchmarks, and making them."""
 
 import shlex
 import sys
@@ -16,7 +16,7 @@ from scenegen.command_line.paths import OutputFolder
 @click.group("sets", invoke_without_command=True, epilog=EXAMPLE + "bench sets make rooms-1")
 @click.pass_context
 def sets_command(context: click.Context) -> None:
-    """List the named test sets, or make one."""
+    """List the named benchmarks, or make one."""
     if context.invoked_subcommand is None:
         _list()
 
@@ -28,28 +28,30 @@ def _list() -> None:
         print_line(f"{name}: {files[0].purpose}")
         print_line(f"  {files[0].command}")
         for test in files:
-            print_line(f"  {test.digest}  {test.rows:,} rows, {test.file}")
-    print_line("made by older versions, whose bits were others:")
+            items = "questions" if test.task == "iqtt" else "images"
+            print_line(f"  {test.digest}  {test.rows:,} {items}, {test.file}")
+    print_line("superseded, made by older versions with different content:")
     for test in known_tests.KNOWN_TESTS:
         if test.superseded:
-            print_line(f"  {test.digest}  {test.rows:,} rows, {test.name}")
+            print_line(f"  {test.digest}  {test.rows:,} items, {test.name}")
 
 
 @sets_command.command("make", epilog=EXAMPLE + "bench sets make rooms-1 --out sets")
 @click.argument("name")
-@click.option("--out", type=OutputFolder(), default="sets", show_default=True, help="Folder.")
+@click.option(
+    "--out", type=OutputFolder(), default="sets", show_default=True, help="Output folder."
+)
 @WORKERS
 def make(name: str, out: str, workers: int) -> None:
-    """Make a test set, and check that its truth is the published one.
+    """Make a named benchmark, and check that its ground truth equals the published one.
 
-    Files that are there already are kept and checked. Where a run was ended, the same command goes
-    on.
+    Existing files are kept and checked. Re-run the same command to resume an interrupted run.
     """
     from metrics.scoring import known_tests
     from scenegen.common.names import check_choice
 
     sets = known_tests.sets()
-    check_choice("set", name, sets)
+    check_choice("benchmark", name, sets)
     folder, files = Path(out), sets[name]
     if not all((folder / test.file).exists() for test in files):
         folder.mkdir(parents=True, exist_ok=True)
@@ -58,9 +60,9 @@ def make(name: str, out: str, workers: int) -> None:
         _run(words)
     wrong = [test.file for test in files if not _is_published(folder, test)]
     if wrong:
-        print_line(f"{name}: not the published set: {', '.join(wrong)}")
+        print_line(f"{name}: differs from the published benchmark: {', '.join(wrong)}")
         sys.exit(1)
-    print_line(f"{name}: the published set")
+    print_line(f"{name}: equals the published benchmark")
 
 
 def _run(words: list[str]) -> Any:
@@ -82,14 +84,15 @@ def _is_published(folder: Path, test: Any) -> bool:
     from metrics.scoring.truth_digests import file_digests
 
     truth, pictures, rows = file_digests(folder / test.file, test.task)
-    found = {"rows": rows, "truth": truth, "pictures": pictures}
-    published = {"rows": test.rows, "truth": test.digest, "pictures": test.pictures}
+    found = {"items": rows, "truth hash": truth, "image hash": pictures}
+    published = {"items": test.rows, "truth hash": test.digest, "image hash": test.pictures}
     if not test.pictures:  # path-traced: `scenegen verify` compares them within a tolerance
-        del found["pictures"], published["pictures"]
+        del found["image hash"], published["image hash"]
     print_line(f"{folder / test.file}:")
     for name, value in found.items():
         same = value == published[name]
-        print_line(f"  {name} {value}, {'as published' if same else f'not {published[name]}'}")
+        outcome = "as published" if same else f"published {published[name]}"
+        print_line(f"  {name} {value}, {outcome}")
     return found == published
 
 

@@ -1,46 +1,76 @@
-"""The `bench` commands on score files: compare methods, and rank them."""
+"""The `bench` commands on several methods: compare them, and rank them.
 
+Both take score files and submissions, which are scored before.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from metrics.commands.options import FITS, MARKDOWN, SEED
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import OVERWRITE
-from scenegen.command_line.output import line_width, print_line
+from scenegen.command_line.output import line_width, print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputPath
+
+if TYPE_CHECKING:
+    from metrics.scoring.records import ScoreFile
 
 ALIGN = click.option(
     "--align",
     type=click.Choice(FITS),
-    help="Score depth and points of all methods after this alignment to the truth of each image"
-    " [default: the loosest one that a method declares].",
+    help="Alignment to the ground truth of each image, for all methods [default: the loosest"
+    " alignment that a method declares].",
+)
+TRUTH = click.option(
+    "--truth",
+    type=InputPath(),
+    help="Ground truth of the submissions [default: the file that each submission names].",
 )
 
 
-@click.command(epilog=EXAMPLE + "bench compare baseline.json mine.json --metric chamfer")
-@click.argument(
-    "scores", nargs=-1, required=True, type=InputPath(), metavar="REFERENCE.json OTHER.json..."
+def _scores_of(paths: tuple[str, ...], truth: str | None, **settings: Any) -> "list[ScoreFile]":
+    from metrics.scoring.compared import read_or_score
+    from metrics.scoring.runs import Settings
+
+    @contextmanager
+    def progress_of(rows: int) -> Iterator[Any]:
+        with progress_bar(rows, "image") as bar:
+            yield bar.update
+
+    return read_or_score(paths, truth, Settings(**settings), progress_of)
+
+
+@click.command(
+    epilog=EXAMPLE + "bench compare theirs.h5 mine.h5 --truth rooms.h5\n"
+    "  bench compare baseline.json mine.json --metric chamfer"
 )
+@click.argument("scores", nargs=-1, required=True, type=InputPath(), metavar="REFERENCE OTHER...")
+@TRUTH
 @click.option(
     "--metric", "metrics", multiple=True,
-    help="A score to compare; may be repeated [default: the headline scores].",
+    help="Metric to compare. Repeatable [default: the main metrics].",
 )  # fmt: skip
-@click.option("--json", "json_path", type=OutputPath(), help="Write the comparison here.")
-@click.option("--html", "html_path", type=OutputPath(), help="Write a page: verdicts and charts.")
+@click.option("--json", "json_path", type=OutputPath(), help="Write the comparison as JSON.")
+@click.option(
+    "--html", "html_path", type=OutputPath(), help="Write a page with verdicts and charts."
+)
 @MARKDOWN
 @SEED
 @ALIGN
 @click.option(
     "--allow-incomparable",
     is_flag=True,
-    help="Compare files that say that they are not comparable, over the rows that all have.",
+    help="Also compare scores that are not comparable, over the items that all files have.",
 )
 @OVERWRITE
 def compare(
     scores: tuple[str, ...],
+    truth: str | None,
     metrics: tuple[str, ...],
     json_path: str | None,
     html_path: str | None,
@@ -48,12 +78,12 @@ def compare(
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Compare methods with the first one, item by item, all after one alignment.
+    """Compare methods with a reference, paired by item and under one alignment.
 
-    Prints the differences, their confidence intervals and significance tests, and the smallest
-    difference that the test set could show.
+    Each argument is a score file of `bench score --json`, or a submission, which is scored first.
+    The output lists differences with confidence intervals and significance tests, and the smallest
+    difference that the test set can detect.
     """
-    from metrics.score_file import read_scores
     from metrics.scoring.aligned import aligned
     from metrics.views.compare.compare import compare as compare_files
     from metrics.views.compare.report import html_report, text_report, to_json
@@ -62,7 +92,7 @@ def compare(
     for path in (json_path, html_path):
         if path:
             check_writable(Path(path), overwrite)
-    files = [read_scores(path) for path in scores]
+    files = _scores_of(scores, truth, seed=settings["seed"], align=settings["align"])
     comparison = compare_files(files, metrics or None, **settings)
     files = aligned(files, comparison.alignment)
     if json_path:
@@ -73,13 +103,14 @@ def compare(
 
 
 @click.command(
-    epilog=EXAMPLE + "bench leaderboard baseline.json mine.json --format html --out b.html"
+    epilog=EXAMPLE + "bench leaderboard baseline.json mine.h5 --truth rooms.h5"
+    " --format html --out b.html"
 )
-@click.argument("scores", nargs=-1, required=True, type=InputPath(), metavar="SCORES.json...")
+@click.argument("scores", nargs=-1, required=True, type=InputPath(), metavar="METHOD...")
+@TRUTH
 @click.option(
     "--metric", "metrics", multiple=True,
-    help="A score to show; may be repeated, and the first one ranks [default: the headline"
-    " scores].",
+    help="Metric to show. Repeatable; the first metric ranks [default: the main metrics].",
 )  # fmt: skip
 @click.option(
     "--format",
@@ -89,19 +120,22 @@ def compare(
     show_default=True,
     help="Format of the tables.",
 )
-@click.option("--no-intervals", is_flag=True, help="Show the values alone.")
-@click.option("--caption", default="", help="Of the first LaTeX table [default: its test set].")
+@click.option("--no-intervals", is_flag=True, help="Print values without confidence intervals.")
+@click.option(
+    "--caption", default="", help="Caption of the first LaTeX table [default: its test set]."
+)
 @click.option(
     "--label",
     default="",
-    help=r"Of the first LaTeX table, for \ref; a number follows it for each other one.",
+    help=r"Label of the first LaTeX table, for \ref. Further tables append a number.",
 )
-@click.option("--out", type=OutputPath(), help="Write to this file instead of printing.")
+@click.option("--out", type=OutputPath(), help="Output file [default: print].")
 @ALIGN
-@click.option("--no-paper", is_flag=True, help="Leave out what the paper reports.")
+@click.option("--no-paper", is_flag=True, help="Leave out the results of the Pix2Shape paper.")
 @OVERWRITE
 def leaderboard(
     scores: tuple[str, ...],
+    truth: str | None,
     metrics: tuple[str, ...],
     form: str,
     no_intervals: bool,
@@ -112,13 +146,13 @@ def leaderboard(
     no_paper: bool,
     overwrite: bool,
 ) -> None:
-    """Rank score files in one table for each test set, all methods after one alignment.
+    """Rank methods, in one table per test set and under one alignment.
 
-    The headline ranks: shape for the paper's rooms, or what is behind for methods that see the
-    first view alone, the relative error of depth for interiors, and skill for questions. Baselines,
-    and what the paper reported on its own data, stand below the methods, without a rank.
+    Each METHOD is a score file of `bench score --json`, or a submission, which is scored first.
+    The first main metric ranks: shape_error for box rooms, hidden surfaces for methods that get the
+    first view only, abs_rel for interiors, and skill for questions. Baselines, and the results that
+    the paper reports on its own data, are listed without a rank.
     """
-    from metrics.score_file import read_scores
     from metrics.views.leaderboard import leaderboard as rank
     from metrics.views.leaderboard import to_html
     from metrics.views.table import to_latex, to_markdown, to_text, without_rests
@@ -128,7 +162,7 @@ def leaderboard(
         raise click.UsageError("--caption and --label need --format latex")
     if out is not None:
         check_writable(Path(out), overwrite)
-    files = [read_scores(path) for path in scores]
+    files = _scores_of(scores, truth, align=align)
     tables = list(rank(files, metrics or None, paper=not no_paper, align=align))
     if no_intervals:
         tables = [without_rests(table) for table in tables]
@@ -145,7 +179,7 @@ def leaderboard(
         click.echo(text)
         return
     write_text(out, f"{text}\n", overwrite)
-    print_line(f"{out}: {len(scores)} score files")
+    print_line(f"{out}: {len(scores)} methods")
 
 
 COMMANDS = (compare, leaderboard)

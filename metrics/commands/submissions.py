@@ -1,4 +1,4 @@
-"""The `bench` commands on submissions: check, score and show them, and tell their format."""
+"""The `bench` commands on submissions: check, score and show them, and print their format."""
 
 from pathlib import Path
 from typing import Any, cast
@@ -7,7 +7,7 @@ import click
 
 from metrics.commands.options import FITS, MARKDOWN, SEED
 from scenegen.command_line.groups import EXAMPLE, needs
-from scenegen.command_line.options import MOST_PROCESSES, OVERWRITE, SCHEDULER, Items
+from scenegen.command_line.options import MOST_PROCESSES, OVERWRITE, SCHEDULER, Items, Renamed
 from scenegen.command_line.output import line_width, on_scheduler, print_line, progress_bar
 from scenegen.command_line.paths import InputPath, OutputPath, refuse_inputs
 from scenegen.commands.viewing import RECORDING, record
@@ -15,8 +15,9 @@ from scenegen.commands.viewing import RECORDING, record
 TRUTH = click.option(
     "--truth",
     type=InputPath(),
-    help="The rooms file or the file of answers to score against [default: the file that the"
-    " submission names; scores are then comparable only if it is a known test set].",
+    help="Ground truth: a file of rooms, or the answer key of questions [default: the path stored"
+    " in"
+    " PREDICTIONS; only scores on named benchmarks are then ranked].",
 )
 
 
@@ -26,72 +27,85 @@ TRUTH = click.option(
 @click.argument("submissions", nargs=-1, required=True, type=InputPath(), metavar="PREDICTIONS...")
 @TRUTH
 @click.option(
-    "--json", "json_path", type=OutputPath(), help="Write the means and the scores of all items."
+    "--json",
+    "json_path",
+    type=OutputPath(),
+    help="Write a score file, with the scores of every item.",
 )
 @click.option(
-    "--csv", "csv_path", type=OutputPath(), help="Write a table of the scores of every item."
+    "--csv", "csv_path", type=OutputPath(), help="Write a table with the scores of every item."
 )
 @click.option(
     "--html",
     "html_path",
     type=OutputPath(),
-    help="Write a page: the headline, pictures of scenes or questions, curves, all numbers.",
+    help="Write a report page: main metrics, example images, curves, all numbers.",
 )
 @click.option(
-    "--beside",
+    "--compare-with",
+    "beside",
+    cls=Renamed,
+    former="--beside",
     multiple=True,
     type=InputPath(),
     metavar="SCORES.json",
-    help="Scores on the same truth to show beside these in the page; may be repeated.",
+    help="Score file on the same ground truth, to add to the page of --html. Repeatable.",
 )
 @click.option(
-    "--all", "whole", is_flag=True, help="Print all scores and groups, not only the headline."
+    "--all", "whole", is_flag=True, help="Print all metrics and groups, not only the main metrics."
 )
 @MARKDOWN
 @SEED
 @click.option(
     "--resamples", type=click.IntRange(100, 100_000), default=2000, show_default=True,
-    help="How many resamples the bootstrap draws.",
+    help="Number of bootstrap resamples.",
 )  # fmt: skip
 @click.option(
-    "--floors",
+    "--baselines",
+    "floors",
+    cls=Renamed,
+    former="--floors",
     type=InputPath(),
     metavar="FLOORS.json",
-    help="Floors of questions, from `iqtt floors` [default: those of the package].",
+    help="Accuracies of 2D-only baselines on questions, from `iqtt floors` [default: those of the"
+    " package].",
 )
 @click.option(
     "--allow-partial",
     is_flag=True,
-    help="Score only the rows that are predicted; the scores are then not comparable.",
+    help="Score only the images or questions that are predicted. The scores are then not ranked.",
 )
 @click.option(
     "--non-finite",
     type=click.Choice(["error", "penalise"]),
     default="error",
     show_default=True,
-    help="Refuse values that are not finite, or score them as the worst possible; the scores are"
-    " then not comparable.",
+    help="error: refuse values that are not finite; penalise: score them as the worst possible"
+    " value. Penalised scores are not ranked.",
 )
 @click.option(
     "--processes",
     type=click.IntRange(1, MOST_PROCESSES),
-    help="How many processes score [default: one a core].",
+    help="Number of scoring processes [default: one per core].",
 )
 @click.option(
     "--protocol",
     default="",
     metavar="NAME",
-    help="Of measured truth: a protocol of docs/real-data.md, or `all` for a table of all that suit"
-    " [default: declared].",
+    help="Evaluation protocol of measured ground truth: a name of docs/real-data.md, or all for a"
+    " table of every protocol that applies [default: declared].",
 )
 @click.option(
     "--align",
     type=click.Choice(FITS),
-    help="Score images after this alignment to the truth of each, as loose as the declared one or"
-    " looser [default: the declared one].",
+    help="Alignment to the ground truth of each image before scoring, with at least as many free"
+    " parameters as the declared alignment [default: the declared alignment].",
 )
 @click.option(
-    "--figure", "figure_path", type=OutputPath(), help="Draw --protocol all here: .pdf, .svg, .png."
+    "--figure",
+    "figure_path",
+    type=OutputPath(),
+    help="Write a figure of --protocol all: .pdf, .svg, .png.",
 )
 @SCHEDULER
 @OVERWRITE
@@ -110,13 +124,17 @@ def score(
     figure_path: str | None,
     **settings: Any,
 ) -> None:
-    """Score a submission, or several training runs of one method, and print the headline."""
+    """Score predictions against ground truth, and print the main metrics.
+
+    PREDICTIONS is a submission, or one submission per training run of one method.
+    """
     from metrics.score_file import write_scores
     from metrics.scoring.evaluate import open_runs, score_runs
     from metrics.scoring.runs import Settings, scorer_versions
+    from metrics.submissions.hints.depth import SCALE
     from metrics.submissions.validation import hints
     from metrics.views.report import html_report, read_beside
-    from metrics.views.score_tables import text_report, write_csv
+    from metrics.views.score_tables import text_report, unit_warning, write_csv
     from scenegen.files.new_file import check_writable, write_text
 
     paths = (json_path, csv_path, html_path, figure_path)
@@ -124,9 +142,11 @@ def score(
     for path in outputs:
         check_writable(path, overwrite)
     if beside and html_path is None:
-        raise click.UsageError("--beside is for the page: give --html, too")
+        raise click.UsageError("--compare-with adds to the page of --html: give --html as well")
     if (protocol == "all") != bool(figure_path) and (figure_path or outputs):
-        raise click.UsageError("--protocol all gives a table and --figure; keep one with NAME")
+        raise click.UsageError(
+            "--protocol all prints a table and writes --figure; other outputs need --protocol NAME"
+        )
     if protocol == "all":
         _score_all(submissions, truth, Settings(**settings), figure_path, markdown, overwrite)
         return
@@ -140,7 +160,10 @@ def score(
             options = Settings(**settings, cluster=cluster, protocol=protocol)
             scores = score_runs(runs, options, bar.update)
         for file in runs.files:
-            for hint in hints(file, runs.truth):
+            found = hints(file, runs.truth)
+            if unit_warning(scores):  # which the report begins with
+                found = [hint for hint in found if not hint.found.startswith(SCALE)]
+            for hint in found:
                 print_line(f"hint: {file.path}: {hint}", err=True)
         if json_path:
             write_scores(scores, json_path, overwrite)
@@ -174,7 +197,7 @@ def _score_all(
 @TRUTH
 @click.pass_context
 def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
-    """List everything that is wrong with a submission, and hints at likely mistakes.
+    """List all errors of a submission, and hints at likely mistakes.
 
     The exit code is 2 if the submission cannot be scored.
     """
@@ -194,11 +217,11 @@ def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
 @TRUTH
 @click.option(
     "--scores", "scores_path", type=InputPath(),
-    help="Score file of the submission, from `bench score --json` [default: it is scored].",
+    help="Score file of PREDICTIONS, from `bench score --json` [default: PREDICTIONS is scored].",
 )  # fmt: skip
 @click.option(
     "--items", type=Items(),
-    help="Rows of the truth to show [default: the scenes with the worst scores, 100 rows].",
+    help="Images to show [default: up to 100 images of the scenes with the worst scores].",
 )  # fmt: skip
 @RECORDING
 @OVERWRITE
@@ -210,10 +233,10 @@ def view(
     out: str | None,
     overwrite: bool,
 ) -> None:
-    """Write a recording of predictions of rooms beside the truth, for the 3D viewer Rerun.
+    """Write a recording of predictions and ground truth of rooms for the 3D viewer Rerun.
 
-    The scenes with the worst scores come first; each timeline is another score. Predicted points
-    have the colour of the error of their depth.
+    Each timeline sorts the scenes by one metric, worst first. The colour of a predicted point is
+    its depth error.
     """
     needs("bench view", ("rerun",), "view")
     from metrics.measured.reader import Images
@@ -235,7 +258,7 @@ def view(
 
 @click.command("describe-format", epilog=EXAMPLE + "bench describe-format")
 def describe_format() -> None:
-    """Print the format of submissions, and how to write one."""
+    """Print the file format of submissions, with code that writes one."""
     from metrics.submissions.layout import describe_format as text
 
     click.echo(text())

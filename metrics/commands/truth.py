@@ -1,4 +1,4 @@
-"""The `bench` command that makes a file of measured truth."""
+"""The `bench` commands that make files of measured ground truth, and corrupted images."""
 
 import shlex
 from pathlib import Path
@@ -18,27 +18,30 @@ LAYOUTS = ("moge", "nyu", "nyu-raw", "kitti", "diode", "hypersim", "sintel")
 # fmt: off
 @click.command(epilog=f"{EXAMPLE}bench truth --images 'rgb/*.png' --depth 'gt/*.png' --unit mm"
                       " --invalid 0 --out mine.h5")
-@click.option("--images", metavar="FILES", help="Pictures: a folder, or a pattern in quotes.")
+@click.option("--images", metavar="FILES", help="Images: a folder, or a quoted pattern.")
 @click.option("--depth", metavar="FILES",
-              help="Their depth: PNG, TIFF, EXR, PFM, NPY or NPZ, in the size of the picture.")
+              help="Depth of the images, at the same size: PNG, TIFF, EXR, PFM, NPY or NPZ.")
 @reading_options(*DEPTH_KINDS)
 @click.option("--focal-baseline", type=Factor(), metavar="N",
-              help="Of disparity in pixels: focal length in pixels x baseline in metres; depth is"
+              help="For disparity in pixels: focal length in pixels x baseline in metres. Depth is"
               " N / disparity.")
 @click.option("--disparity-offset", type=float, default=0.0, metavar="PIXELS",
-              help="Added to disparity first, such as the difference of the principal points.")
+              help="Offset that is added to the disparity, such as the difference between the"
+              " principal points.")
 @click.option("--intrinsics", type=InputPath(), metavar="K.json",
-              help="Pinhole matrix in pixels, whose first pixel has its centre at 0.5; or an object"
-              " of them by picture.")
+              help="Camera matrix in pixels, with the first pixel centre at 0.5, or a JSON object"
+              " with one matrix per image name.")
 @click.option("--groups", type=InputPath(), metavar="GROUPS.csv",
-              help="Lines `picture,group`: frames of one scene or drive are a group.")
-@click.option("--mask", metavar="FILES", help="Images that are 0 where depth does not count.")
-@click.option("--layout", type=click.Choice(LAYOUTS), help="A public set, as it is downloaded.")
-@click.option("--data", type=InputPath(), metavar="FOLDER", help="Its folder, or its file.")
-@click.option("--split", type=InputPath(), help="splits.mat of NYU, or a list of KITTI's frames.")
-@click.option("--source", default="", help="Where the data come from, to keep in the file.")
-@click.option("--license", "licence", default="", help="Their licence, to keep in the file.")
-@click.option("--out", type=NewHdf5(), required=True, metavar="TRUTH.h5", help="File to write.")
+              help="Lines `image,group`. Frames of the same scene or drive form a group.")
+@click.option("--mask", metavar="FILES", help="Masks that are 0 at pixels to ignore.")
+@click.option("--layout", type=click.Choice(LAYOUTS), help="Layout of a public data set, as"
+                                                           " downloaded.")
+@click.option("--data", type=InputPath(), metavar="FOLDER", help="Folder or file of the public"
+                                                                 " data set.")
+@click.option("--split", type=InputPath(), help="splits.mat of NYU, or a list of KITTI frames.")
+@click.option("--source", default="", help="Source of the data, stored in the file.")
+@click.option("--license", "licence", default="", help="Licence of the data, stored in the file.")
+@click.option("--out", type=NewHdf5(), required=True, metavar="TRUTH.h5", help="Output file.")
 @OVERWRITE
 def truth(
     images: str | None, depth: str | None, normals: str | None, intrinsics: str | None,
@@ -46,10 +49,10 @@ def truth(
     source: str, licence: str, focal_baseline: float | None, disparity_offset: float, out: str,
     overwrite: bool, **numbers: Any,
 ) -> None:
-    """Make a file of truth that others measured, from files or from a public set.
+    """Make a file of measured ground truth, from image and depth files or from a public data set.
 
-    It is predicted and scored as a file of rooms: bench import, run, validate, score, compare,
-    leaderboard.
+    `bench import`, `run`, `validate`, `score`, `compare` and `leaderboard` take this file like a
+    file of rooms.
     """
     from metrics.intake.truth_files import (
         Beside,
@@ -70,7 +73,8 @@ def truth(
     if layout and data:
         told = [numbers[name] for name in ("unit", "scale", "invalid", "array")]
         if any((*told, focal_baseline, disparity_offset, intrinsics, groups, normals, mask)):
-            raise click.UsageError("--layout knows its units, cameras and groups")
+            raise click.UsageError("--layout sets units, cameras and groups: leave out their"
+                                   " options")
         source, licence = source or SETS[layout].source, licence or SETS[layout].licence
         rows = read_layout(layout, Path(data), Path(split) if split else None)
     else:
@@ -80,7 +84,7 @@ def truth(
         if not disparity and (focal_baseline or disparity_offset):
             raise click.UsageError("--focal-baseline and --disparity-offset need --kind disparity")
         if disparity and (numbers["unit"] or (numbers["scale"] and focal_baseline)):
-            raise click.UsageError("disparity has no unit of length: say --focal-baseline, or"
+            raise click.UsageError("disparity has no unit of length: give --focal-baseline, or"
                                    " --scale for 1 / metres of each step")
         if focal_baseline is not None:
             numbers["scale"] = 1.0 / focal_baseline
@@ -105,7 +109,7 @@ def truth(
 @click.command(epilog=f"{EXAMPLE}bench info mine.h5")
 @click.argument("file", type=InputPath())
 def info(file: str) -> None:
-    """Print what a file of measured truth holds: sizes, depths, groups, source, digest."""
+    """Print the contents of a file of measured ground truth: sizes, depths, groups, source."""
     from metrics.measured.describe import describe
 
     click.echo(describe(file))
@@ -114,18 +118,20 @@ def info(file: str) -> None:
 @click.command(epilog=f"{EXAMPLE}bench corrupt rooms.h5 --kind jpeg --severity 3 --out jpeg-3.h5")
 @click.argument("data", type=InputPath(), metavar="ROOMS.h5")
 @click.option("--kind", required=True, metavar="NAME",
-              help="noise, shot, impulse, blur, motion, fog, brightness, dark, contrast, pixelate,"
-              " jpeg or quantize.")
-@click.option("--severity", type=click.IntRange(1, 5), required=True, help="1 to 5.")
+              help="Corruption: noise, shot, impulse, blur, motion, fog, brightness, dark,"
+                   " contrast,"
+              " pixelate, jpeg or quantize.")
+@click.option("--severity", type=click.IntRange(1, 5), required=True, help="Severity of the"
+                                                                           " corruption, 1 to 5.")
 @click.option("--seed", type=click.IntRange(0, 2**63 - 1), default=0, show_default=True,
-              help="Seed of random corruptions.")
-@click.option("--out", type=NewHdf5(), required=True, metavar="FILE.h5", help="File to write.")
+              help="Random seed of the corruption.")
+@click.option("--out", type=NewHdf5(), required=True, metavar="FILE.h5", help="Output file.")
 @OVERWRITE
 def corrupt(data: str, kind: str, severity: int, seed: int, out: str, overwrite: bool) -> None:
-    """Write a file with corrupted images and the same truth.
+    """Write a copy of a file with corrupted images and the same ground truth.
 
-    Predict both files, score both against the clean one, and compare the two score files: the
-    difference is the drop, paired by image.
+    Run a model on both files, score both predictions against ROOMS.h5, and compare the two score
+    files. The difference is the drop in performance, paired by image.
     """
     from metrics.corruptions import write_corrupted
     from metrics.measured.reader import open_images

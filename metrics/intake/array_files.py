@@ -84,7 +84,7 @@ def _npz(path: Path, name: str | None, vectors: bool) -> Array:
         chosen = name or only
         if chosen not in names:
             found = f"the arrays {', '.join(map(repr, names[:8]))}"
-            hint = "" if name else "name one with --array"
+            hint = "" if name else "select one with --array"
             raise ArrayFileError(path, found, repr(name) if name else "one", hint)
         member = f"{chosen}.npy"
         if member in arrays.zip.namelist():  # whose size, inflated, is known before it is read
@@ -126,11 +126,13 @@ def _pfm(path: Path, _name: str | None, vectors: bool) -> Array:
     shape = (int(head[3]), int(head[2]), *((3,) if head[1] == b"F" else ()))
     values = np.frombuffer(data[head.end() :], "<f4" if float(head[4]) < 0 else ">f4")
     if values.size != np.prod(shape):
-        raise ArrayFileError(path, f"{values.size:,} numbers", f"{np.prod(shape):,}, as it says")
+        raise ArrayFileError(
+            path, f"{values.size:,} numbers", f"{np.prod(shape):,}, as its header states"
+        )
     return _channels(path, values.reshape(shape)[::-1], vectors)
 
 
-_AS_NUMBERS = "save the numbers themselves, as .npy or as a 16-bit PNG of one channel"
+_AS_NUMBERS = "save the values as .npy, or as a 16-bit PNG with one channel"
 
 
 def _channels(path: Path, values: Array, vectors: bool) -> Array:
@@ -143,7 +145,7 @@ def _channels(path: Path, values: Array, vectors: bool) -> Array:
         return values
     if values.ndim == 3:
         if not (values == values[..., :1]).all():
-            raise ArrayFileError(path, "a picture in colours", "one channel", _AS_NUMBERS)
+            raise ArrayFileError(path, "a colour image", "one channel", _AS_NUMBERS)
         values = values[..., 0]
     return values
 
@@ -157,7 +159,7 @@ def _exr(path: Path, name: str | None, vectors: bool) -> Array:
     chosen = [name] if name else _depths_of(channels)
     if len(chosen) != 1 or chosen[0] not in channels:
         expected = repr(name) if name else f"one that ends in {', '.join(DEPTH_CHANNELS)}"
-        raise ArrayFileError(path, _listed(channels), expected, "name one with --array")
+        raise ArrayFileError(path, _listed(channels), expected, "select one with --array")
     return channels[chosen[0]]
 
 

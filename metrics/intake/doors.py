@@ -52,8 +52,8 @@ class HuggingFace:
         refuse_lost(lost)
         self.key = key or key_of(self.network.config)
         if self.key is None:
-            what = f"what {type(self.network).__name__} predicts is not known"
-            raise ValueError(f"{what}; say --key {DISPARITY}, or another that is true of it")
+            what = f"the output of {type(self.network).__name__} is unknown"
+            raise ValueError(f"{what}; use --key {DISPARITY}, or the key that describes the output")
         self.processor = AutoImageProcessor.from_pretrained(name)
         self.network.to(device).eval()
         self.device, self.dtype = device, dtype
@@ -166,7 +166,7 @@ def _moge(name: str) -> tuple[Any, str]:
 def refuse_lost(names: list[str]) -> None:
     """Raise ValueError where a network has weights that its file does not."""
     if names:
-        raise ValueError(f"{len(names)} weights that do not fit, such as {', '.join(names[:3])}")
+        raise ValueError(f"{len(names)} weights that do not match, such as {', '.join(names[:3])}")
 
 
 def provenance_of(

@@ -20,7 +20,7 @@ Key = tuple[int, ...]  # the numbers in a name that tell it from others
 Keys = Callable[[], Sequence[Sequence[Key]]]
 RowReader = Callable[[int], tuple[str, Array]]  # from a row to its place in words, and its array
 SHOWN = 3  # files or rows that an error lists
-ORDER = "say --match name to take files in the order of their names"
+ORDER = "use --match name to assign files in alphabetical order"
 _DIGITS = re.compile("([0-9]+)")
 
 
@@ -38,14 +38,14 @@ def files_of(pattern: str, endings: Collection[str] = READERS) -> list[Path]:
         paths = [path for path in folder.iterdir() if not path.name.startswith(".")]
         for path in sorted(paths):
             if path.is_file() and path.suffix.lower() not in endings:
-                hint = f"name the files with a pattern, such as '{folder}/*.png'"
+                hint = f"give the files as a pattern, such as '{folder}/*.png'"
                 expected = f"files that end in {', '.join(endings)}"
                 raise MatchError(folder, f"{path.name:.80}", expected, hint)
     else:
         paths = [Path(name) for name in glob.glob(_with_names_escaped(pattern))]
     paths = sorted(path for path in paths if path.is_file())
     if not paths:
-        raise MatchError(pattern, "no file", "one for each row")
+        raise MatchError(pattern, "no file", "one for each image")
     return paths
 
 
@@ -80,7 +80,7 @@ def row_reader(
     if len(files) == 1 and files[0].suffix in (".npy", ".npz"):
         stack = read_array(files[0], array, vectors)
         if stack.ndim > (3 if vectors else 2) and len(stack) == count:
-            return lambda row: (f"{files[0]}: row {row}", stack[row]), "one image for each row"
+            return lambda row: (f"{files[0]}: row {row}", stack[row]), "one file for each image"
     paths, how = match_files(files, names, keys, by)
 
     def read(row: int) -> tuple[str, Array]:
@@ -110,11 +110,11 @@ def match_files(
     count, folder = len(names), paths[0].parent
     if by == "name":
         if len(paths) != count:
-            raise MatchError(folder, f"{len(paths)} files", f"{count}, one for each row")
+            raise MatchError(folder, f"{len(paths)} files", f"{count}, one for each image")
         return list(paths), f"in the order of their names: {paths[0].name} is row 0"
     stems, named = [Path(name).stem for name in names], {path.stem: path for path in paths}
     if len(named) == len(paths) == count and named.keys() == set(stems):
-        return [named[stem] for stem in stems], "by the names of the pictures"
+        return [named[stem] for stem in stems], "by the names of the images"
     by_key = numbered(paths)
     chosen = max(keys(), key=lambda some: len(by_key.keys() & set(some)))
     both = by_key.keys() & set(chosen)
@@ -127,7 +127,7 @@ def match_files(
     if missing or extra:
         parts = (("no file for ", missing), ("also ", extra))
         found = "; ".join(say + _first_of(some) for say, some in parts if some)
-        raise MatchError(folder, found, f"{count} files, one for each row")
+        raise MatchError(folder, found, f"{count} files, one for each image")
     how = f"by the number in their names, counted from {_text(chosen[0])}"
     if len(chosen[0]) == 2:
         how = "by scene and view in their names"

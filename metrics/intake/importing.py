@@ -45,8 +45,9 @@ def import_rooms(
     """
     with open_data(truth) as rooms:
         if not isinstance(rooms, Images):
-            raise SpecError(rooms.path, "questions", "rooms, or measured truth", "see --answers")
-        names, keys = _names(rooms), partial(_keys, rooms)
+            expected = "rooms, or measured ground truth"
+            raise SpecError(rooms.path, "questions", expected, "see --responses")
+        names, keys = names_of(rooms), partial(keys_of, rooms)
         read, how = geometry_reader(reading, pattern, names, keys, normals, confidence=confidence)
         default: Alignment = "scale_shift" if reading.kind == "disparity" else "none"
         with RoomPredictionWriter(
@@ -67,13 +68,13 @@ def import_rooms(
     return how
 
 
-def _names(rooms: Images) -> list[str]:
+def names_of(rooms: Images) -> list[str]:
     """Return the names of rows: of rooms their numbers, of measured truth those of its pictures."""
     rows = range(len(rooms))
     return [rooms.name(row) if isinstance(rooms, MeasuredFile) else f"row {row}" for row in rows]
 
 
-def _keys(rooms: Images) -> list[list[tuple[int, ...]]]:
+def keys_of(rooms: Images) -> list[list[tuple[int, ...]]]:
     """Return the numbers that files of rows may have: scene and view, or those of the row."""
     if isinstance(rooms, MeasuredFile):
         return counted(len(rooms))

@@ -63,7 +63,7 @@ def kept_rows(out: str | Path, settings: Mapping[str, Any], keep: str | None) ->
     error of the block says how many rows are kept.
     """
     if is_remote(out):
-        raise SpecError("out", str(out), "a path of this machine, where rows can be kept")
+        raise SpecError("out", str(out), "a path of this machine, where finished images are kept")
     folder = Path(f"{out}.rows")
     text = json.dumps(dict(settings), indent=1, sort_keys=True)
     with run_lock(Path(f"{out}.rows.lock"), Path(out)):
@@ -72,8 +72,8 @@ def kept_rows(out: str | Path, settings: Mapping[str, Any], keep: str | None) ->
         stored = folder / SETTINGS
         if stored.exists() and stored.read_text(encoding="utf-8") != text and keep != "resume":
             count = len(list(folder.glob("*.npz")))
-            found = f"{count} rows of another model, other weights or other options"
-            hint = "say --resume to keep them, or --restart to begin anew"
+            found = f"{count} images of another model, other weights or other options"
+            hint = "use --resume to keep them, or --restart to start again"
             raise SpecError(folder, found, "rows of this model", hint)
         folder.mkdir(exist_ok=True)
         stored.write_text(text, encoding="utf-8")
@@ -85,7 +85,7 @@ def kept_rows(out: str | Path, settings: Mapping[str, Any], keep: str | None) ->
             if not done:
                 shutil.rmtree(folder)
             elif isinstance(error, SceneGenError):
-                kept = f"{done} rows are kept in {folder}; the same command goes on with the others"
+                kept = f"{done} images are kept in {folder}; re-run the same command to resume"
                 error.hint = "; ".join(filter(None, (error.hint, kept)))
             raise
         shutil.rmtree(folder)

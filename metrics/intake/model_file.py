@@ -131,7 +131,7 @@ class Model:
     def ask_provenance(self) -> None:
         """Ask once more, after the first row, what the model tells of itself."""
         if self.provenance:
-            self.provenance = self.begin("provenance", "what it tells of itself")()
+            self.provenance = self.begin("provenance", "its provenance")()
 
     def begin(self, function: str, where: str, *arguments: Any) -> Callable[[], Any]:
         """Begin to call `infer` or `infer_batch`; the function returned waits for the result.
@@ -194,7 +194,7 @@ class Model:
                 raise self._lost(place)
             if timeout is not None and seconds > timeout:
                 self.kill()
-                found, hint = f"no answer after {timeout:g} s", "--timeout may give it more"
+                found, hint = f"no result after {timeout:g} s", "--timeout may give it more"
                 raise ModelError(place, found, "", hint)
             if seconds > told:
                 self._note(f"{place}: at work for {seconds:.0f} s; Ctrl-C ends it")
@@ -215,12 +215,12 @@ class Model:
 
     def _lost(self, place: str) -> ModelError:
         code = self._process.poll()
-        how = "closed its pipes" if code is None else f"ended with {ended(code)}"
+        how = "closed its pipes" if code is None else f"exited with {ended(code)}"
         if self._said != READY:
             tells = self._said.startswith(("no NumPy", "Python "))
             found = f"{self._program}: {self._said if tells else how}"
             return ModelError("--python", found, NEEDED)
-        hint = "memory may be short" if code == -getattr(signal, "SIGKILL", 9) else ""
+        hint = "possibly out of memory" if code == -getattr(signal, "SIGKILL", 9) else ""
         return ModelError(place, f"a model whose process {how}", "", hint)
 
 

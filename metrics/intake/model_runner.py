@@ -25,8 +25,8 @@ from typing import IO, Any
 
 SIZE = 8  # bytes of a message's length, before it
 END = b""  # the message after the last request
-EXPECTED = "infer(image, intrinsics=None), or load() or one class that gives an object with it"
-EXAMPLE = "see docs/your-model.md"
+EXPECTED = "infer(image, intrinsics=None), or load() or one class whose object has infer"
+EXAMPLE = "see docs/evaluate.md"
 
 
 class UnusableError(Exception):
@@ -167,7 +167,7 @@ def _loaded(path: str, settings: Mapping[str, Any], arguments: Sequence[str]) ->
         return _Baseline(make, settings, arguments)
     if arguments:
         found = f"{path}, which has no Baseline with a command load"
-        raise UnusableError("what stands after --", found, "a file of MoGe's evaluation", EXAMPLE)
+        raise UnusableError("arguments after --", found, "a file of MoGe's evaluation", EXAMPLE)
     taken = {name: settings[name] for name in settings if make and _accepts(make, name)}
     model: Any = module
     if make is not None:
@@ -210,7 +210,7 @@ class _Baseline:
         try:
             self.wrapped = made.load.main(words, standalone_mode=False)
         except click.ClickException as error:
-            where, known = "what stands after --", ", ".join(sorted(options))
+            where, known = "arguments after --", ", ".join(sorted(options))
             raise UnusableError(
                 where, error.format_message(), f"options of its load: {known}"
             ) from None

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from metrics.intake.resampling import filled, nearest, resampled
 from metrics.measures.alignment import Alignment
 from metrics.submissions.problems import PredictionError
+from metrics.submissions.rules import LAYERS
 from metrics.submissions.writer import as_array
 from scenegen.common.errors import SceneGenError
 from scenegen.common.names import did_you_mean
@@ -34,12 +35,15 @@ KEYS: dict[str, tuple[str, Alignment]] = {
     "points_affine_invariant": ("points", "scale_shift"),
     "depth_affine_invariant": ("depth", "scale_shift"),
     "disparity_affine_invariant": ("disparity", "scale_shift"),
+    "layers_metric": ("layers", "none"),
+    "layers_scale_invariant": ("layers", "scale"),
+    "layers_affine_invariant": ("layers", "scale_shift"),
 }
 FRAMES: dict[Frame, Array] = {  # what an axis is multiplied by to be one of ours
     "opencv": np.array([1.0, -1.0, -1.0]),
     "opengl": np.array([1.0, 1.0, 1.0]),
 }
-FILL = "say --missing nearest to fill them from the nearest pixel that has a value"
+FILL = "use --missing nearest to fill them from the nearest valid pixel"
 _WANTED = "a dict with one of " + ", ".join(KEYS)
 
 
@@ -53,7 +57,8 @@ class Geometry:
 
     Attributes:
         kind, alignment: as in `submissions.layout.KINDS`.
-        geometry: depth or disparity (h, w), or points (h, w, 3), camera frame; NaN for no value.
+        geometry: depth or disparity (h, w), points (h, w, 3), or layers (h, w, L), camera frame;
+            NaN for no value.
         normal: (h, w, 3), camera frame; None where there are none.
         fov_y_degrees: vertical field of view; None where it is not estimated.
         key: the name that the model gave to the geometry.
@@ -112,8 +117,9 @@ def read_output(
     Args:
         output: a mapping with one of `KEYS`, and maybe `normal` (h, w, 3), `mask` (h, w; what is
             False has no value), `intrinsics` (3, 3), normalised by the image's size or in its
-            pixels, and `confidence` or `uncertainty` (h, w). Arrays, or tensors of torch; axes of
-            size 1 around them are dropped.
+            pixels, and `confidence` or `uncertainty` (h, w). Layers are depths (h, w, L) or points
+            (h, w, L, 3), maybe with their number `layer_count` (h, w). Arrays, or tensors of
+            torch; axes of size 1 around them are dropped.
         frame: of points and normals: "opencv" has x right, y down, z forward; "opengl" is ours.
         key: which of `KEYS` to take; by default the first that is there.
         missing: "nearest" fills pixels without a value from the nearest that has one.
@@ -131,6 +137,10 @@ def read_output(
         raise OutputError("returned", f"a dict with the keys {names}", wanted, hint)
     kind, alignment = KEYS[chosen]
     normal, mask = output.get("normal"), output.get("mask")
+    if kind == "layers":
+        layers = layers_of(output[chosen], chosen, frame, output.get("layer_count"))
+        geometry = Geometry(kind, alignment, layers, key=chosen)
+        return fitted_to(geometry, height, width, frame=frame, missing=missing)
     geometry = Geometry(
         kind,
         alignment,
@@ -159,6 +169,8 @@ def fitted_to(
     """Return a geometry of any size and frame in ours, at (H, W) pixels. Raises OutputError."""
     name, image, normal = geometry.key or geometry.kind, geometry.geometry, geometry.normal
     _refuse_shape(image, name, height, width)
+    if geometry.kind == "layers":
+        return replace(geometry, geometry=nearest(image, height, width))
     _refuse_zeros(geometry, name)
     image = np.where(np.isfinite(image), image, np.nan)
     if geometry.kind == "points":
@@ -206,6 +218,28 @@ def image_of(values: Any, name: str, vectors: bool = False) -> Array:
     return array.astype(np.float64)
 
 
+def layers_of(values: Any, name: str, frame: Frame, count: Any = None) -> Array:
+    """Return depths (h, w, L), or points (h, w, L, 3), as planar depths (h, w, L).
+
+    `count`, (h, w), is how many of them there are. Raises OutputError.
+    """
+    array = as_array(values, name)
+    vectors = array.shape[-1:] == (3,) and array.ndim > 3
+    while array.ndim > 3 + vectors and array.shape[0] == 1:
+        array = array[0]
+    if array.dtype.kind not in "fiu" or array.ndim != 3 + vectors or 0 in array.shape:
+        found = f"type {array.dtype!s:.40}, shape {array.shape}"
+        raise OutputError(name, found, "numbers (h, w, L), or points (h, w, L, 3)")
+    if math.prod(array.shape[:2]) > MAX_PIXELS or array.shape[2] not in LAYERS:
+        raise OutputError(name, f"shape {array.shape}", f"at most {LAYERS[-1]} layers")
+    layers = array.astype(np.float64)
+    if vectors:
+        layers = layers[..., 2] * -FRAMES[frame][2]
+    if count is not None:
+        layers[np.arange(layers.shape[2]) >= image_of(count, "layer_count")[..., None]] = np.nan
+    return layers
+
+
 def planar_from_distance(distance: Array, rays: Array) -> Array:
     """Return planar depth (h, w) of distances along rays (h, w, 3), z = -1."""
     return np.asarray(distance / np.linalg.norm(rays, axis=-1))
@@ -229,7 +263,9 @@ def _refuse_zeros(geometry: Geometry, name: str) -> None:
     """Raise OutputError for depths of 0: the camera's own place, or a file's mark for no value."""
     zeros = np.count_nonzero(geometry.geometry == 0.0)
     if geometry.kind == "depth" and geometry.alignment != "scale_shift" and zeros:
-        hint = "if 0 stands for no value, bench import --invalid 0, or let the model return NaN"
+        hint = (
+            "if 0 marks invalid pixels, use bench import --invalid 0, or return NaN from the model"
+        )
         raise OutputError(name, f"0 at {zeros} pixels", "depths above 0", hint)
 
 

@@ -16,6 +16,7 @@ from metrics.intake.outputs import (
     Missing,
     OutputError,
     image_of,
+    layers_of,
     planar_from_distance,
 )
 from metrics.measures.alignment import Alignment
@@ -45,6 +46,7 @@ class Reading:
         missing: what to do with pixels without a value.
         array: name of the array in NPZ files, or of the channel in EXR files.
         surer: whether confidence is larger where the method is surer, or smaller, as an error is.
+        layered: whether each pixel has several depths, distances or points: its layers.
         match: whether files belong to rows by number, or in the order of their names.
     """
 
@@ -56,13 +58,16 @@ class Reading:
     frame: Frame = "opencv"
     missing: Missing = "refuse"
     array: str | None = None
+    layered: bool = False
     match: By = "number"
     surer: Literal["more", "less"] = "more"
 
     def __post_init__(self) -> None:
         """Raise SpecError where settings contradict each other."""
         kinds = {"distance": KINDS["depth"][:-1], "disparity": KINDS["depth"]}
-        allowed = kinds.get(self.kind) or KINDS[self.kind]
+        if self.layered and self.kind == "disparity":
+            raise SpecError("kind", "disparity", "depth, distance or points, for layers")
+        allowed = KINDS["layers"] if self.layered else kinds.get(self.kind) or KINDS[self.kind]
         if self.alignment is not None and self.alignment not in allowed:
             expected = f"{' or '.join(allowed)}, for {self.kind}"
             raise SpecError("alignment", repr(self.alignment), expected)
@@ -76,6 +81,12 @@ class Reading:
 
         `rays` returns the directions of the pixels of an image of a height and a width, z = -1.
         """
+        if self.layered:
+            depth = layers_of(stored, "layers", self.frame)
+            depth[np.isin(depth, self.invalid)] = np.nan
+            if self.kind == "distance":
+                depth = planar_from_distance(depth, rays(*depth.shape[:2])[:, :, None])
+            return Geometry("layers", self.alignment or "none", depth * self.scale)
         values = image_of(stored, self.kind, vectors=self.kind == "points")
         marks = np.asarray(self.invalid)
         if stored.dtype.kind == "f":  # in which a mark such as 255.996 has fewer digits

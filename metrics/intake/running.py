@@ -58,7 +58,7 @@ class Call:
         radiance = radiance * np.float32(self.exposure)
         brightest = float(radiance.max())
         if not brightest <= 1.0 + 1e-6:
-            hint = f"say --exposure {0.9 * self.exposure / brightest:.2g}"
+            hint = f"use --exposure {0.9 * self.exposure / brightest:.2g}"
             raise SpecError(where, f"radiance up to {brightest:.4g}", "at most 1", hint)
         if self.encoding == "srgb":
             return srgb_bytes(radiance)
@@ -118,7 +118,7 @@ def _check_suits(model: Model, rows: "Images | QuestionsFile", call: Call) -> No
     if not isinstance(rows, Images):
         if model.named:
             found = f"questions in {rows.path}"
-            raise ModelError(model.name, found, "rooms, whose depth it predicts")
+            raise ModelError(model.name, found, "rooms, because it predicts depth")
     elif call.intrinsics and not model.takes_intrinsics:
         found = f"infer of {model.name}, which takes none"
         raise ModelError("--intrinsics", found, "infer(image, intrinsics=None)")
@@ -175,7 +175,7 @@ def _write_rooms(
                 writer.add(row, **geometry.values)
             kept.write(row, _arrays(geometry))
             progress(1)
-    return f"{first.key} of {len(rooms)} rows"
+    return f"{first.key} of {len(rooms)} images"
 
 
 def _predicted(model: Model, rooms: Images, call: Call, row: int, output: Any) -> Geometry:
@@ -283,7 +283,7 @@ def _write_answers(
 
 def _answer(value: Any, offered: int, where: str) -> Array:
     """Return an index as int64, or scores (A,) as float64. Raises OutputError."""
-    expected = f"the index of an answer, 0 to {offered - 1}, or {offered} scores"
+    expected = f"the index of an option, 0 to {offered - 1}, or {offered} scores"
     array = as_array(value, where)
     if array.shape == () and array.dtype.kind in "iu" and -1 <= int(array) < offered:
         return array.astype(np.int64)

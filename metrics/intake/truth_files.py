@@ -108,15 +108,15 @@ def _look_for_marks(
             texts = [str(stored.dtype.type(mark)) for mark in sorted(marks)]
             is_usual = is_highest or all(map(USUAL_MARK.fullmatch, texts))
             found = f"{' and '.join(texts)} at {count:,} pixels, far from all other numbers"
-            says = f"say {' '.join(f'--invalid {text}' for text in texts)}"
+            says = f"use {' '.join(f'--invalid {text}' for text in texts)}"
             if count <= k and away < 1e4:
                 continue
             if away >= (LIKELY if is_highest and highest > 255 else CERTAIN) and (
                 is_beyond or is_highest
             ):
-                raise TruthError(where, found, "depth; it stands for no value", says)
+                raise TruthError(where, found, "depth; this value marks invalid pixels", says)
             if away >= LIKELY and (is_usual or (is_beyond and away >= 1.5 * LIKELY)):
-                hint(f"{where}: {found}; if it stands for no value, {says}")
+                hint(f"{where}: {found}; if this value marks invalid pixels, {says}")
                 return
 
 
@@ -129,7 +129,7 @@ def _of_each(pictures: Sequence[Path], by_name: Mapping[str, Any], what: str) ->
     missing = sorted(path.stem for path in pictures if path.stem not in by_stem)
     if by_name and "" not in by_stem and missing:
         found = f"none of {', '.join(missing[:SHOWN])}" + ", ..." * (len(missing) > SHOWN)
-        raise TruthError(what, found, "one for each picture")
+        raise TruthError(what, found, "one for each image")
     return [by_stem.get("", by_stem.get(path.stem)) for path in pictures]
 
 
@@ -160,7 +160,9 @@ def read_matrices(path: str | Path) -> dict[str, Array]:
     return matrices
 
 
-_MATRICES = "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels, or an object of them by picture"
+_MATRICES = (
+    "[[fx, 0, cx], [0, fy, cy], [0, 0, 1]] in pixels, or an object with one matrix per image name"
+)
 
 
 def read_groups(path: str | Path) -> dict[str, str]:
@@ -169,11 +171,13 @@ def read_groups(path: str | Path) -> dict[str, str]:
         with Path(path).open(encoding="utf-8", newline="") as file:
             rows = [row for row in csv.reader(file) if row]
     except (UnicodeDecodeError, csv.Error) as error:
-        raise TruthError(path, f"no CSV ({error!s:.80})", "lines picture,group") from error
+        raise TruthError(path, f"no CSV ({error!s:.80})", "lines image,group") from error
     groups: dict[str, str] = {}
     for number, row in enumerate(rows, 1):
         if len(row) != 2 or not row[1].strip() or row[0] in groups:
-            raise TruthError(f"{path}: line {number}", f"{row!s:.60}", "picture,group, each once")
+            raise TruthError(
+                f"{path}: line {number}", f"{row!s:.60}", "image,group, each image once"
+            )
         groups[row[0]] = row[1].strip()
     return groups
 
@@ -190,9 +194,9 @@ def unknown_unit(depth: str, reading: Reading) -> SceneGenError:
     if reading.kind == "disparity":
         found = f"disparity with a median of {middle:g}, and no focal length or baseline"
         wanted = "depth = focal length in pixels x baseline in metres / disparity"
-        hint = "say --focal-baseline N, their product; and --disparity-offset, if there is one"
+        hint = "use --focal-baseline N, their product, and --disparity-offset if needed"
         return TruthError(path, found, wanted, hint)
     guesses = (says for factor, says in GUESSES if USUAL[0] <= middle / factor <= USUAL[1])
     guess = next(guesses, "--unit m, cm or mm, or --scale")
     found = f"a median of {middle:g}, and no unit" if len(known) else "no depth above 0"
-    return TruthError(path, found, "the unit of depth", f"say {guess}, if that is what it is")
+    return TruthError(path, found, "the unit of depth", f"use {guess}, if it applies")

@@ -78,14 +78,14 @@ def _matching(folder: Path, pattern: str) -> list[Path]:
     """Return the files of a pattern below a folder, in order. Raises TruthError for none."""
     paths = files_below(folder, pattern)
     if not paths:
-        raise TruthError(folder, "none of its files", f"a folder that holds {pattern}")
+        raise TruthError(folder, "none of its files", f"a folder with {pattern}")
     return paths
 
 
 def _other(path: Path, what: str) -> Path:
     """Return the path of a file that belongs to a picture. Raises TruthError where it is not."""
     if not path.is_file():
-        raise TruthError(path, f"no {what}", "a file beside its picture")
+        raise TruthError(path, f"no {what}", "a file next to its image")
     return path
 
 
@@ -116,7 +116,7 @@ def moge(folder: Path, _split: Path | None) -> Iterator[Source]:
     for place in folders:
         picture = next((p for p in (place / "image.jpg", place / "image.png") if p.is_file()), None)
         if picture is None:
-            raise TruthError(place, "no image.jpg", "a picture beside its depth.png")
+            raise TruthError(place, "no image.jpg", "an image next to its depth.png")
         name = _below(folder, place)
         yield _row(name, name.rpartition("/")[0] or name, picture, _of_moge, place)
 
@@ -176,7 +176,7 @@ def _of_nyu(path: Path, depths: str, i: int) -> Measured:
         with open_unchecked(path, "labelled .mat of NYU Depth V2") as file:
             image, depth = (StoredArray(file[name])[i] for name in ("images", depths))
     except HDF5_ERRORS as error:
-        raise TruthError(f"{path}: picture {i + 1}", f"{error!s:.80}", "one to read") from error
+        raise TruthError(f"{path}: image {i + 1}", f"{error!s:.80}", "one to read") from error
     picture = np.ascontiguousarray(image.transpose(2, 1, 0))
     return Measured(picture, depth.T, NYU_CAMERA if depth.T.shape == (480, 640) else None)
 
@@ -193,7 +193,7 @@ def _nyu_split(path: Path, count: int) -> list[int]:
     except Exception as error:  # of a reader of many formats
         raise TruthError(path, f"no testNdxs ({error!s:.60})", "splits.mat of NYU") from error
     if not len(numbers) or numbers.min() < 0 or numbers.max() >= count:
-        raise TruthError(path, "numbers of other pictures", f"1 to {count}")
+        raise TruthError(path, "numbers of other images", f"1 to {count}")
     return [int(number) for number in numbers]
 
 
@@ -227,7 +227,7 @@ def kitti(folder: Path, split: Path | None) -> Iterator[Source]:
         drive, frame, side = key
         if key not in pictures:
             expected = f"{drive[:10]}/{drive}/image_0{side}/data/{frame}.png"
-            raise TruthError(folder, f"no picture of {drive}, frame {frame}", expected)
+            raise TruthError(folder, f"no image of {drive}, frame {frame}", expected)
         calibration = pictures[key].parents[3] / "calib_cam_to_cam.txt"
         name = f"{drive}_{frame}" + f"_image_0{side}" * (side == RIGHT)
         measure = partial(_of_kitti, side)
@@ -311,7 +311,7 @@ def sintel(folder: Path, _split: Path | None) -> Iterator[Source]:
     """
     for path in _matching(folder, "*/depth/*/frame_*.dpt"):
         scene, root = path.parent.name, path.parents[2]
-        picture = _other(root / "final" / scene / f"{path.stem}.png", "picture of the final pass")
+        picture = _other(root / "final" / scene / f"{path.stem}.png", "image of the final pass")
         camera = root / "camdata_left" / scene / f"{path.stem}.cam"
         yield _row(f"{scene}_{path.stem}", scene, picture, _of_sintel, path, camera)
 

@@ -27,18 +27,18 @@ def describe(path: str | Path) -> str:
         facts = {
             "format": f"{texts['format']} {texts['format_version']}",
             "written by": texts["writer"],
-            "source": texts["source"] or "not told",
-            "license": texts["license"] or "not told",
+            "source": texts["source"] or "-",
+            "license": texts["license"] or "-",
             "groups": str(len(np.unique(truth.groups))),
             "sizes": ", ".join(f"{h}x{w}" for h, w in sorted(set(sizes))[:8]),
             "depth": f"{low:.3g} to {high:.3g} m, median {middle:.3g}, of {len(rows)} images",
-            "measured": f"{share.min():.1%} to {share.max():.1%} of the pixels",
-            "cameras": f"known of {cameras} of {len(rows)} images",
-            "truth digest": texts[TRUTH_DIGEST],
-            "content digest": texts[CONTENT_DIGEST],
+            "measured": f"{share.min():.1%} to {share.max():.1%} of the pixels per image",
+            "cameras": f"known for {cameras} of {len(rows)} images",
+            "truth hash": texts[TRUTH_DIGEST],
+            "content hash": texts[CONTENT_DIGEST],
             "conventions": texts["conventions"],
         }
         size = size_text(Path(path).stat().st_size)
         parts = [*fact_lines(facts), "", *column_lines(truth)]
-    lines = [f"{path}: {len(sizes)} images of measured truth, {size}", ""]
+    lines = [f"{path}: {len(sizes)} images with measured ground truth, {size}", ""]
     return "\n".join(map(printable, (*lines, *(f"  {line}" for line in parts))))

@@ -20,7 +20,7 @@ CONVENTIONS = (
 FORMAT = Format(
     FORMAT_NAME,
     "1.0",
-    "file of measured truth",
+    "file of measured ground truth",
     {
         "writer": ".+",
         "source": ".*",

@@ -66,34 +66,34 @@ GARG = Crop("fractions", (0, 0), 0.40810811, 0.99189189, 0.03594771, 0.96405229)
 EIGEN = Crop("fractions", (0, 0), 0.3324324, 0.91351351, 0.0359477, 0.96405229)
 KB = Crop("bottom", (352, 1216))
 TO_10, TO_80 = (1e-3, 10.0), (1e-3, 80.0)
-_BTS = "evaluation code of Lee et al. 2019 (BTS)"
-_MONODEPTH2 = "evaluation code of Godard et al. 2019 (Monodepth2)"
-_MARIGOLD = "evaluation code of Ke et al. 2024 (Marigold)"
+_BTS = "Lee et al. 2019 (BTS)"
+_MONODEPTH2 = "Godard et al. 2019 (Monodepth2)"
+_MARIGOLD = "Ke et al. 2024 (Marigold)"
 _MIDAS = "Ranftl et al. 2020 (MiDaS), section 5"
-_DPT = "the sample code that DPT's EVALUATION.md names for"
-_MOGE = "evaluation code of Wang et al. 2025 (MoGe); here all pixels are fitted, not 64x64"
-DECLARED = Protocol("declared", "this benchmark: all that was measured, aligned as the submission"
-                    " declares", alignment=None)  # fmt: skip
+_DPT = "DPT's sample code for"
+_MOGE = "Wang et al. 2025 (MoGe), fitted to all pixels"
+DECLARED = Protocol("declared", "all measured pixels, aligned as the submission declares",
+                    alignment=None)  # fmt: skip
 PROTOCOLS = (
     DECLARED,
     Protocol("nyu-eigen", _BTS, (NYU,), *TO_10, clip=TO_10),
-    Protocol("nyu-eigen-pixels", "the formulas of Eigen et al. 2014, whose T are all pixels of the"
-             " test set; crop and range as nyu-eigen", (NYU,), *TO_10, clip=TO_10, mean="pixels"),
+    Protocol("nyu-eigen-pixels", "Eigen et al. 2014, over all pixels of the test set", (NYU,),
+             *TO_10, clip=TO_10, mean="pixels"),
     Protocol("kitti-eigen", _BTS, (EIGEN,), *TO_80, clip=TO_80),
     Protocol("kitti-eigen-garg", _BTS, (GARG,), *TO_80, clip=TO_80),
     Protocol("kitti-eigen-garg-median", _MONODEPTH2, (GARG,), *TO_80, "median_scale", TO_80),
-    Protocol("kitti-kb", "the size of the KITTI depth benchmark's pictures, Uhrig et al. 2017, cut"
-             " as BTS and Marigold do; no other crop", (KB,), *TO_80, clip=TO_80),
+    Protocol("kitti-kb", "image size of the KITTI depth benchmark, Uhrig et al. 2017", (KB,),
+             *TO_80, clip=TO_80),
     Protocol("affine-depth", f"{_MARIGOLD}, as for ETH3D", (), 1e-5, np.inf, "scale_shift",
              (1e-5, np.inf)),
     Protocol("affine-depth-nyu", _MARIGOLD, (NYU,), *TO_10, "scale_shift", TO_10),
     Protocol("affine-depth-kitti", _MARIGOLD, (KB, EIGEN), 1e-5, 80.0, "scale_shift",
              (1e-5, 80.0)),
-    Protocol("affine-disparity", f"{_MIDAS}; depth is capped at the largest true one, as MoGe does",
+    Protocol("affine-disparity", f"{_MIDAS}; depth capped at the largest true one",
              alignment="disparity_scale_shift"),
     Protocol("affine-disparity-10m", f"{_MIDAS}; {_DPT} NYUv2", (), 0.0, 10.0,
              "disparity_scale_shift", (0.0, 10.0)),
-    Protocol("affine-disparity-80m", f"{_MIDAS}; {_DPT} KITTI, which scores farther depths, too",
+    Protocol("affine-disparity-80m", f"{_MIDAS}; {_DPT} KITTI",
              alignment="disparity_scale_shift", clip=(0.0, 80.0)),
     Protocol("moge", _MOGE, alignment="scale_shift_l1"),
     Protocol("moge-scale", _MOGE, alignment="scale_l1"),

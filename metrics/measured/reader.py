@@ -31,7 +31,7 @@ class MeasuredView:
     """The truth of one image, in its own size.
 
     Attributes:
-        depth: planar depth, (H, W), metres; NaN where nothing was measured.
+        depth: planar depth, (H, W), metres; NaN where nothing is measured.
         normal: (H, W, 3), camera frame (x right, y up, z towards the viewer), 0 where nothing was
             measured; None without normals.
         rays: directions of the pixels in the camera frame, (H, W, 3), with z = -1; None where the
@@ -117,7 +117,7 @@ class MeasuredFile(RowFile):
         wrong = ~((known & (depth > 0) & inside) | np.isnan(depth))
         if wrong.any() or not known.any():
             found = f"{np.count_nonzero(wrong)} wrong pixels" if wrong.any() else "no pixel"
-            expected = "depth above 0 somewhere, and NaN where nothing was measured"
+            expected = "depth above 0 somewhere, and NaN where nothing is measured"
             raise FileFormatError(self.place("depth", row), found, expected)
         normal = stored[1][:height, :width] if len(stored) > 1 else None
         if normal is not None:

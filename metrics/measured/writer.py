@@ -71,7 +71,7 @@ def write_measured(
     Raises TruthError, naming the picture, what was found and what was expected; OSError.
     """
     if not sources:
-        raise TruthError(path, "no pictures", "at least one")
+        raise TruthError(path, "no images", "at least one")
     height, width = (max(source.size[side] for source in sources) for side in (0, 1))
     if height * width > MAX_PIXELS:
         found, expected = f"{height}x{width} for all images", f"at most {MAX_PIXELS:,} pixels"
@@ -91,7 +91,7 @@ def write_measured(
             table.append(row)
             table.write_packed(WAITING)
             progress(1)
-        assert table is not None, "there are pictures"
+        assert table is not None, "there are images"
         digests = {n: str(d.attrs[SHA256]) for n, d in table.datasets.items() if n in SCORED}
         file.attrs.update({**texts, TRUTH_DIGEST: joint_digest(digests)})
         seal(file)
@@ -104,9 +104,9 @@ def _row(item: Source, measured: Measured, height: int, width: int) -> dict[str,
         found = f"shape {image.shape}, {image.dtype}"
         raise TruthError(f"{item.name}: image", found, f"({item.size[0]}, {item.size[1]}, 3) bytes")
     if depth.shape != image.shape[:2]:
-        found, expected = f"shape {depth.shape}", f"{image.shape[:2]}, as the picture"
+        found, expected = f"shape {depth.shape}", f"{image.shape[:2]}, as the image"
         turned = depth.shape == image.shape[1::-1]
-        hint = "EXIF data may turn the picture: turn the depth, too" if turned else ""
+        hint = "EXIF data may rotate the image: rotate the depth as well" if turned else ""
         hint = hint or "depth is never resampled here"
         raise TruthError(f"{item.name}: depth", found, expected, hint)
     with np.errstate(over="ignore", invalid="ignore"):

@@ -73,6 +73,22 @@ def align(p: Array, t: Array, alignment: Alignment, cap: float | None = None) ->
     return np.asarray(scale * unit + shift)
 
 
+def scale_and_shift(p: Array, t: Array, alignment: Alignment) -> tuple[float, float]:
+    """Return the scale and the shift by which `align` maps p to t, under none, scale, scale_shift.
+
+    Without points, nothing changes.
+    """
+    if alignment == "none" or not len(p):
+        return 1.0, 0.0
+    if alignment == "scale":
+        return _ratio(float(p @ t), float(p @ p)), 0.0
+    if alignment != "scale_shift":
+        raise MeasureError("alignment of layers", alignment, "none, scale or scale_shift")
+    centred = p - p.mean()
+    scale = _ratio(float(centred @ (t - t.mean())), float(centred @ centred))
+    return scale, float(t.mean() - scale * p.mean())
+
+
 def depth_of_disparity(d: Array, t: Array, cap: float | None = None) -> Array:
     """Return depth (N,) of disparity (N,), known up to scale and shift, fitted to the true depth.
 

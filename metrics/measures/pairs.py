@@ -136,7 +136,7 @@ def _sampled(mask: Mask, scale: int) -> tuple[Array, Mask]:
     chosen = order[squares[..., order].argmax(axis=-1)]
     rows = np.arange(tall)[:, None] * scale + chosen // scale
     columns = np.arange(wide) * scale + chosen % scale
-    valid = squares.any(axis=-1)
+    valid = np.asarray(squares.any(axis=-1))
     return np.where(valid, rows * width + columns, 0), valid
 
 

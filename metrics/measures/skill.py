@@ -56,7 +56,7 @@ def skill_intervals(
     require_finite(errors, "scores")
     require_finite(lines, "floors")
     score, floor = errors.mean(axis=0), lines.mean(axis=0)
-    require((floor > 0.0).all(), "mean of the floors", floor.min(), "above 0")
+    require((floor > 0.0).all(), "mean of the baselines", floor.min(), "above 0")
     if len(errors) == 1:
         return np.full(len(score), np.nan), np.full(len(score), np.nan)
     apart = errors - score / floor * lines

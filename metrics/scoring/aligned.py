@@ -32,25 +32,27 @@ class AlignmentError(SceneGenError):
     """Scores that no single alignment brings together."""
 
 
-def common_alignment(files: Sequence[ScoreFile], chosen: Alignment | None = None) -> Alignment:
-    """Return the alignment for all files: the loosest one that a method declares, or `chosen`.
+def common_alignment(
+    declared: Sequence[tuple[str, Alignment]], chosen: Alignment | None = None
+) -> Alignment:
+    """Return the alignment for all methods: the loosest one that a method declares, or `chosen`.
 
     Raises AlignmentError where the chosen one is tighter than that, or where two methods leave the
     same open in different ways: a shift of depth and one of disparity.
     """
-    most = max(FITTED[file.alignment] for file in files)
-    loosest = sorted({file.alignment for file in files if FITTED[file.alignment] == most})
+    most = max(FITTED[alignment] for _, alignment in declared)
+    loosest = sorted({alignment for _, alignment in declared if FITTED[alignment] == most})
     if chosen is not None:
         if FITTED[chosen] < most:
-            who = next(file for file in files if file.alignment == loosest[0])
-            found = f"{chosen}, but {who.method} is scored after {loosest[0]}"
+            who = next(method for method, alignment in declared if alignment == loosest[0])
+            found = f"{chosen}, but {who} is scored after {loosest[0]}"
             raise AlignmentError("alignment", found, f"{loosest[0]}, or a looser one")
         return chosen
     if len(loosest) == 1:
         return loosest[0]
     if most == 1:
         return "scale"
-    found = f"{' and '.join(loosest)}, of {' and '.join(file.method for file in files)}"
+    found = f"{' and '.join(loosest)}, of {' and '.join(method for method, _ in declared)}"
     hint = "compare methods that predict disparity apart from those that predict depth"
     raise AlignmentError("alignment", found, "one that all methods can be scored after", hint)
 
@@ -62,9 +64,13 @@ def aligned(files: Sequence[ScoreFile], chosen: Alignment | None = None) -> list
     under their plain names, and those that such a fit does not change. Baselines that are fitted as
     methods are come from a file that was scored under the common alignment.
     """
-    alignment = common_alignment(files, chosen)
+    alignment = common_alignment(_declared(files), chosen)
     like = next((file for file in files if file.alignment == alignment), None)
     return [_under(file, alignment, like) for file in files]
+
+
+def _declared(files: Sequence[ScoreFile]) -> list[tuple[str, Alignment]]:
+    return [(file.method, file.alignment) for file in files]
 
 
 def _under(file: ScoreFile, alignment: Alignment, like: ScoreFile | None) -> ScoreFile:
@@ -96,9 +102,9 @@ def again(alignment: Alignment) -> str:
 
 
 def left_out(files: Sequence[ScoreFile], shown: Sequence[str]) -> list[str]:
-    """Return in a sentence which headline scores of files, as scored, `aligned` cannot compare."""
+    """Return which main metrics of files, as scored, `aligned` cannot compare."""
     lost = [n for n in files[0].headline if n not in shown and any(n in f.items for f in files)]
     if not lost or len({file.alignment for file in files}) < 2:
         return []
-    advice = again(common_alignment(files))
-    return [f"not compared: {', '.join(lost)}, as the files have other alignments: {advice}"]
+    advice = again(common_alignment(_declared(files)))
+    return [f"not compared: {', '.join(lost)}, because the declared alignments differ; {advice}"]

@@ -230,8 +230,8 @@ def skills(
     column_of = {name: floor_column(items, scene, name, shown) for name in SKILLED if name in items}
     names = [name for name, column in column_of.items() if column is not None]
     of_objects = [name for name in OBJECT_SCORES if name in items]
-    shown = any(np.isfinite(items[name]).any() for name in of_objects)
-    if weights is None and of_objects and not shown:
+    seen = any(np.isfinite(items[name]).any() for name in of_objects)
+    if weights is None and of_objects and not seen:
         return {}
     skill_of: dict[str, Skill] = {}
     pairs = {name: np.stack([items[name], items[str(column_of[name])]]) for name in names}
@@ -268,7 +268,7 @@ def skills(
                     (perfect - errors[:, [k]])[:, 0], low, high, metric(name).unit
                 )
                 low = (low - float(floor[k])) / (1.0 - float(floor[k]))
-            span = finite(min(low, value)), finite(max(high, value))
+            span = finite(min(low, value)), finite(min(max(high, value), 1.0))  # none is above 1
             if all(abs(end) <= ROUNDING for end in (value, *span) if end is not None):
                 value = 0.0
                 span = None if span[0] is None else 0.0, None if span[1] is None else 0.0
@@ -310,7 +310,7 @@ def question_skill(
         return None
     floor, name = found
     value = skill(score.value, floor, higher_is_better=True)
-    assert value is not None, "no floor is perfect"
+    assert value is not None, "no baseline is perfect"
     low, high = (
         None if end is None else skill(end, floor, higher_is_better=True)
         for end in (score.low, score.high)

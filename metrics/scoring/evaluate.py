@@ -112,16 +112,22 @@ def score_protocols(runs: Runs, settings: Settings, progress: Progress) -> list[
     return _unchanged(runs, score_measured(_measured(runs), settings, progress, all_protocols=True))
 
 
+def allowed_alignments(file: RoomPredictions) -> set[Alignment]:
+    """Return the alignments a submission can be scored under: its own one, and looser ones."""
+    if file.kind == "disparity":
+        return {"disparity_scale_shift"}
+    allowed = {file.alignment, *alignments_scored(file.kind, file.alignment)}
+    return allowed & {file.alignment, "scale", "scale_shift"} if file.kind == "points" else allowed
+
+
 def _align(files: Sequence[Predictions], alignment: Alignment | None) -> None:
     """Score files under an alignment that is as loose as theirs. Raises ScoringError for others."""
     for file in files if alignment is not None else ():
         if not isinstance(file, RoomPredictions):
-            raise ScoringError(file.path, f"answers under --align {alignment}", "depth or points")
-        allowed = {file.alignment, *alignments_scored(file.kind, file.alignment)}
-        if file.kind == "points":
-            allowed &= {file.alignment, "scale", "scale_shift"}
-        if file.kind == "disparity":
-            allowed = {"disparity_scale_shift"}
+            raise ScoringError(
+                file.path, f"responses to questions, with --align {alignment}", "depth or points"
+            )
+        allowed = allowed_alignments(file)
         if alignment not in allowed:
             found = f"{file.kind} under {file.alignment}, scored under {alignment}"
             raise ScoringError(file.path, found, f"one of {', '.join(sorted(allowed))}")
@@ -138,7 +144,7 @@ def _unchanged(runs: Runs, scores: Result) -> Result:
 def _measured(runs: Runs) -> MeasuredRuns:
     """Raise ProtocolError for truth that is exact, and has no pixels or ranges to choose."""
     if not isinstance(runs, MeasuredRuns):
-        expected = "measured truth, as `bench truth` makes it"
+        expected = "measured ground truth, as `bench truth` makes it"
         raise ProtocolError("protocol", f"one for {runs.truth.path}", expected)
     return runs
 

@@ -1,6 +1,6 @@
 """Depth and points of any kind of predicted geometry, as every score takes them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +42,8 @@ def fitted_geometry(
     height, width = true_depth.shape
     rays = pixel_directions(height, width, fov_y_degrees)[mask]
     true = true_depth[mask].astype(np.float64)
+    if predicted.kind == "layers":
+        predicted = replace(predicted, kind="depth", geometry=predicted.geometry[..., 0])
     depth = np.full(true_depth.shape, np.nan)
     if predicted.kind == "points":
         points = predicted.geometry[mask].astype(np.float64)
@@ -66,6 +68,8 @@ def depth_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees: 
 def points_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees: float) -> Array:
     """Return points (H, W, 3) as scores see them, NaN where one of both is not finite."""
     known = np.isfinite(true_depth)
+    if predicted.kind == "layers":
+        predicted = replace(predicted, kind="depth", geometry=predicted.geometry[..., 0])
     finite = np.isfinite(predicted.geometry)
     known &= finite.all(axis=-1) if predicted.kind == "points" else finite
     image = np.full((*known.shape, 3), np.nan)

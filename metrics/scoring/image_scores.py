@@ -232,7 +232,8 @@ def _floors(
     }
     if truth.room_size is not None:  # of a leaning cut-out, but for each object's shift
         floors[f"{LEANING}shape_error"] = flat_error((empty / 2.0 - truth.depth)[at], inside[at])
-    rays = pixel_directions(*mask.shape, fov)[mask]
+    height, width = mask.shape
+    rays = pixel_directions(height, width, fov)[mask]
     down = (np.nonzero(mask)[0] + 0.5) / len(mask)
     at = truth.object_id[mask] > 0
     near, weights = room.depth[mask] - true, at / true
@@ -401,11 +402,12 @@ def scores_of_pairs(
     """Return the scores of pairs of pixels, and SAWA-H, of aligned depth (H, W) and its points."""
     normals, ordinal = relative_normal_scores(points, pairs), ordinal_scores(depth, order)
     fits: tuple[Alignment, ...] = ("disparity_scale_shift", "scale_shift")
-    within = [within_eighth(pair, fit) for fit in fits]
+    of_disparity, of_depth = (within_eighth(pair, fit) for fit in fits)
     unordered = 1.0 - ordinal["anywhere"]
     scores = {"relative_normal_degrees": normals["relative_normal_degrees"]}
     scores |= {name: value for name, value in ordinal.items() if name != "anywhere"}
-    return scores | {"sawa_h": sawa_h(unordered, *within, boundary_f1, normals["anywhere"])}
+    hybrid = sawa_h(unordered, of_disparity, of_depth, boundary_f1, normals["anywhere"])
+    return scores | {"sawa_h": hybrid}
 
 
 def scores_of_confidence(
@@ -523,7 +525,8 @@ def _scores_of_points(
     mask, points, true = truth.mask, geometry.points, reference.surface.points
     scores = point_map_scores(points, true)
     if not geometry.on_rays:
-        rays = pixel_directions(*mask.shape, truth.fov_y_degrees)[mask]
+        height, width = mask.shape
+        rays = pixel_directions(height, width, truth.fov_y_degrees)[mask]
         scores["ray_error_degrees"] = ray_error_degrees(points, rays)
     for after in ("scale", "scale_shift"):
         if after in alignments:

@@ -1,4 +1,4 @@
-"""The named test sets: one table of them, for rooms and for questions.
+"""The named benchmarks: one table of them, for rooms and for questions.
 
 The benchmark knows a set by the digest of its truth, wherever its files lie. A set whose digest
 changes gets a new version; the old one stays listed, so that scores on it keep their name.
@@ -45,9 +45,13 @@ _RENDER = "scenegen render --n 300 --views 0,5,35,55,80"
 _QUESTIONS = "iqtt make-split --preset suite --train 0 --labeled 0 --val 0 --test 500"
 _ROOMS = {  # purpose, rows, command
     "sample-1": ("the rooms in examples/sample", 8, "scenegen render --n 8 --size 48"),
-    "rooms-1": ("the headline: basic shapes", 1500, f"{_RENDER} --seed 1000 --size 64"),
+    "rooms-1": (
+        "main benchmark: rooms with basic shapes",
+        1500,
+        f"{_RENDER} --seed 1000 --size 64",
+    ),
     "rooms-shadows-1": (
-        "other rooms of this kind, where objects cast shadows",
+        "basic shapes that cast shadows, in other rooms",
         1500,
         f"{_RENDER} --seed 2000 --size 64 --shadows",
     ),
@@ -58,10 +62,11 @@ _ROOMS = {  # purpose, rows, command
         f"{_RENDER} --seed 1000 --size 64 --preset shapenet --object-split test",
     ),
     "interiors-512-1": (
-        "furnished rooms, for networks that were trained on photographs",
+        "furnished rooms, for networks trained on photographs",
         400,
         "scenegen render --preset interiors --n 100 --views 0,10,20,30 --seed 1000 --size 512"
-        " --object-split test --spp 16 --denoise",
+        # Shards, as an interrupted command keeps those that are complete.
+        " --object-split test --spp 16 --denoise --shard-size 10",
     ),
 }
 # Digests of truth and pictures. `bench sets make NAME` prints those of the files that it makes.
@@ -141,7 +146,15 @@ KNOWN_TESTS = (
         for name, (purpose, rows, command) in _ROOMS.items()
     ),
     *(
-        KnownTest(name, "iqtt", truth, 500, _QUESTIONS, "mental rotation, by kind", pictures)
+        KnownTest(
+            name,
+            "iqtt",
+            truth,
+            500,
+            _QUESTIONS,
+            "mental-rotation questions, by distractor type",
+            pictures,
+        )
         for name, (truth, pictures) in _DIGESTS.items()
         if name.startswith("rotation-1/")
     ),

@@ -2,10 +2,12 @@
 
 To add a metric: write its function in `metrics.measures`, call it where images are scored, and add
 a row here. All lists of metrics are read from these rows: the order in files and tables, what is
-printed first, units, directions, bounds, baselines of skills, roots, and the table of
-`docs/scores.md`, which `python -m metrics.scoring.metric_names` prints.
+printed first, units, directions, bounds, baselines of skills, roots, and `docs/data/metrics.csv`,
+which `python -m metrics.scoring.metric_names` prints.
 """
 
+import csv
+import io
 import itertools
 import math
 import re
@@ -48,61 +50,80 @@ EMPTY_ROOM, CUT_OUT, LEANING = "empty_room_", "cut_out_", "leaning_"
 BALLS, BLOCKS, FLAT, RAMP = "balls_", "blocks_", "flat_", "ramp_"
 OTHER_SCENE, HALF, LIFTED = "other_scene_", "half_resolution_", "lifted_"
 RANDOM_ORDER, EDGE_DISTANCE = "random_order_", "edge_distance_"
+CONSTANT, SIZED = "constant_thickness_", "size_thickness_"
+INFLATED, MIRRORED = "inflated_mask_", "mirrored_front_"
+_GIVEN = " behind the true front, in the true mask, by the factor that is best for the image."
 _BLIND = (
-    " that sees no picture, fitted as predictions are, in least squares for L1, and by scale and"
-    " shift where nothing is."
+    " without the image, fitted as predictions are; by least squares in place of L1, and by scale"
+    " and shift in place of no alignment."
 )
 BASELINES = {
     EMPTY_ROOM: Baseline(
-        "empty room", "room without objects", "the empty room, drawn from the true camera.",
+        "empty room", "no objects", "the empty room, drawn from the true camera.",
         needs="no_view",
     ),
     CUT_OUT: Baseline(
-        "cut-out", "each object flat at its true median depth",
+        "cut-out", "flat objects at their true depth",
         "flat cut-outs, each at its object's median depth; of normals, each object's mean true"
         " normal.",
     ),
     LEANING: Baseline(
-        "leaning cut-out", "a cut-out that leans half as much as the wall behind it",
-        "cut-outs that lean half as much as the walls behind them, in closed rooms alone.",
+        "leaning cut-out", "cut-out slanted half as much as the wall behind it",
+        "cut-outs slanted half as much as the walls behind them, in closed rooms only.",
     ),
     LIFTED: Baseline(
-        "lifted masks", "true masks, moved before the empty room by one fitted distance",
-        "the true masks of objects, moved before the empty room by one distance that is fitted to"
-        " the truth of each image.",
+        "lifted masks", "true masks at one fitted distance",
+        "the true masks of objects, moved in front of the empty room by one distance that is fitted"
+        " to the ground truth of each image.",
     ),
     FLAT: Baseline(
-        "constant", "one depth for all pixels, fitted as predictions are",
+        "constant", "one fitted depth per image",
         f"one depth for all pixels,{_BLIND}",
     ),
     RAMP: Baseline(
-        "ramp", "depth that falls to the lower edge, fitted as predictions are",
-        f"depth that falls evenly to the lower edge,{_BLIND}",
+        "ramp", "depth that falls linearly to the bottom edge, fitted",
+        f"depth that falls evenly to the lower image border,{_BLIND}",
     ),
     BALLS: Baseline(
-        "balls", "a ball for each object of the first view",
-        "balls in place of the first view's objects.", needs="first_view",
+        "balls", "a sphere proxy per object of the first view",
+        "sphere proxies of the first view's objects.", needs="first_view",
     ),
     BLOCKS: Baseline(
-        "blocks", "a block for each object of the first view",
-        "blocks in place of the first view's objects.", needs="first_view",
+        "blocks", "a box proxy per object of the first view",
+        "box proxies of the first view's objects.", needs="first_view",
+    ),
+    CONSTANT: Baseline(
+        "constant thickness", "true masks and fronts, one thickness for the image",
+        f"one thickness for all objects{_GIVEN}",
+    ),
+    SIZED: Baseline(
+        "thickness by size", "true masks and fronts, thickness by the size of the mask",
+        f"a thickness proportional to the square root of the mask's area{_GIVEN}",
+    ),
+    INFLATED: Baseline(
+        "inflated masks", "true masks and fronts, as thick as round bodies",
+        f"bodies that are round over the masks, as thick as 2 sqrt(e (2 r - e)){_GIVEN}",
+    ),
+    MIRRORED: Baseline(
+        "mirrored front", "true masks and fronts, mirrored",
+        "the true front of each object, mirrored at its farthest visible depth.",
     ),
     HALF: Baseline(
-        "half resolution", "the true depth at half the resolution, enlarged again",
-        "the true depth, halved by means of 2 x 2 pixels and doubled again, bilinear.",
+        "half resolution", "ground-truth depth, downsampled and upsampled by 2",
+        "the true depth, averaged over 2 x 2 pixels and enlarged bilinearly.",
     ),
     OTHER_SCENE: Baseline(
-        "shuffled", "this prediction against another scene",
-        "the same prediction with the relief of another scene, seen in the same view.",
+        "shuffled", "another scene",
+        "the same prediction against the relief of another scene in the same view.",
         of_truth=False,
     ),
     RANDOM_ORDER: Baseline(
         "random order", "confidence in a random order",
-        "a confidence that says nothing.", of_truth=False,
+        "a confidence in random order.", of_truth=False,
     ),
     EDGE_DISTANCE: Baseline(
-        "edge distance", "distance to the nearest edge of the image's brightness as confidence",
-        "the distance from the nearest edge of brightness as confidence.", of_truth=False,
+        "edge distance", "distance to the nearest brightness edge as confidence",
+        "the distance from the nearest brightness edge as confidence.", of_truth=False,
     ),
 }  # fmt: skip
 OF_TRUTH = tuple(begins for begins, baseline in BASELINES.items() if baseline.of_truth)
@@ -110,10 +131,11 @@ _SEEN: Sequence[Shown] = ("no_view", "first_view", "scored_view")  # ever more
 
 Lacking = Literal[
     "", "objects", "relief", "inside", "bends", "behind", "boundary", "planes", "partner", "edges",
-    "pairs", "order", "order within", "order between",
+    "pairs", "order", "order within", "order between", "solids",
+    "layer 3", "layer 4",
 ]  # fmt: skip
 # The kinds of test sets, which differ in their headline: `ScoreFile.kind`.
-KINDS = ("rooms", "interiors", "measured", "iqtt")
+KINDS = ("rooms", "interiors", "layers", "measured", "iqtt")  # layers: of either kind of rooms
 
 
 @dataclass(frozen=True)
@@ -144,7 +166,8 @@ class Metric:
             "boundary", those whose true depth nowhere jumps; "planes", those in which no pixel has
             a reliable normal from its depth; "partner", those whose view no other scene has;
             "edges", those without an occlusion edge; "pairs" and "order", those without the pairs
-            of pixels that `measures.pairs` compares; else "".
+            of pixels that `measures.pairs` compares; "solids", those in which no ray first
+            meets a solid; "layer 3" and "layer 4", those without such layers; else "".
         unchanged_by: what may be fitted to the truth without a change of the value.
         signed: whether the value is a bias, which is best at 0 and ranks nothing.
     """
@@ -153,7 +176,9 @@ class Metric:
     title: str
     unit: str
     definition: str
-    of: Literal["points", "depth", "normals", "field of view", "answers", "confidence"] = "depth"
+    of: Literal[
+        "points", "depth", "normals", "field of view", "answers", "confidence", "layers"
+    ] = "depth"
     higher_is_better: bool = False
     largest: float = math.inf
     smallest: float = 0.0
@@ -246,6 +271,7 @@ _INSIDE: dict[str, Any] = {"lacking": "inside", "redefined": True}
 _BEHIND = _SURFACE | {"lacking": "behind"}
 _OBJECT: dict[str, Any] = {"lacking": "objects", "of_objects": True}
 _RELIEF = _SURFACE | {"lacking": "relief", "baselines": (OTHER_SCENE,)}
+_LAYERS: dict[str, Any] = {"of": "layers", "lacking": "solids"}
 # Tops and fronts of furniture are parallel to floor and walls, so the empty room may be better.
 _FLAT_OR_EMPTY = (CUT_OUT, EMPTY_ROOM)
 
@@ -269,8 +295,9 @@ TABLE: Sequence[Metric] = (
            "larger of the 95th percentiles of the distances from predicted points to the true"
            " surface and from there to predicted points.", **_SURFACE),
     _share(F_SCORE, "F-score",
-           "harmonic mean of the fraction of predicted points nearer than the threshold (scene"
-           " units) to the true surface, and of the fraction of that nearer to them.", **_SURFACE),
+           "harmonic mean of precision (predicted points nearer than the threshold, in scene units,"
+           " to the true surface) and recall (true surface nearer than that to a predicted point).",
+           **_SURFACE),
     _error("paper_chamfer", "Chamfer, as in the paper",
            "mean distance from the predicted points to the nearest true point, plus that from the"
            " true points to the nearest predicted point.", **_PAPER),
@@ -290,7 +317,7 @@ TABLE: Sequence[Metric] = (
            **_DEPTH),
     _error("silog", "SILog",
            "standard deviation of ln predicted - ln true depth, times 100; predicted depths up to"
-           " 0.001 count as 0.001 and are left out of the mean it subtracts.", "100 ln",
+           " 0.001 count as 0.001 and are left out of the subtracted mean.", "100 ln",
            headline={"measured": 4}, **_BLINDLY, **_DEPTH),
     _share("delta_1", "delta 1",
            "fraction of pixels whose predicted and true depth differ by a factor below 1.25.",
@@ -306,21 +333,23 @@ TABLE: Sequence[Metric] = (
     _error("sq_rel", "SqRel", "mean squared difference of depth divided by true depth.",
            **_ANYWHERE),
     _error("rmse_log", "RMSE-log",
-           "root mean square of ln predicted - ln true depth; depths up to 0.001 count as 0.001, as"
-           " in the next two.", "ln", is_root=True, **_ANYWHERE),
-    _error("log10", "log10", "mean absolute difference of the decimal logarithms of depth.",
+           "root mean square of ln predicted - ln true depth; depths up to 0.001 count as 0.001.",
+           "ln", is_root=True, **_ANYWHERE),
+    _error("log10", "log10",
+           "mean absolute difference of log10 depth; depths up to 0.001 count as 0.001.",
            "log10", **_ANYWHERE),
-    _error("irmse", "iRMSE", "root mean square of 1 / predicted - 1 / true depth.",
+    _error("irmse", "iRMSE",
+           "root mean square of 1 / predicted - 1 / true depth; depths up to 0.001 count as 0.001.",
            "1 / scene unit", is_root=True, **_ANYWHERE),
     _share("boundary_f1", "Boundary F1",
-           "harmonic mean of precision and recall of pairs of neighbours whose depths differ by a"
-           " ratio above a threshold, each the mean over four directions, 0 where there is none;"
-           " weighted mean over ten thresholds from 1.05 to 1.25.", redefined=True,
+           "F1 of pairs of neighbouring pixels whose depth ratio exceeds a threshold; precision and"
+           " recall are means over four directions; weighted mean over ten thresholds from 1.05 to"
+           " 1.25.", redefined=True,
            headline={"measured": 6, "interiors": 4}, baselines=(EMPTY_ROOM, CUT_OUT),
            unchanged_by="scale", **_ANYWHERE),
     _share("boundary_recall", "Boundary recall",
-           "fraction of these pairs of the truth, in all directions together, that the prediction"
-           " has as well; the same mean, over thresholds where the truth has any.",
+           "fraction of the true pairs of `boundary_f1` that the prediction has, over all"
+           " directions; weighted mean over thresholds with true pairs.",
            lacking="boundary", redefined=True, unchanged_by="scale", **_ANYWHERE),
     _error("flying_points", "Flying points",
            "fraction of the pixels within 2 pixels of an occlusion edge whose predicted depth lies"
@@ -328,39 +357,41 @@ TABLE: Sequence[Metric] = (
            largest=1.0, lacking="edges", baselines=(HALF,)),
     _angle("relative_normal_degrees", "Relative normals",
            "mean absolute difference of predicted and true angle between the normals of two pixels"
-           " of one object, or without an edge of depth between them where objects are not known;"
-           " over pairs up to 32 pixels apart, the mean over four scales.", of="points",
+           " of one object (without object ids: no depth edge between them), up to 32 pixels apart;"
+           " mean over four scales.", of="points",
            lacking="pairs", headline={"measured": 7, "interiors": 5},
            baselines=(CUT_OUT, EMPTY_ROOM, FLAT),
            unchanged_by="scale", **_ANYWHERE),
     _share("ordinal_accuracy", "Ordinal accuracy",
            "fraction of pairs of pixels, whose true depths differ by a factor above 1.02, that the"
-           " predicted depth orders rightly.", lacking="order", **_ORDER),
+           " predicted depth orders correctly.", lacking="order", **_ORDER),
     _share("ordinal_accuracy_within", "Ordinal accuracy within objects",
-           "the same of pairs on one object.", lacking="order within", unchanged_by="scale_shift"),
+           "`ordinal_accuracy` of pairs on one object.", lacking="order within",
+           unchanged_by="scale_shift"),
     _share("ordinal_accuracy_between", "Ordinal accuracy between objects",
-           "the same of pairs on two objects, or on one and the room.", lacking="order between",
+           "`ordinal_accuracy` of pairs on two objects, or on one and the room.",
+           lacking="order between",
            unchanged_by="scale_shift"),
     _error("sawa_h", "SAWA-H",
-           "weighted sum of errors of order, of depth after two alignments, of boundaries and of"
-           " relative normals (arXiv 2510.19814), over the pairs of this benchmark.",
+           "weighted sum of errors of order, depth after two alignments, boundaries and relative"
+           " normals (arXiv 2510.19814), over the pairs of this benchmark.",
            "weighted sum", largest=SAWA_H_WORST, of="points", unchanged_by="scale", **_ANYWHERE),
     _error("scale_log2", "Scale",
            "log2 of the median over pixels of predicted divided by true depth.", "log2",
            smallest=-math.inf, signed=True, **_ANYWHERE),
     _error("points_rel", "Points, relative error",
-           "mean distance of each predicted point from the true one of its pixel, divided by the"
-           " true distance from the camera.", "ratio", headline={"measured": 5, "interiors": 3},
+           "mean distance between predicted and true point of a pixel, divided by the true distance"
+           " from the camera.", "ratio", headline={"measured": 5, "interiors": 3},
            baselines=_NO_SHAPE, **_POINT_MAP),
     _share("points_delta_1", "Points, delta 1",
-           "fraction of the pixels where that distance is below a quarter of the smaller distance"
-           " from the camera.", **_POINT_MAP),
+           "fraction of pixels where the distance between predicted and true point is below a"
+           " quarter of the smaller distance from the camera.", **_POINT_MAP),
     _error("local_points_rel", "Local points, relative error",
-           "mean over objects of the mean distance of points, after scale and shift of each object"
-           " alone, divided by its diameter.", "ratio", lacking="objects", **_SURFACE),
+           "mean over objects of the mean distance of points, after scale and shift of each object,"
+           " divided by its diameter.", "ratio", lacking="objects", **_SURFACE),
     _share("local_points_delta_1", "Local points, delta 1",
-           "mean over objects of the fraction of pixels where that ratio is below 0.25.",
-           lacking="objects", **_SURFACE),
+           "mean over objects of the fraction of pixels where the ratio of `local_points_rel` is"
+           " below 0.25.", lacking="objects", **_SURFACE),
     _angle("fov_error_degrees", "Field of view, error",
            "absolute difference of predicted and true vertical field of view.",
            of="field of view"),
@@ -371,45 +402,47 @@ TABLE: Sequence[Metric] = (
            "mean angle between the line from the camera to a predicted point and its pixel's ray;"
            " of point maps.", of="points"),
     _error("ause_abs_rel", "AUSE of AbsRel",
-           "area between the mean absolute relative error of the most confident pixels and that of"
-           " the pixels with the least error, over the fraction left out.", "ratio",
+           "area between the AbsRel of the most confident pixels and that of the pixels with the"
+           " least error, over the fraction left out.", "ratio",
            of="confidence", baselines=(RANDOM_ORDER, EDGE_DISTANCE), **_ANYWHERE),
     _error("aurg_abs_rel", "AURG of AbsRel",
-           "area between the mean absolute relative error and that of the most confident pixels,"
-           " over the fraction left out; 0 for a random order.", "ratio", of="confidence",
+           "area between the AbsRel of all pixels and that of the most confident ones, over the"
+           " fraction left out; 0 for a random order.", "ratio", of="confidence",
            smallest=-math.inf, higher_is_better=True, **_ANYWHERE),
     _angle("normal_mean_degrees", "Normals, mean",
            "mean angle between predicted and true normals.", **_NORMAL),
-    _angle("normal_median_degrees", "Normals, median", "median of these angles in the image.",
-           **_NORMAL),
-    _angle("normal_rmse_degrees", "Normals, RMS", "root mean square of these angles.",
-           is_root=True, **_NORMAL),
+    _angle("normal_median_degrees", "Normals, median",
+           "median angle between predicted and true normals.", **_NORMAL),
+    _angle("normal_rmse_degrees", "Normals, RMS",
+           "root mean square angle between predicted and true normals.", is_root=True, **_NORMAL),
     *(_share(f"normal_within_{limit}", f"Normals within {limit}°",
-             f"fraction of these angles below {limit} degrees.", **_NORMAL)
+             f"fraction of angles between predicted and true normals below {limit} degrees.",
+             **_NORMAL)
       for limit in ("5", "7.5", "11.25", "22.5", "30")),
     _error("shape_error", "Shape error",
-           "mean error inside objects, after each object's median error is taken off.", of="points",
+           "mean error inside objects, after each object's median error is subtracted.",
+           of="points",
            headline={"rooms": 1, "interiors": 6}, printed=8,
            baselines=(*_FLAT_OR_EMPTY, LEANING), **_INSIDE),
     _correlation("shape_correlation", "Shape correlation",
-                 "correlation inside objects of what predicted and true depth have left after the"
+                 "correlation inside objects of the residuals of predicted and true depth after the"
                  " least-squares plane of each object.", lacking="bends", **_SURFACE),
     _share("shape_recall_0.02", "Shapes within 0.02",
-           "fraction of the objects whose own `shape_error` is below 0.02 scene units.",
+           "fraction of objects whose own `shape_error` is below 0.02 scene units.",
            of="points", **_INSIDE),
     _angle("shape_normal_degrees", "Normals inside objects",
            "mean angle between predicted and true normals inside objects.", of="normals",
            baselines=_FLAT_OR_EMPTY, **_INSIDE),
     _angle("derived_shape_normal_degrees", "Normals inside objects, from points",
-           "the same of normals derived from the predicted and from the true points.", of="points",
-           baselines=_FLAT_OR_EMPTY, **_INSIDE),
-    _error(BEHIND, "Depth error behind",
-           "mean error at the pixels of objects that the first view of the scene does not see.",
+           "`shape_normal_degrees` of normals derived from the predicted and from the true points.",
+           of="points", baselines=_FLAT_OR_EMPTY, **_INSIDE),
+    _error(BEHIND, "Hidden surfaces, depth error",
+           "mean error at the pixels of objects that are hidden in the first view of the scene.",
            headline={"rooms": 2}, printed=7,
            baselines=(EMPTY_ROOM, CUT_OUT, LEANING, BALLS, BLOCKS), **_BEHIND),
-    _share("behind_recall_0.05", "Found behind within 0.05",
-           "fraction of the true surface there that is nearer than 0.05 scene units to the"
-           " predicted points.", **_BEHIND),
+    _share("behind_recall_0.05", "Hidden surfaces within 0.05",
+           "fraction of the hidden true surface that is nearer than 0.05 scene units to a predicted"
+           " point.", **_BEHIND),
     _error("object_depth_error", "Objects' depth error",
            "mean absolute difference of predicted and true planar depth, over the pixels of"
            " objects.", baselines=(EMPTY_ROOM,), **_OBJECT),
@@ -417,24 +450,43 @@ TABLE: Sequence[Metric] = (
            "mean distance from the true surface of objects to all predicted points.",
            baselines=(EMPTY_ROOM,), **_SURFACE, **_OBJECT),
     *(_share(f"object_recall_{limit}", f"Objects found within {limit}",
-             f"fraction of the objects whose own `object_completeness` is below {limit} scene"
+             f"fraction of objects whose own `object_completeness` is below {limit} scene"
              " units.", **_SURFACE, **_OBJECT)
       for limit in ("0.02", "0.05")),
     _angle("object_normal_mean_degrees", "Objects' normals, mean",
            "mean angle between predicted and true normals, over the pixels of objects.",
            of="normals", lacking="objects"),
     _angle("derived_object_normal_mean_degrees", "Objects' normals, mean, from points",
-           "the same of normals derived from the predicted and from the true points.",
-           lacking="objects", **_SURFACE),
+           "`object_normal_mean_degrees` of normals derived from the predicted and from the true"
+           " points.", lacking="objects", **_SURFACE),
     _correlation("relief_correlation", "Relief correlation",
-                 "correlation, over the scored pixels, of predicted with true relief: planar depth"
-                 " of the empty room minus that of the surface.", **_RELIEF),
+                 "correlation of predicted and true relief: planar depth of the empty room minus"
+                 " that of the surface.", **_RELIEF),
     _share("relief_iou", "Segmentation (relief IoU)",
-           "pixels where predicted and true relief both exceed 0.05 scene units, divided by those"
-           " where either does.", headline={"rooms": 3}, printed=6, **_RELIEF),
+           "foreground IoU: pixels where predicted and true relief both exceed 0.05 scene units,"
+           " divided by those where either does.", headline={"rooms": 3}, printed=6, **_RELIEF),
+    _share("solid_iou", "Solid IoU",
+           "length of the rays that is inside objects in prediction and ground truth, divided by"
+           " that inside either.",
+           headline={"layers": 1},
+           baselines=(CONSTANT, SIZED, INFLATED, MIRRORED), **_LAYERS),
+    _error("back_depth_error", "Back depth error",
+           "mean absolute error of the depth at which rays leave the first visible solid.",
+           headline={"layers": 2}, **_LAYERS),
+    _error("unseen_chamfer", "Chamfer, unseen",
+           "Chamfer distance of the surfaces of objects behind the first layer.",
+           headline={"layers": 3}, **_LAYERS),
+    _error("seen_chamfer", "Chamfer, seen",
+           "Chamfer distance of the surfaces of objects in the first layer.", **_LAYERS),
+    _share("layer_recall_0.02", "Layer recall",
+           "fraction of the true layers of objects behind the first whose depth is within 0.02"
+           " scene units of the predicted layer of the same number.",
+           headline={"layers": 4}, **_LAYERS),
+    *(_share(f"layer_{number}_recall_0.02", f"Layer recall, layer {number}",
+             f"`layer_recall_0.02` of layer {number}.", **{**_LAYERS, "lacking": lacking})
+      for number, lacking in ((2, "solids"), (3, "layer 3"), (4, "layer 4"))),
     _share("iqtt_accuracy", "IQTT accuracy",
-           "1 where the right answer is given, else 0, abstentions included; chance is 1 /"
-           " answers.",
+           "1 if the correct option is chosen, else 0 (also abstentions); chance is 1 / options.",
            of="answers", tasks=("iqtt",), headline={"iqtt": 1}),
 )  # fmt: skip
 
@@ -466,36 +518,31 @@ class Form:
         )
 
 
-_NEAREST = "the predicted depth of an image nearest to the true depth in least squares."
-_NEAREST_L1 = "the mean of absolute difference of depth divided by true depth least."
-_FITTED = "the same after the scale, at least 0,"
+_LEAST_SQUARES = "fitted by least squares to the ground truth of the image."
+_FITTED = "after the non-negative scale"
 FORMS: Mapping[str, Sequence[Form]] = {
     "": (),
     "depth": (
-        Form("*_after_median_scale", "scaled to the truth's median",
-             "the same after the predicted depth was scaled to the true median depth of its"
-             " image."),
-        Form("*_after_scale", "scaled", f"{_FITTED} that brings {_NEAREST}"),
-        Form("*_after_scale_shift", "scaled and shifted",
-             f"{_FITTED} and the shift that bring {_NEAREST}"),
-        Form("*_after_scale_l1", "scaled by L1", f"{_FITTED} that makes {_NEAREST_L1}"),
+        Form("*_after_median_scale", "scaled by the median",
+             "after scaling the predicted depth to the true median depth of the image."),
+        Form("*_after_scale", "scaled", f"{_FITTED} {_LEAST_SQUARES}"),
+        Form("*_after_scale_shift", "scaled and shifted", f"{_FITTED} and shift {_LEAST_SQUARES}"),
+        Form("*_after_scale_l1", "scaled by L1", f"{_FITTED} that minimises AbsRel of the image."),
         Form("*_after_scale_shift_l1", "scaled and shifted by L1",
-             f"{_FITTED} and the shift that make {_NEAREST_L1}"),
+             f"{_FITTED} and shift that minimise AbsRel of the image."),
         Form("*_after_disparity_scale_shift", "with disparity scaled and shifted",
-             "the same after 1 / depth was fitted to 1 / true depth by a scale, at least 0, and a"
-             " shift in least squares; no depth then exceeds the largest true one."),
+             f"{_FITTED} and shift of 1 / depth, {_LEAST_SQUARES[:-1]}; depth is at most the"
+             " largest true one."),
     ),
     "points": (
-        Form("*_after_scale", "scaled",
-             f"{_FITTED} that brings the predicted points of an image nearest to the true ones in"
-             " least squares."),
+        Form("*_after_scale", "scaled", f"{_FITTED} of points {_LEAST_SQUARES}"),
         Form("*_after_scale_shift", "scaled and shifted",
-             f"{_FITTED} and the shift in space that bring them nearest."),
+             f"{_FITTED} and shift in space {_LEAST_SQUARES}"),
     ),
     "normals": (
         Form("derived_*", "from points",
-             "the same of normals derived from the predicted points, against those derived in the"
-             " same way from the true points.",
+             "of normals derived from the predicted points, against those derived from the true"
+             " points.",
              {"of": "points", "lacking": "planes", "redefined": True, "tasks": ("rooms",)}),
     ),
 }  # fmt: skip
@@ -557,7 +604,9 @@ def metric(name: str) -> Metric:
         return replace(ALL[F_SCORE], name=name, title=f"F-score at {threshold:g}")
     if name not in ALL or name == F_SCORE:
         hint = did_you_mean(name, ALL)
-        raise UnknownMetricError("score", f"{name!r:.60}", "a name listed in docs/scores.md", hint)
+        raise UnknownMetricError(
+            "score", f"{name!r:.60}", "a name listed in docs/data/metrics.csv", hint
+        )
     return ALL[name]
 
 
@@ -584,22 +633,23 @@ def _threshold(name: str) -> float | None:
     return threshold if valid else None
 
 
-def markdown_table() -> str:
-    """Return all metrics as the Markdown table of docs/scores.md."""
-    rows: list[tuple[str, ...]] = []
+def csv_table() -> str:
+    """Return all metrics as docs/data/metrics.csv."""
+    rows: list[tuple[str, ...]] = [("name", "of", "unit", "better", "worst", "definition")]
     for forms, family in itertools.groupby(TABLE, lambda metric: metric.forms):
         rows += [(m.name, m.of, m.unit, m.better, f"{m.worst():g}", m.definition) for m in family]
         for form in FORMS[forms]:
-            name = form.name.replace("*", f"<{forms.rstrip('s')} score>")
-            of = form.changes.get("of", "the same")
-            rows.append((name, of, *["the same"] * 3, form.definition))
+            name = form.name.replace("*", f"<{forms.rstrip('s')} metric>")
+            of = str(form.changes.get("of", "the same"))
+            rows.append((name, of, *["the same"] * 3, f"the metric {form.definition}"))
     for begins, baseline in BASELINES.items():
         names = ", ".join(f"`{m.name}`" for m in TABLE if begins in m.baselines)
-        text = f"of {baseline.definition} In `items` alone, for {names}."
-        rows.append((f"{begins}<score>", *["the same"] * 4, text))
-    head = ["| name | of | unit | better | worst | definition |", "| --- " * 6 + "|"]
-    return "\n".join([*head, *(f"| `{name}` | {' | '.join(cells)} |" for name, *cells in rows)])
+        text = f"of {baseline.definition} In `items` only, for {names}."
+        rows.append((f"{begins}<metric>", *["the same"] * 4, text))
+    table = io.StringIO()
+    csv.writer(table, lineterminator="\n").writerows(rows)
+    return table.getvalue()
 
 
 if __name__ == "__main__":
-    print(markdown_table())
+    print(csv_table(), end="")

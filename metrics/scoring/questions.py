@@ -157,5 +157,5 @@ def _check_kinds(truth: "AnswersFile", kinds: Array, answers: Array) -> None:
     right = np.arange(kinds.shape[1]) == answers[:, None]
     for row in np.flatnonzero(((kinds < 0) != right).any(axis=1))[:1].tolist():
         where = truth.place("distractor_kind", row)
-        expected = f"-1 for the right answer, {answers[row]}, and for no other"
+        expected = f"-1 for the correct option, {answers[row]} and no other option"
         raise FileFormatError(where, kinds[row].tolist(), expected)

@@ -222,6 +222,8 @@ class ScoreFile:
     @property
     def kind(self) -> str:
         """The kind of the test set, by which its headline goes: one of `metric_names.KINDS`."""
+        if "solid_iou" in self.columns:
+            return "layers"
         return "interiors" if self.task == "rooms" and self.length == "metre" else self.task
 
     @property
@@ -299,15 +301,15 @@ class ScoreFile:
         meta, texts = self.meta, []
         if meta.truth_source == "submission":
             texts.append(
-                f"without --truth these scores are not ranked: {meta.truth_path}, digest"
-                f" {meta.truth_digest:.12}, was used because the submission names it; if it is the"
-                f" right file, score again with --truth {meta.truth_path}"
+                "the ground truth is the path stored in the predictions; score with --truth"
+                f" {meta.truth_path} if this file is correct"
             )
         count = meta.counts[COUNTS[self.task][0]]
         if len(self.ids) < count:
-            texts.append(f"only {len(self.ids)} of {count} rows were answered by all runs")
+            items = "questions" if self.task == "iqtt" else "images"
+            texts.append(f"only {len(self.ids)} of {count} {items} are predicted by all runs")
         if meta.counts.get("rows_penalised"):
-            texts.append(f"{meta.counts['rows_penalised']} rows with values that are not finite")
+            texts.append(f"{meta.counts['rows_penalised']} images have values that are not finite")
         return tuple(f"not comparable: {text}" for text in texts)
 
     @cached_property

@@ -22,8 +22,10 @@ from metrics.scoring.image_scores import (
     true_relief,
 )
 from metrics.scoring.kept_baselines import KeptBaselines, key_of
+from metrics.scoring.layers import read_true_layers, score_layers, worst_of_layers
 from metrics.scoring.measured_rows import scores_of_view
 from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE
+from metrics.scoring.records import OBJECT_COLUMNS
 from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.scoring.truth_digests import RowDigests, view_digests
 from metrics.submissions.problems import PredictionError
@@ -279,14 +281,51 @@ class MeasuredScorer:
         return ScoredRows(scores, {}, {}, bad, digests)
 
 
+class LayerScorer:
+    """Scores rows of open submissions of layers against an open truth that has layers."""
+
+    def __init__(self, files: Sequence[RoomPredictions], truth: RoomsFile) -> None:
+        """Take files that stay open as long as rows are scored."""
+        self._files, self._truth = files, truth
+        self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in files]
+
+    def score(self, triples: Array) -> ScoredRows:
+        """Return the scores of rows, (N, 3), as `RowScorer.score`."""
+        bad: dict[int, ScoringError] = {}
+        digests: dict[int, RowDigests] = {}
+        images, floors = [], []
+        for row in triples[:, 0].tolist():
+            view = read_true_view(self._truth, row)
+            digests[row], runs = view_digests(view), []
+            layers = read_true_layers(self._truth, row, view)
+            for file, entries in zip(self._files, self._entries, strict=True):
+                predicted = file.view(entries[row])
+                try:
+                    runs.append(score_layers(predicted, layers))
+                except PredictionError as error:
+                    bad[row] = ScoringError(*_placed(error, file, row))
+                    runs.append(worst_of_layers(layers))
+            images.append(runs)
+            floors.append(layers.floors())
+        scores = {
+            name: np.array([[run[name] for run in runs] for runs in images]).T
+            for name in images[0][0]
+        }
+        none: dict[str, Array] = {name: np.zeros((len(self._files), 0)) for name in OBJECT_SCORES}
+        none |= dict.fromkeys(OBJECT_COLUMNS, np.zeros(0, np.int64))
+        of_truth = {name: np.array([row[name] for row in floors]) for name in floors[0]}
+        return ScoredRows(scores, of_truth, none, bad, digests)
+
+
+Scorer = RowScorer | MeasuredScorer | LayerScorer
+
+
 def _placed(error: PredictionError, file: RoomPredictions, row: int) -> tuple[str, str, str, str]:
     """Return an error's fields, with file and row before its place."""
     return f"{file.path}: row {row}: {error.where}", error.found, error.expected, error.hint
 
 
-def _scored_here(
-    scorer: RowScorer | MeasuredScorer, chunks: Sequence[Array]
-) -> Iterator[ScoredRows]:
+def _scored_here(scorer: Scorer, chunks: Sequence[Array]) -> Iterator[ScoredRows]:
     with one_thread():
         yield from map(scorer.score, chunks)
 
@@ -318,15 +357,13 @@ def _on_cluster(job: Job, chunks: Sequence[Array], cluster: Cluster) -> Iterator
         yield from scored
 
 
-def _scorer(
-    files: Sequence[RoomPredictions], truth: Images, protocols: tuple[str, ...]
-) -> RowScorer | MeasuredScorer:
+def _scorer(files: Sequence[RoomPredictions], truth: Images, protocols: tuple[str, ...]) -> Scorer:
     if isinstance(truth, MeasuredFile):
         return MeasuredScorer(files, truth, protocols)
-    return RowScorer(files, truth)
+    return (LayerScorer if files[0].kind == "layers" else RowScorer)(files, truth)
 
 
-def _opened(job: Job, opening: ExitStack) -> RowScorer | MeasuredScorer:
+def _opened(job: Job, opening: ExitStack) -> Scorer:
     """Open the files of a job, until the stack is closed."""
     truth = open_images(job[1])
     opening.enter_context(truth)
@@ -350,7 +387,7 @@ def _score_in_worker(job: Job, rows: Array) -> ScoredRows:
 
 
 @functools.cache
-def _scorer_of_this_process(job: Job) -> RowScorer | MeasuredScorer:
+def _scorer_of_this_process(job: Job) -> Scorer:
     """Open the files of a job when its first chunk comes; a worker process has only one job."""
     opening = ExitStack()
     atexit.register(opening.close)

@@ -125,14 +125,14 @@ def matched_rows(runs: Runs, partial: bool) -> Array:
         rows = np.intersect1d(rows, file.rows)
     if not rows.size:
         expected = f"rows of {runs.truth.path}"
-        raise ScoringError(runs.files[0].path, "no row that all runs answer", expected)
+        raise ScoringError(runs.files[0].path, "no item that all runs predict", expected)
     return rows
 
 
 def raise_first_problem(path: Path, problems: Sequence[Problem]) -> None:
     """Raise ScoringError with the first of the problems, if there are any."""
     incomplete = any(problem.rule == "complete" for problem in problems)
-    advice = "to score the rest, not comparably, say --allow-partial" if incomplete else ""
+    advice = "use --allow-partial to score the rest, without a rank" if incomplete else ""
     if problems:
         raise first_error(ScoringError, path, problems, advice)
 

@@ -61,15 +61,15 @@ def require_truth(
     """
     if protocol not in (None, file.protocol):
         found, expected = f"scores under the protocol {file.protocol}", f"{protocol}, as {owner}"
-        hint = f"say bench score --protocol {protocol}"
+        hint = f"use bench score --protocol {protocol}"
         raise OtherTruthError(file.place, found, expected, hint)
     if file.truth != truth:
         found, expected = (
-            f"scores of {task}, truth of digest {digest or 'none':.12}"
+            f"scores of {task}, ground truth with hash {digest or 'none':.12}"
             for task, digest in (file.truth, truth)
         )
         expected = f"{expected}, as {owner} has"
-        raise OtherTruthError(file.place, found, expected, "say bench score --truth with that one")
+        raise OtherTruthError(file.place, found, expected, "use bench score --truth with this file")
 
 
 def images_digest(truth: Images, scored: Mapping[int, RowDigests]) -> str:
@@ -114,9 +114,9 @@ def _checked(
     changed = [name for name in stored if stored[name] != digests.get(name, stored[name])]
     raise ScoringError(
         f"{path}: {TRUTH_DIGEST}",
-        f"content with the digest {digest:.12}",
+        f"content with hash {digest:.12}",
         f"{expected!s:.12}, with which the file was written",
-        f"what was changed since: {', '.join(changed)}" if changed else "",
+        f"changed since: {', '.join(changed)}" if changed else "",
     )
 
 

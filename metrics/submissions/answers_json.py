@@ -19,7 +19,9 @@ from metrics.submissions.strict_json import parse_json, read_bytes, refusal, sho
 MOST_BYTES = 32 * 2**20
 SCORES = "pix2shape-bench/scores"
 ADVICE = "`bench leaderboard` and `bench compare` read them"
-_EXPECTED = "a list or an object with a whole number for each question: the answer from 0, or -1"
+_EXPECTED = (
+    "a list or an object with a whole number for each question: the selected option from 0, or -1"
+)
 _ANSWERS = TypeAdapter(
     Annotated[list[Annotated[int, Field(strict=True, gt=-(2**31), lt=2**31)]], FailFast()]
 )

@@ -42,8 +42,8 @@ class Inspection:
         task: None where it is none of `layout.TASKS`.
         texts: its root attributes that are as they should be.
         arrays: the data sets that can be used, by name: stored ones, or arrays.
-        ids: (M,) int64, rows of the truth or indices of questions; None where they are unusable.
-        answers: (M,) int64, of an iqtt submission; None where they are unusable.
+        ids: (M,) int64, rows of the ground truth or indices of questions; None where they are
+        unusable. answers: (M,) int64, of an iqtt submission; None where they are unusable.
     """
 
     task: str | None = None
@@ -119,7 +119,7 @@ def _text(file: h5py.File, attribute: layout.Attribute) -> str | Problem | None:
     if name in ("format", "format_version") and text not in attribute.choices:
         kind = layout.DATA_FORMATS.get(text)
         what = f", a file of {kind}, not a submission" if kind else ""
-        expected = repr(attribute.choices[0]) + (", and this file after --truth" if kind else "")
+        expected = repr(attribute.choices[0]) + (", and give this file to --truth" if kind else "")
         return Problem(name, "value", expected, f"{text!r:.60}{what}")
     return text
 
@@ -150,7 +150,7 @@ def _take_arrays(
     present = {problem.dataset for problem in result.problems} | set(result.arrays)
     if result.task == "iqtt" and not {"answer", "scores"} & present:
         found = f"neither; found {_names(file)}"
-        result.problems.append(Problem("answer", "present", "answer, or scores", found))
+        result.problems.append(Problem("answer", "present", "answer or scores", found))
     if result.task != "iqtt":
         result.problems[before:before] = _kind_problems(present, file)
 
@@ -161,7 +161,9 @@ def _kind_problems(present: set[str], file: h5py.File) -> list[Problem]:
     expected = f"one of {', '.join(layout.KINDS)}"
     if not kinds:
         return [Problem("depth", "present", expected, f"no such dataset; found {_names(file)}")]
-    return [Problem(kind, "unique", expected, f"it beside {kinds[0]}") for kind in kinds[1:]]
+    return [
+        Problem(kind, "unique", expected, f"it in addition to {kinds[0]}") for kind in kinds[1:]
+    ]
 
 
 def _check_alignment(result: Inspection) -> None:
@@ -241,7 +243,7 @@ def take_values(result: Inspection) -> None:
         return
     if values.dtype == np.uint64 and values.size and values.max() > np.iinfo(np.int64).max:
         found = f"numbers up to {values.max()}"
-        result.problems.append(Problem(name, "range", "rows of the truth", found))
+        result.problems.append(Problem(name, "range", "rows of the ground truth", found))
         return
     ids = values.astype(np.int64)
     result.problems += value_problems(name, ids, ids)

@@ -19,6 +19,7 @@ KINDS: dict[str, tuple[str, ...]] = {
     "depth": ("none", "median_scale", "scale", "scale_shift"),
     "disparity": ("scale_shift",),
     "points": ("none", "scale", "scale_shift"),
+    "layers": ("none", "scale", "scale_shift"),
 }
 ALIGNMENTS = KINDS["depth"]
 LONGEST_NAME = 200  # characters of method and run, which tables and file names repeat
@@ -46,59 +47,66 @@ ATTRIBUTES = (
     Attribute("format_version", "version of this layout", choices=(FORMAT_VERSION,)),
     Attribute("task", "what is predicted", choices=TASKS),
     Attribute("method", "name of the method; tables show it", longest=LONGEST_NAME),
-    Attribute("run", "which training run, such as its seed: runs of one method are averaged",
+    Attribute("run", "name of the training run, such as its seed; runs of one method are averaged",
               required=False, may_be_empty=True, longest=LONGEST_NAME),
-    Attribute("truth_fingerprint", "the attribute `fingerprint` of the truth file; empty if that"
-              " has none, as the released 3D-IQTT", may_be_empty=True),
-    Attribute("truth_path", "where the truth lay; looked up from the submission's folder, then the"
-              " working directory, unless --truth is given; scores are not comparable without that",
+    Attribute("truth_fingerprint", "the attribute `fingerprint` of the ground truth file; empty"
+              " if the file has none, as the released 3D-IQTT", may_be_empty=True),
+    Attribute("truth_path", "path of the ground truth, relative to the submission's folder or the"
+              " working directory; used without --truth, and scores are then not comparable",
               required=False, may_be_empty=True),
-    Attribute("alignment", "what the method cannot know, and the truth may decide for it, by kind: "
+    Attribute("alignment", "alignment that the predictions need, by prediction type: "
               + "; ".join(f"{kind} {', '.join(kinds)}" for kind, kinds in KINDS.items())
               + "; the first by default",
               required=False, tasks=("rooms", "measured"), choices=ALIGNMENTS),
-    Attribute("shown", "which image of a scene the method was shown to predict a view: that of the"
-              " view, that of the scene's first view alone, or none; scored_view by default",
+    Attribute("shown", "input view of a prediction: the scored view, the first view of the scene,"
+                       " or no"
+              " view; scored_view by default",
               required=False, tasks=("rooms",), choices=get_args(Shown)),
     Attribute("writer", "the program that wrote the file", required=False, may_be_empty=True),
     Attribute("notes", "anything else", required=False, may_be_empty=True),
 )  # fmt: skip
 COLUMNS = {
     "rooms": (
-        Column("row", (), "int64", meaning="row of the truth file; in any order"),
+        Column("row", (), "int64", meaning="row of the ground truth file, in any order"),
         Column("depth", (), "float32", "scene unit", "camera",
                "planar depth, -z in the camera frame (not the distance along the ray), of the ray"
-               " through the pixel's centre; above 0 to lie in front of the camera",
+               " through the pixel's centre; positive in front of the camera",
                ("y", "x"), own_chunk=True),
         Column("disparity", (), "float32", "1", "camera",
-               "1 / planar depth, up to a scale above 0 and a shift of each image; large where the"
-               " surface is near", ("y", "x"), own_chunk=True),
+               "1 / planar depth, up to a scale above 0 and a shift of each image; large for near"
+               " surfaces", ("y", "x"), own_chunk=True),
         Column("points", (), "float32", "scene unit", "camera",
                "surface points, x right, y up, z towards the viewer, so that planar depth is -z",
                ("y", "x", "xyz"), own_chunk=True),
+        Column("layers", (), "float32", "scene unit", "camera",
+               "planar depth of the surfaces along each pixel's ray, in order, also of hidden ones;"
+               " NaN behind the last one; layers 1 and 2, 3 and 4, ... are front and back of a"
+               " solid, a last one without a partner is background", ("y", "x", "layer"),
+               own_chunk=True),
         Column("normal", (), "float32", "1", "camera",
                "surface normal, x right, y up, z towards the viewer; faces the viewer; of any"
                " length but 0", ("y", "x", "xyz"), own_chunk=True),
-        Column("confidence", (), "float32", meaning="how sure the method is of each pixel's depth:"
-               " larger is surer; only the order within an image counts", axes=("y", "x"),
+        Column("confidence", (), "float32", meaning="confidence of the depth of each pixel, larger"
+                                                    " for"
+               " more certain; only the order within an image counts", axes=("y", "x"),
                own_chunk=True),
         Column("fov_y_degrees", (), "float64", "degree",
-               meaning="vertical field of view, where the method estimates the camera"),
+               meaning="vertical field of view, if the method estimates the camera"),
     ),
     "iqtt": (
         Column("question", (), "int64", meaning="index in the test file; in any order"),
         Column("answer", (), "int8",
-               meaning="which of the answers shows the reference, from 0; -1 abstains, which"
-               " counts as wrong"),
+               meaning="index of the selected option, from 0; -1 abstains, which counts as"
+               " wrong"),
         Column("scores", (), "float64",
-               meaning="one for each answer; the highest wins, a tie for it counts as an"
-               " abstention; if `answer` is there too, both must say the same", axes=("answer",)),
+               meaning="one score per option; the highest selects, and a tie counts as an"
+               " abstention; `answer`, if present, must agree", axes=("answer",)),
         Column("outcome", (), "int8",
-               meaning="what a model's text held: "
+               meaning="outcome of reading the reply of a model: "
                + ", ".join(f"{i} {name}" for i, name in enumerate(OUTCOMES))),
         Column("rotated", (), "int8",
-               meaning="the answer, from 0, when answer r stood first, for r from 0; -1 abstains,"
-               " -2 was not asked; the first is `answer`", axes=("answer",)),
+               meaning="the selected option, from 0, if option r is shown first, for r from 0; -1"
+               " abstains, -2 not asked; the first column is `answer`", axes=("answer",)),
     ),
 }  # fmt: skip
 COLUMNS["measured"] = COLUMNS["rooms"]  # in metres; images are padded as in the truth
@@ -149,22 +157,22 @@ def describe_format() -> str:
     lines += [
         "",
         "Task 'measured' has the datasets of task 'rooms', in metres. Images have the size to which"
-        " those of the truth are padded; what is beyond the size of a row is not read.",
+        " the ground truth is padded; values beyond the size of an image are not read.",
         "",
-        "Each row of the truth comes once; all are scored, so a missing one is an error.",
-        "A submission is one file: links and data outside it are refused, and so are datasets of"
-        " which a part was never written.",
+        "Each row of the ground truth must occur exactly once.",
+        "A submission is one file: external links, external data and partly written datasets are an"
+        " error.",
         "Datasets are compressed by gzip or lzf, with or without shuffle and fletcher32, or not at"
         " all.",
-        "iqtt takes JSON as well: a list of answers; an object from index to answer; or",
+        "Task 'iqtt' takes JSON as well: a list of responses; an object from index to response; or",
         '  {"method": "...", "run": "...", "answers": a list or an object}',
-        "  JSON names no truth: give it with --truth.",
+        "  JSON stores no path of the ground truth: use --truth.",
         "",
         "Depth is planar. If a network gives distance along the ray, divide it by the length of"
         " the ray's direction d,",
         "  d = ((c + 0.5 - W/2) s, (H/2 - r - 0.5) s, -1), s = 2 tan(fov_y / 2) / H, in row r,"
         " column c of an H x W image.",
-        "metrics.prediction_writer writes such files and checks every row as it comes:",
+        "metrics.prediction_writer writes such files and checks each row:",
         '  with RoomPredictionWriter("predictions.h5", "rooms.h5", method="mine") as out:',
         "      out.add(row, depth, normal)",
     ]

@@ -87,7 +87,7 @@ class Predictions:
 
     @property
     def kind(self) -> str:
-        """What is predicted: "depth", "disparity" or "points" of rooms; "answers" to questions."""
+        """What is predicted: "depth", "disparity", "points" or "layers"; "answers" to questions."""
         return next((kind for kind in layout.KINDS if kind in self._arrays), "answers")
 
     @cached_property
@@ -110,7 +110,7 @@ class Predictions:
             theirs not in (0, ours) for theirs, ours in zip(identity, self.identity, strict=True)
         ):
             found = "another file than the one that was opened"
-            raise FileFormatError(self.path, found, "one that does not change while it is scored")
+            raise FileFormatError(self.path, found, "a file that does not change during scoring")
 
     def close(self) -> None:
         """Close the file; idempotent."""
@@ -131,7 +131,8 @@ class PredictedView:
     Attributes:
         kind: which of `layout.KINDS` the geometry is.
         alignment: what the method cannot know, one of those that the kind allows.
-        geometry: planar depth or disparity (H, W), or points (H, W, 3), camera frame, as stored.
+        geometry: planar depth or disparity (H, W), points (H, W, 3), or layers (H, W, L), camera
+            frame, as stored.
         normal: (H, W, 3), camera frame, as stored; None where there are none.
         fov_y_degrees: vertical field of view; None where the method does not estimate it.
         confidence: of each pixel's depth, (H, W), larger is surer; None where there is none.
@@ -152,7 +153,7 @@ class PredictedView:
 
 
 class RoomPredictions(Predictions):
-    """Predicted depth, disparity or points, and optionally normals and field of view.
+    """Predicted depth, disparity, points or layers, and optionally normals and field of view.
 
     They are of rooms, or of images whose truth was measured (`task`).
     """
@@ -198,19 +199,21 @@ class RoomPredictions(Predictions):
         return "fov_y_degrees" in self._arrays
 
     def geometry(self, index: int) -> Array:
-        """Depth or disparity (H, W), or points (H, W, 3), of entry `index`, as stored.
+        """Depth or disparity (H, W), points (H, W, 3) or layers (H, W, L) of entry `index`.
 
         Values need not be finite. Raises FileFormatError where they are damaged.
         """
         return self._read(self.kind, index)
 
     def depth(self, index: int) -> Array:
-        """Planar depth (H, W) of entry `index`, scene units, camera frame: as stored, or of points.
+        """Planar depth (H, W) of entry `index`, scene units, camera frame; of the first layer.
 
         Values need not be finite. Raises FileFormatError where they are damaged, or disparity.
         """
         if self.kind == "points":
             return -self.geometry(index)[..., 2]
+        if self.kind == "layers":
+            return self.geometry(index)[..., 0]
         return self._read("depth", index)
 
     def normal(self, index: int) -> Array:
@@ -313,7 +316,7 @@ def inspect_predictions(
     else:
         if not tried:
             trial.try_file(path)
-        file = open_unchecked(path, "submission; `bench import` makes one of other files")
+        file = open_unchecked(path, "submission; `bench import` converts other files")
         with checking(file):
             content = inspect(file)
     opened: RoomPredictions | QuestionPredictions | None = None

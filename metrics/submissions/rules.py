@@ -24,6 +24,7 @@ Ids = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
 MOST_ROWS = 10_000_000
+LAYERS = range(1, 65)  # how many an image may have
 # Of depths and normals: what single precision holds. All scores of such values are finite, and so
 # are the squares that intervals need of them.
 LARGEST = float(np.finfo(np.float32).max)
@@ -108,11 +109,11 @@ def _on_surface(wrong: Any, against: Against) -> Any:
 
 OUTCOMES = ("answered", "unparsed", "refused", "cut off")  # of the text of a model that was asked
 NOT_ASKED = -2  # in this order of the answers, or the model failed
-IDS, SURFACE = ("row", "question"), "wherever the truth shows a surface"
+IDS, SURFACE = ("row", "question"), "wherever the ground truth has a surface"
 RULES = (
     Rule(IDS, "range", "0 or more", "negative", lambda ids, _: ids < 0),
     Rule(IDS, "unique", "each once", "given more than once", lambda ids, _: _repeated(ids)),
-    Rule(IDS, "known", "rows of the truth", "that the truth does not have", _unknown),
+    Rule(IDS, "known", "rows of the ground truth", "that the ground truth does not have", _unknown),
     Rule(
         ("depth", "disparity", "confidence"), "finite", f"finite numbers {SURFACE}",
         "NaN, infinite or huge",
@@ -123,6 +124,16 @@ RULES = (
         lambda vectors, against: _on_surface(~_finite(vectors).all(axis=-1), against),
     ),
     Rule(
+        ("layers",), "range", "depths above 0, and NaN behind the last layer",
+        "infinite, huge, or at or behind the camera",
+        lambda layers, _: ~(np.isnan(layers) | (_finite(layers) & (layers > 0.0))).all(axis=-1),
+    ),
+    Rule(
+        ("layers",), "order", "depths in order, nearest first, without gaps", "not in order",
+        lambda layers, _: (~np.isnan(layers[..., 1:]) & ~(layers[..., 1:] >= layers[..., :-1]))
+        .any(axis=-1),
+    ),
+    Rule(
         ("normal",), "length", f"normals of a length above 0 {SURFACE}", "of length 0",
         lambda normal, against: _on_surface(~normal.any(axis=-1), against),
     ),
@@ -131,15 +142,15 @@ RULES = (
         lambda degrees, _: ~((degrees > 0.0) & (degrees < 180.0)),
     ),
     Rule(
-        ("answer",), "range", "the number of an answer from 0, or -1", "that are no answer",
+        ("answer",), "range", "the index of an option from 0, or -1", "that are not an option",
         _no_answer,
     ),
     Rule(
-        ("rotated",), "range", "numbers of answers from 0, -1 or -2", "that are no answers",
+        ("rotated",), "range", "indices of options from 0, -1 or -2", "that are not options",
         _no_rotated,
     ),
     Rule(
-        ("rotated",), "agreement", "`answer`, in the first column", "that begin with another one",
+        ("rotated",), "agreement", "`answer`, in the first column", "that begin with another value",
         lambda answers, against: _other_than_scores(answers[:, 0], against),
     ),
     Rule(
@@ -152,7 +163,7 @@ RULES = (
     ),
     Rule(
         ("answer",), "agreement", "the highest of scores, -1 where it is tied",
-        "other than scores say", _other_than_scores,
+        "that disagree with scores", _other_than_scores,
     ),
 )  # fmt: skip
 
@@ -206,7 +217,7 @@ def refuse_behind_camera(
         geometry: (H, W), or points (H, W, 3).
         surface: where the truth shows a surface, (H, W).
     """
-    if kind == "disparity" or alignment == "scale_shift":
+    if kind in ("disparity", "layers") or alignment == "scale_shift":
         return
     depth = geometry if kind == "depth" else -geometry[..., 2]
     if 2 * np.count_nonzero(depth[surface] <= 0.0) > np.count_nonzero(surface):
@@ -230,6 +241,7 @@ def array_problem(
     name = column.name
     shape: tuple[int, ...] = array.shape or ()
     kinds = "f" if is_float(column) else "iu"
+    sizes = {**sizes, "layer": LAYERS}
     axes = [sizes.get(axis, ()) for axis in column.axes or ()]
     fits = len(shape) == 1 + len(axes) and all(
         size in allowed if allowed else size > 0

@@ -95,7 +95,7 @@ def find_truth(predictions: Predictions, named: str | Path | None = None) -> Fou
     """
     advice = "give it with --truth" if named is None else ""
     if named is None and not predictions.truth_path:
-        raise FileFormatError(predictions.path, "no path of a truth file", "a path", advice)
+        raise FileFormatError(predictions.path, "no path of a ground truth file", "a path", advice)
     recorded = Path(predictions.truth_path)
     places = [predictions.path.parent / recorded, recorded] if named is None else [Path(named)]
     for place in places:
@@ -129,20 +129,24 @@ def match_problems(
     """
     fingerprint, count = predictions.truth_fingerprint, len(truth)
     if fingerprint not in (None, truth.fingerprint):
-        found = f"predictions for the truth with fingerprint {fingerprint:.12}"
-        expected = f"{(truth.fingerprint or 'none'):.12}, that of {truth.path}"
+        found = f"predictions for ground truth with recipe hash {fingerprint:.12}"
+        expected = f"{(truth.fingerprint or 'none'):.12}, the recipe hash of {truth.path}"
         return [Problem("truth_fingerprint", "match", expected, found)]
     problems = []
     if isinstance(truth, RoomsFile) and not truth.has_truth:
-        expected = f"the file of truth, such as {truth_path(truth.path).name}"
-        return [Problem("truth", "present", expected, f"{truth.path}, rooms without truth")]
+        expected = f"the file with ground truth, such as {truth_path(truth.path).name}"
+        return [Problem("truth", "present", expected, f"{truth.path}, rooms without ground truth")]
     if isinstance(predictions, RoomPredictions) and isinstance(truth, Images):
         height, width = padded_size(truth)
         if (predictions.height, predictions.width) != (height, width):
             found = f"images of {predictions.height}x{predictions.width}"
             problems.append(
-                Problem(predictions.kind, "shape", f"{height}x{width}, as the truth", found)
+                Problem(predictions.kind, "shape", f"{height}x{width}, as the ground truth", found)
             )
+    layered = isinstance(truth, RoomsFile) and "layers" in truth.spec.truth
+    if isinstance(predictions, RoomPredictions) and predictions.kind == "layers" and not layered:
+        expected = "ground truth with layers, by scenegen render --with layers"
+        problems.append(Problem("layers", "match", expected, f"{truth.path}, which has none"))
     name, rows = ID_NAMES[predictions.task], predictions.rows
     problems += [
         problem
@@ -161,7 +165,7 @@ def match_problems(
 def _answer_problems(predictions: QuestionPredictions, offered: int) -> list[Problem]:
     """Return whether a submission chooses among another number of answers than is offered."""
     if predictions.candidates not in (None, offered):
-        expected = f"(M, {offered}), as each question offers {offered} answers"
+        expected = f"(M, {offered}), because each question has {offered} options"
         return [Problem("scores", "shape", expected, f"shape (M, {predictions.candidates})")]
     against = Against(answers=offered)
     return value_problems("answer", predictions.answers, predictions.rows, against)

@@ -77,8 +77,8 @@ def _hints_on_source(truth: FoundTruth) -> list[Problem]:
     """Return a hint where nobody but the submission says that this is the truth."""
     if truth.source == "given":
         return []
-    found = f"{truth.path}, which was used because the submission names it"
-    expected = f"--truth {truth.path} if it is the right file; else scores are not ranked"
+    found = f"{truth.path}, the path stored in the predictions"
+    expected = f"--truth {truth.path} if this file is correct; else scores are not ranked"
     return [Problem("truth", HINT, expected, found)]
 
 

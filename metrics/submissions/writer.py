@@ -1,6 +1,6 @@
-"""Writers of submissions that cannot be invalid; `metrics.prediction_writer` is their public door.
+"""Writers of valid submissions; `metrics.prediction_writer` is the public entry point.
 
-Rooms are written row by row, answers to questions all at once; the rules that readers ask for are
+Rooms are written row by row, responses to questions all at once. The rules of the reader are
 checked before anything is written.
 """
 
@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 
 
 class RoomPredictionWriter:
-    """Writes predicted geometry, and optionally normals, of a file's images; a context manager.
+    """Context manager that writes predicted geometry, and optionally normals, of images.
 
-    The file appears under its name when the block ends without an error and every row was given.
-    Memory stays flat. Not to be shared between threads.
+    The file appears under its name when the block ends without an error and every row is written.
+    Memory use is constant. An instance must not be shared between threads.
     """
 
     def __init__(
@@ -52,18 +52,17 @@ class RoomPredictionWriter:
         """Check the texts; the files are opened when the block begins.
 
         Args:
-            truth: the file of rooms, or of measured truth, that is predicted; its path is recorded
-                as given. An open file stays open.
-            method, run: who predicts; runs of one method are averaged.
-            alignment: what the method cannot know: "none", "median_scale", "scale" or
-                "scale_shift"; None for "none", or "scale_shift" of disparity.
-            shown: which image the method was shown to predict a view: that of the view
-                ("scored_view"), of the scene's first view alone ("first_view"), or none
-                ("no_view"). Leaderboards rank "first_view" apart.
+            truth: file of rooms, or of measured ground truth, to predict; its path is recorded as
+                given. An open file stays open.
+            method, run: names of method and training run; runs of one method are averaged.
+            alignment: alignment that the predictions need: "none", "median_scale", "scale" or
+                "scale_shift"; None for "none", or "scale_shift" for disparity.
+            shown: input view of each prediction: the scored view ("scored_view"), the first view of
+                the scene ("first_view"), or none ("no_view"). Leaderboards rank each separately.
             allow_partial: whether rows may be missing; scores of such a file are not comparable.
 
-        Raises PredictionError where a text does not suit; when the block begins also OSError for
-        either path, and FileFormatError for the truth.
+        Raises PredictionError for an invalid text; when the block begins also OSError for
+        either path, and FileFormatError for the ground truth.
         """
         texts: dict[str, Any] = {"method": method, "run": run, "shown": shown, "notes": notes}
         texts |= {} if alignment is None else {"alignment": alignment}
@@ -85,6 +84,11 @@ class RoomPredictionWriter:
         assert context is not None, "a block ends after it began"
         context.__exit__(*error)
 
+    @property
+    def truth(self) -> Images:
+        """The open file that is predicted, while the block lasts."""
+        return self._truth
+
     def add(
         self,
         row: int,
@@ -93,25 +97,28 @@ class RoomPredictionWriter:
         *,
         disparity: ArrayLike | None = None,
         points: ArrayLike | None = None,
+        layers: ArrayLike | None = None,
         fov_y_degrees: float | None = None,
         confidence: ArrayLike | None = None,
     ) -> None:
-        """Write the prediction for one row of the truth; rows may come in any order.
+        """Write the prediction for one row of the ground truth; rows may come in any order.
 
-        One of depth, disparity and points is given, the same for all rows; arrays may be tensors
-        of torch.
+        Give one of depth, disparity, points and layers, the same for all rows. Torch tensors are
+        accepted.
 
         Args:
-            row: of the truth file.
+            row: row of the ground truth file.
             depth: (H, W) floats: planar depth, scene units, camera frame.
             normal: (H, W, 3) floats: camera frame, facing the viewer, of any length but 0. For
-                all rows or for none.
+                all rows or none.
             disparity: (H, W) floats: 1 / planar depth, up to a scale above 0 and a shift.
             points: (H, W, 3) floats: camera frame (x right, y up, z towards the viewer), scene
                 units.
+            layers: (H, W, L) floats: planar depth of all surfaces along each ray, in order; NaN
+                behind the last one.
             fov_y_degrees: vertical field of view that the method estimates. For all rows or none.
-            confidence: (H, W) floats: larger where the method is surer of its depth; only their
-                order within the image counts. For all rows or none.
+            confidence: (H, W) floats: larger for more certain depth; only the order within the
+                image counts. For all rows or none.
 
         Raises PredictionError, naming the row, what was found and what was expected.
         """
@@ -125,6 +132,7 @@ class RoomPredictionWriter:
             surface = np.isfinite(self._truth.read("depth", row)[:height, :width])
         sizes = dict(zip(("y", "x"), ((size,) for size in surface.shape), strict=True))
         images = {"depth": depth, "disparity": disparity, "points": points}
+        images["layers"] = layers
         images |= {"normal": normal, "confidence": confidence}
         values = {}
         for column in layout.COLUMNS["rooms"]:
@@ -140,6 +148,7 @@ class RoomPredictionWriter:
         if self._table is None:
             self._table = self._new_table(values)
             self._names = list(values)
+        self._check_layers(values, where)
         for name in sorted(set(self._names) ^ set(values)):
             found, expected = ("one", "none") if name in values else ("none", "one")
             raise PredictionError(f"{where}: {name}", found, f"{expected}, as in the first row")
@@ -147,6 +156,14 @@ class RoomPredictionWriter:
         self._table.append({name: self._padded(image) for name, image in values.items()})
         self._rows.append(row)
         self._written[row] = True
+
+    def _check_layers(self, values: Mapping[str, rules.Array], where: str) -> None:
+        """Raise PredictionError unless there are as many layers as in the first row."""
+        assert self._table is not None, "a row was given"
+        shapes = {column.name: column.shape for column in self._table.columns}
+        if "layers" in values and shapes.get("layers", (0,))[-1] != values["layers"].shape[-1]:
+            found, expected = values["layers"].shape[-1], shapes.get("layers", (0,))[-1]
+            raise PredictionError(f"{where}: layers", found, f"{expected}, as in the first row")
 
     def _padded(self, image: rules.Array) -> rules.Array:
         """Return an image (h, w, ...) in the size to which those of the truth are padded."""
@@ -248,19 +265,19 @@ def write_answers(
     notes: str = "",
     overwrite: bool = False,
 ) -> None:
-    """Write answers to the questions of a file, all of them in its order unless `rows` is given.
+    """Write responses to all questions of a file in its order, or to those of `rows`.
 
     Args:
         questions_file: such as iqtt-test.h5, or an open one; its path is recorded as given.
         method, run: as for `RoomPredictionWriter`.
-        answer: (Q,) integers from 0, or -1 to abstain, which counts as wrong.
-        scores: (Q, A) floats for A answers, 2 or 3 as the file offers: the highest wins, a tie for
-            it abstains. Either or both; both must say the same.
-        outcome: (Q,) what a model's text held, an index into `rules.OUTCOMES`.
-        rotated: (Q, A) the answers when answer r stood first, for r from 0; -1 abstains, and -2 was
-            not asked.
-        rows: (Q,) the questions that are answered, each once; scores of such a file are not
-            comparable unless these are all.
+        answer: (Q,) indices of options from 0, or -1 to abstain, which counts as wrong.
+        scores: (Q, A) floats for A options, 2 or 3 as in the file: the highest score selects, and a
+            tie abstains. Give `answer`, `scores`, or both in agreement.
+        outcome: (Q,) outcome of reading a reply, an index into `rules.OUTCOMES`.
+        rotated: (Q, A) the selected option if option r is shown first, for r from 0; -1 abstains,
+            -2 not asked.
+        rows: (Q,) indices of the questions, each once; the scores are comparable only if these are
+            all questions.
 
     Raises:
         PredictionError: naming the questions, what was found and what was expected.
@@ -274,7 +291,7 @@ def write_answers(
     if count == 0:
         raise PredictionError(place, "no questions", "at least one")
     if answer is None and scores is None:
-        raise PredictionError(path, "neither answer nor scores", "either")
+        raise PredictionError(path, "neither a response nor scores", "either")
     ids = np.arange(count) if rows is None else as_array(rows, f"{path}: rows")
     arrays = {"question": ids, "answer": answer, "scores": scores}
     arrays |= {"outcome": outcome, "rotated": rotated}

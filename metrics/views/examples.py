@@ -12,14 +12,17 @@ from numpy.typing import NDArray
 from iqtt.questions.specs import LETTERS
 from metrics.measured.reader import Images, MeasuredFile
 from metrics.measures.answers import ABSTAINED
+from metrics.scoring.layers import fitted_layers, read_true_layers
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
+from metrics.submissions.truths import read_true_view
 from metrics.views.figures import shown_row
 from metrics.views.pictures import Picture, data_url, depth_pictures, normal_pictures
 from scenegen.common.errors import SceneGenError
 from scenegen.common.text_table import number
-from scenegen.rooms.preview import srgb_bytes
+from scenegen.rooms.preview import cut_places, cuts, srgb_bytes
+from scenegen.rooms.reader import RoomsFile
 
 if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
@@ -129,9 +132,33 @@ def _pictures(rooms: Images, predictions: RoomPredictions, row: int, place: int)
     if isinstance(rooms, MeasuredFile):
         return pictures
     normal = predictions.normal(place) if predictions.has_normals else None
+    if predictions.kind == "layers":
+        return [*pictures, *_cut_pictures(rooms, predictions, row, place)]
     fov_y_degrees = float(rooms.read("camera/fov_y_degrees", row))
     true_normal = rooms.read("normal", row)
     return [*pictures, *normal_pictures(true, depth, true_normal, fov_y_degrees, normal)]
+
+
+def _cut_pictures(
+    rooms: RoomsFile, predictions: RoomPredictions, row: int, place: int
+) -> list[Picture]:
+    """Return cuts through true and predicted layers, along the row and column of most objects."""
+    truth = read_true_layers(rooms, row, read_true_view(rooms, row))
+    true = [rooms.read(f"layers/{x}", row) for x in ("depth", "object_id", "entering")]
+    fitted = fitted_layers(predictions.view(place), truth)
+    there, odd = np.isfinite(fitted), np.arange(fitted.shape[-1]) % 2 == 1
+    alone = there & ~odd  # a last one without a partner is background
+    alone[..., :-1] &= ~there[..., 1:]
+    kind = np.where(odd, -1, 1)
+    said = [fitted, np.where(there & ~alone, 1, np.where(alone, 0, -1)), np.where(alone, 0, kind)]
+    at, known = cut_places(true[2]), true[0][np.isfinite(true[0])]
+    ends = float(known.min()), float(known.max())
+    captions = ("cut from above", "cut from the side")
+    return [
+        Picture(f"{which} {caption}", data_url(image))
+        for which, layers in (("true", true), ("predicted", said))
+        for caption, image in zip(captions, cuts(layers, *at, ends), strict=True)
+    ]
 
 
 def _name(scores: ScoreFile, entry: int) -> str:
@@ -154,9 +181,9 @@ def _entry_scores(scores: ScoreFile, entry: int) -> str:
 
 
 def chosen_questions(right: NDArray[np.bool_], most: int = SHOWN) -> dict[str, list[int]]:
-    """Return entries to show that are "right" and "wrong", (Q,), spread evenly over the file."""
+    """Return entries to show that are "correct" and "wrong", (Q,), spread evenly over the file."""
     lists = {}
-    for title, entries in (("right", np.flatnonzero(right)), ("wrong", np.flatnonzero(~right))):
+    for title, entries in (("correct", np.flatnonzero(right)), ("wrong", np.flatnonzero(~right))):
         places = np.rint(np.linspace(0, len(entries) - 1, min(most, len(entries)))).astype(int)
         if len(entries):
             lists[title] = entries[places].tolist()
@@ -181,10 +208,10 @@ def _questions(scores: ScoreFile, truth: Path, predictions: QuestionPredictions)
         answers = np.array([answer.get(i, ABSTAINED) for i in ids])
         true = np.asarray(questions.read("answers", slice(None)), np.int64)[scores.ids]
         right = answers == true
-        totals = {"right": int(right.sum()), "wrong": int((~right).sum())}
+        totals = {"correct": int(right.sum()), "wrong": int((~right).sum())}
         return [
             (
-                f"{len(entries)} of {totals[title]:,} questions answered {title}ly",
+                f"{len(entries)} of {totals[title]:,} {title} responses",
                 [_question(questions[ids[i]], int(true[i]), int(answers[i])) for i in entries],
             )
             for title, entries in chosen_questions(right).items()
@@ -205,11 +232,11 @@ def _question(record: Any, right: int, answer: int) -> Example:
     urls = [data_url(srgb_bytes(np.nan_to_num(image))) for image in record.radiance]
     pictures = [Picture("reference", urls[0])]
     for k, url in enumerate(urls[1:]):
-        marks = ["right"] * (k == right) + ["answered"] * (k == answer)
-        pictures.append(Picture(f"answer {LETTERS[k]}", url, ", ".join(marks), k == right))
-    text = f"right is {LETTERS[right]}, "
-    text += "no answer was given" if answer == ABSTAINED else f"{LETTERS[answer]} was answered"
+        marks = ["correct"] * (k == right) + ["selected"] * (k == answer)
+        pictures.append(Picture(f"option {LETTERS[k]}", url, ", ".join(marks), k == right))
+    text = f"correct: {LETTERS[right]}, selected: "
+    text += "none" if answer == ABSTAINED else LETTERS[answer]
     kinds: Sequence[str | None] = record.truth.distractor_kind if record.truth else ()
     wrong = sorted({kind for kind in kinds if kind})
-    text += f"; wrong answers: {', '.join(wrong)}" if wrong else ""
+    text += f"; distractor types: {', '.join(wrong)}" if wrong else ""
     return Example(f"question {record.index}", text, pictures)

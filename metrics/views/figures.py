@@ -119,7 +119,7 @@ def draw_groups(
     keys = [key for key in groups[0] if all(name in group.get(key, {}) for group in groups)]
     if not keys:
         place = f"{files[0].method}: {name} by {by}"
-        raise FigureError(place, "no groups that all files have", "another --by or --score")
+        raise FigureError(place, "no groups that all files have", "another --by or --metric")
     keys.sort(key=_by_number)
     floors = [_group_floor(files[0], by, key, name) for key in keys]
     with _figure(path, overwrite, width, 0.62 * width) as axes:
@@ -163,7 +163,7 @@ def draw_sparsification(path: Target, curves: Array, width: float = COLUMN) -> N
     with _figure(path, False, width, 0.7 * width) as axes:
         for curve, name, (color, _) in zip(curves, names, LOOKS[1:], strict=False):
             axes.plot(100.0 * REMOVED, curve, color=color, label=name)
-        axes.set(xlabel="pixels left out (%), the least sure first", ylabel="AbsRel of the rest")
+        axes.set(xlabel="removed pixels (%), least confident first", ylabel="AbsRel of the rest")
         axes.set_ylim(bottom=0.0)
         _legend(axes)
 
@@ -198,7 +198,7 @@ def draw_grid(
             for row in rows:
                 if not 0 <= row < len(rooms):
                     raise FigureError(
-                        f"{truth}: row {row}", "no such row", f"0 to {len(rooms) - 1}"
+                        f"{truth}: row {row}", "no such image", f"0 to {len(rooms) - 1}"
                     )
                 lines.append(shown_row(rooms, row, [_view(file, row) for file in opened]))
     finally:
@@ -231,10 +231,10 @@ def shown_row(rooms: Images, row: int, views: Sequence[PredictedView]) -> Line:
 
 def _view(file: Any, row: int) -> PredictedView:
     if not isinstance(file, RoomPredictions):
-        raise FigureError(file.path, "answers to questions", "predictions of rooms")
+        raise FigureError(file.path, "responses to questions", "predictions of rooms")
     places = np.flatnonzero(file.rows == row)
     if not len(places):
-        raise FigureError(f"{file.path}: row {row}", "no prediction", "one of this row")
+        raise FigureError(f"{file.path}: row {row}", "no prediction", "one of this image")
     return file.view(int(places[0]))
 
 
@@ -283,7 +283,7 @@ def _common(files: Sequence[ScoreFile], name: str) -> str:
     """Return the score that is drawn. Raises FigureError."""
     tasks = {file.task for file in files}
     if len(tasks) > 1:
-        raise FigureError(files[-1].place, "scores of rooms and of questions", "one kind")
+        raise FigureError(files[-1].place, "scores of rooms and of questions", "files of one task")
     names = [name] if name else HEADLINE[files[0].kind]
     for candidate in names:
         if all(candidate in file.metrics for file in files):
@@ -292,7 +292,7 @@ def _common(files: Sequence[ScoreFile], name: str) -> str:
     asked = name or names[0]
     hint = did_you_mean(asked, lacking.metrics)
     raise FigureError(
-        lacking.place, f"no score {asked}", "one that `bench score --all` prints", hint
+        lacking.place, f"no metric {asked}", "one that `bench score --all` prints", hint
     )
 
 
@@ -340,10 +340,10 @@ def _legend(axes: Any) -> None:
 
 def _words(by: str, task: str) -> str:
     if by == "angle":
-        what = "degrees from the first view" if task == "rooms" else "degrees of rotation"
+        what = "angle to the first view (degrees)" if task == "rooms" else "rotation (degrees)"
     else:
-        what = {"kind": "shape" if task == "rooms" else "kind of question"}.get(by, "")
-        what = what or "share of the picture, percent"
+        what = {"kind": "shape" if task == "rooms" else "distractor type"}.get(by, "")
+        what = what or "area in the image (percent)"
     return what
 
 

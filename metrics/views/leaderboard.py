@@ -49,22 +49,21 @@ BASELINE, CHANCE = "baseline: ", "baseline: chance"
 AGREEMENT = 1e-9  # of baselines, relative: other releases of libraries add differently
 REPORTED_MARK, INCOMPARABLE_MARK = "†", "‡"
 NOT_COMPARABLE = (
-    f"{INCOMPARABLE_MARK} not comparable, so not ranked: not all of the test set was scored, or"
-    " values that are not finite were given the worst score, or only the submission named the truth"
-    " (bench score --truth tells it)"
+    f"{INCOMPARABLE_MARK} not ranked: part of the test set is missing, or values are not finite, or"
+    " the file was scored without --truth"
 )
 BELOW = (
-    "methods below the line of the baseline are not better than it, by their interval, so they have"
-    " no rank; the next column orders them"
+    "methods below the baseline are not significantly better than it; they have no rank, and the"
+    " next column orders them"
 )
 SHARED = (
-    "methods share a rank where the 95% interval of their paired difference from the first method"
-    " of that rank holds 0; bold: better than the next best method by such an interval"
+    "methods share a rank if the 95% CI of their paired difference contains 0; bold: significantly"
+    " better than the next best method"
 )
 VIEWS_SEEN = {
     "scored_view": "the scored view",
-    "first_view": "the first view alone",
-    "no_view": "no view",
+    "first_view": "the first view of the scene",
+    "no_view": "none",
 }
 GIVEN: Mapping[str, str] = {
     "median_scale": "scale, by the median",
@@ -78,7 +77,7 @@ Cells = Mapping[str, Mapping[str, Cell]]  # by the label of the row, then by the
 
 
 class LeaderboardError(SceneGenError):
-    """Score files that cannot stand in one table."""
+    """Score files that do not fit in one table."""
 
 
 class FloorError(SceneGenError):
@@ -147,14 +146,14 @@ def rankings(
         if score.signed:
             found = f"{name}, a bias, of which neither direction is better"
             raise LeaderboardError("metric", found, "a metric with a better direction")
-    groups: dict[tuple[tuple[Task, str, str], Shown | None, bool], list[ScoreFile]] = {}
+    groups: dict[tuple[tuple[Task, str, str, str], Shown | None, bool], list[ScoreFile]] = {}
     for file in files:
-        key = ((*file.truth, file.protocol), file.shown_of_several, file.older)
+        key = ((*file.truth, file.protocol, file.kind), file.shown_of_several, file.older)
         groups.setdefault(key, []).append(file)
     ranked = []
     for (truth, seen, older), group in groups.items():
         task, members = truth[0], aligned(group, align if truth[0] != "iqtt" else None)
-        together = [f for f in files if (*f.truth, f.protocol, f.older) == (*truth, older)]
+        together = [f for f in files if (*f.truth, f.protocol, f.kind, f.older) == (*truth, older)]
         _require_same_rows(together)
         _require_same_baselines(together)
         names = [name for name, score in wanted.items() if task in score.tasks]
@@ -192,7 +191,7 @@ def _require_same_rows(files: Sequence[ScoreFile]) -> None:
                 file.place,
                 f"{len(file.ids)} {items}s",
                 f"the {len(whole[0].ids)} of {whole[0].place}",
-                "both claim to score the whole of one test set",
+                "both files claim to score the whole test set",
             )
 
 
@@ -225,12 +224,14 @@ def _is_shared(name: str) -> bool:
 def _keys(files: Sequence[ScoreFile], names: Sequence[str], headline: bool) -> list[str]:
     """Return the keys of columns: scores, and skills where any file has them.
 
-    In the headline the skills stand before all scores that they are made of; else after each.
+    In the headline the skills stand before all scores that they are made of; else after each. The
+    first name, or its skill, is the first key, which ranks.
     """
     skilled = [name for name in names if any(name in file.skills for file in files)]
     if headline:
         others = [name for name in names if name not in skilled]
-        return [*others, *(SKILL_OF + name for name in skilled), *skilled]
+        with_skills = [*(SKILL_OF + name for name in skilled), *skilled]
+        return [*with_skills, *others] if names[0] in skilled else [*others, *with_skills]
     return [k for n in names for k in ((n, SKILL_OF + n) if n in skilled else (n,))]
 
 
@@ -261,14 +262,14 @@ def _ranking(
     rows += _unranked("baseline", ((k, v) for k, v in baselines.items() if k != line), keys)
     reported = _reported(members, keys) if paper else {}
     rows += _unranked("reported", reported.items(), keys)
-    notes = [*filter(None, [mute]), *_notes(ranked, key), *_same_request_notes(members, files)]
-    if line and any(file.comparable for file in ranked[above:]):
-        notes.append(BELOW)
+    below = [BELOW] * bool(line and any(file.comparable for file in ranked[above:]))
+    notes = [*filter(None, [mute]), *_notes(ranked, key, below)]
+    notes += _same_request_notes(members, files)
     if not all(file.comparable for file in members):
         notes.append(NOT_COMPARABLE)
     if reported:
-        unit = "; it states no unit of length" if first.task == "rooms" else ""
-        notes.append(f"{REPORTED_MARK} {SOURCE}, {REPORTED}, so not ranked{unit}")
+        unit = "; unit of length unknown" if first.task == "rooms" else ""
+        notes.append(f"{REPORTED_MARK} not ranked: {SOURCE}, {REPORTED}{unit}")
     head = ("#", "method", *(_head(k, first) for k in keys))
     table = Table(_title(first), head, tuple(rows), tuple(notes), named_by=1)
     return Ranking(tuple(ranked), tuple(ranks), table, mute)
@@ -425,14 +426,14 @@ def _why_none_is_told_apart(file: ScoreFile, key: str) -> str:
     of_objects = [name for name in OBJECT_SCORES if name in file.items]
     scenes, scored = len(np.unique(file.clusters)), file.metrics[name].n
     if of_objects and not file.metrics.keys() & set(of_objects):
-        why = "no image shows an object that counts, so the empty room is the truth"
+        why = "no image shows an object, so the empty room is the ground truth"
     elif name == BEHIND and file.shown == "no_view":
-        why = "without an image, the mean relief of other rooms beats the baseline"
+        why = "without an input image, the mean over other rooms beats the baseline"
     elif scored < 2:
-        why = f"only {scored} of {scenes} {file.unit} has a score of {metric(name).title}"
+        why = f"only {scored} of {scenes} {file.unit} has a value of {metric(name).title}"
     else:
         return ""
-    return f"this test set cannot tell methods apart: {why}; no method has a rank"
+    return f"no ranks: {why}"
 
 
 def _title(file: ScoreFile) -> str:
@@ -441,13 +442,14 @@ def _title(file: ScoreFile) -> str:
     test = known_test(file.meta.truth_digest)
     name = plain(test.name if test else Path(file.meta.truth_path).name)
     if file.task == "iqtt":
-        kind = f" of the kind {plain(*file.by_distractor)}" if len(file.by_distractor) == 1 else ""
+        types = file.by_distractor
+        kind = f", distractor type {plain(*types)}" if len(types) == 1 else ""
         return f"Mental rotation: {len(file.ids):,} questions{kind}, {name}"
     if file.task == "measured":
         groups = f" of {len(np.unique(file.clusters)):,} groups" if file.grouped else ""
         size = f"{len(file.ids):,} images{groups}"
         return f"Measured depth: {size}, {name}, protocol {file.protocol}{fitted}"
-    task = {"first_view": "Rooms from the first view", "no_view": "Rooms from no view"}.get(
+    task = {"first_view": "Rooms from the first view", "no_view": "Rooms without an image"}.get(
         file.shown_of_several or "", "Rooms"
     )
     scenes, views = (len(np.unique(c)) for c in (file.clusters, file.columns["view_index"]))
@@ -462,44 +464,42 @@ def _label(file: ScoreFile, name: str) -> str:
     """Return a method's name with what has to be known about it."""
     texts = [f"{file.runs} runs"] * (file.runs > 1)
     if file.task != "iqtt" and (file.declared or file.alignment) != "none":
-        texts.append(f"given the {GIVEN[file.declared or file.alignment]}")
+        texts.append(f"fitted {GIVEN[file.declared or file.alignment]}")
     if file.unread is not None:
-        texts.append(f"{file.unread:.0%} of replies unread")
+        texts.append(f"{file.unread:.0%} of replies without a letter")
     mark = "" if file.comparable else f" {INCOMPARABLE_MARK}"
     return name + (f" ({'; '.join(texts)})" if texts else "") + mark
 
 
-def _notes(files: Sequence[ScoreFile], key: str) -> Iterator[str]:
+def _notes(files: Sequence[ScoreFile], key: str, below: Sequence[str]) -> Iterator[str]:
+    """Yield warnings, then what was scored, and how to read the table."""
     first, name = files[0], key.removeprefix(SKILL_OF)
-    truth = f", truth {first.meta.truth_digest[:12]}"
+    scored = first.metrics[name].n if first.task != "iqtt" and name in first.metrics else 0
+    few = too_few_warning(scored, f"{first.unit} with a value of {metric(name).title}")
+    yield from (f"warning: {text}" for text in few_clusters(first) or few)
+    if first.older:
+        yield f"warning: files of format 1.0 define some metrics differently; {SCORE_AGAIN}"
+    truth = f", ground truth {first.meta.truth_digest[:12]}"
     if first.task != "iqtt":
         clusters = f"{len(np.unique(first.clusters)):,} {first.unit}"
-        yield f"{len(first.ids):,} images of {clusters}{truth}"
-        if first.older:
-            yield (
-                "these are files of format 1.0, in which Chamfer, Hausdorff and others are defined"
-                f" otherwise: {SCORE_AGAIN}"
-            )
-        if first.shown_of_several is not None:
-            yield f"these methods were shown {VIEWS_SEEN[first.shown]}; others have their own table"
+        seen = first.shown_of_several
+        view = f"; input view: {VIEWS_SEEN[seen]}" if seen else ""
+        yield f"{len(first.ids):,} images of {clusters}{truth}{view}"
     else:
         chance = 1.0 / first.meta.counts["answers"]
         yield f"{len(first.ids):,} questions{truth}; chance is {chance:.4f}"
     skilled = next((file for file in files if file.skills), None)
     yield from () if skilled is None else skill_notes(skilled)
     yield f"[low, high]: {INTERVAL} over {first.unit}; ±: standard deviation over training runs"
-    yield SHARED
-    scored = first.metrics[name].n if first.task != "iqtt" and name in first.metrics else 0
-    warnings = too_few_warning(scored, f"{first.unit} with a score of {metric(name).title}")
-    yield from (f"warning: {text}" for text in few_clusters(first) or warnings)
+    yield "; ".join([SHARED, *below])
 
 
 def _same_request_notes(members: Sequence[ScoreFile], files: Sequence[ScoreFile]) -> Iterator[str]:
-    """Yield a note on each other test set that the same request made."""
+    """Yield a note on each other test set with the same recipe hash."""
     requests = {file.meta.truth_fingerprint for file in members}
     digests = {f.meta.truth_digest for f in files if f.meta.truth_fingerprint in requests}
     for digest in sorted(digests - {members[0].meta.truth_digest}):
         yield (
-            f"not ranked with truth {digest[:12]}: it answers the same request, but its content"
-            " differs, so its scores are ranked separately"
+            f"scores on ground truth {digest[:12]} are ranked separately: the same request made it,"
+            " but its content differs"
         )

@@ -1,5 +1,7 @@
 """How the numbers of one prediction move with the protocol: one table, and one figure."""
 
+import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -11,7 +13,7 @@ from metrics.scoring.records import ScoreFile
 from metrics.views.figures import COLUMN, draw_scores
 from metrics.views.score_tables import INTERVAL, baseline_cell, score_cell, size_of
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
-from scenegen.common.text_table import piped, plain
+from scenegen.common.text_table import plain
 
 
 def protocols_report(
@@ -21,11 +23,10 @@ def protocols_report(
     left_out = [p.name for p in PROTOCOLS if p.name not in {file.protocol for file in scores}]
     notes = [
         f"[low, high]: {INTERVAL} over {scores[0].unit}; 1 unit is 1 m",
-        "numbers of two protocols are not comparable; bench score --protocol NAME --json keeps one",
+        "values of two protocols are not comparable; bench score --protocol NAME --json stores one",
     ]
     if left_out:
-        why = "they suit neither these images nor what is predicted"
-        notes.append(f"left out, as {why}: {', '.join(left_out)}")
+        notes.append(f"protocols that do not apply to these images: {', '.join(left_out)}")
     form = to_markdown if as_markdown else to_text
     first = scores[0]
     title = f"{plain(first.method)} on {plain(first.meta.truth_path)}: {size_of(first)}"
@@ -44,7 +45,7 @@ def protocols_table(scores: Sequence[ScoreFile]) -> Table:
         # Its baseline beside the first score; that of the others is in the tables of one protocol.
         scored.insert(1, baseline_cell(file, names[0]))
         rows.append([protocol.name, file.alignment, limits, share, *scored])
-    head = ("protocol", "alignment", "metres", "pixels", names[0], "its baseline", *names[1:])
+    head = ("protocol", "alignment", "metres", "pixels", names[0], "baseline", *names[1:])
     return make_table("", head, rows)
 
 
@@ -61,12 +62,12 @@ def range_text(low: float, high: float) -> str:
     return f"from {low:g}" if low else "all"
 
 
-def markdown_table() -> str:
-    """Return the table of protocols of docs/real-data.md."""
+def csv_table() -> str:
+    """Return docs/data/protocols.csv."""
     head = ("protocol", "pixels", "metres", "alignment", "clipped to", "mean over", "source")
     rows = [
         (
-            f"`{p.name}`",
+            p.name,
             ", then ".join(_crop_text(crop) for crop in p.crops) or "all",
             range_text(p.least, p.largest),
             p.alignment or "as declared",
@@ -76,7 +77,9 @@ def markdown_table() -> str:
         )
         for p in PROTOCOLS
     ]
-    return "\n".join(piped([head, *rows]))
+    table = io.StringIO()
+    csv.writer(table, lineterminator="\n").writerows([head, *rows])
+    return table.getvalue()
 
 
 def _crop_text(crop: Crop) -> str:

@@ -41,12 +41,15 @@ if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
 
 ROOMS_REMARK = (
-    "Depths share the truth's range; the error ends at a tenth of it. Normals are x, y, z as red,"
-    " green, blue. Grey is not scored. A click enlarges a picture."
+    "All depth images share the range of the ground truth; error images end at a tenth of this"
+    " range."
+    " Normals show x, y, z as red, green, blue. Grey pixels are not scored. Click an image to"
+    " enlarge"
+    " it."
 )
 MOST_CURVES = 64  # images, spread evenly, over which the curve of confidence is a mean
 QUESTIONS_REMARK = (
-    "One answer shows the shape of the reference, turned. The questions are spread evenly over the"
+    "One option shows the shape of the reference, rotated. The questions are spread evenly over the"
     " file."
 )
 
@@ -73,7 +76,7 @@ def html_report(
         titles = {"rooms": "Scenes", "measured": "Images", "iqtt": "Questions"}
         remark = QUESTIONS_REMARK if scores.task == "iqtt" else ROOMS_REMARK
         if scores.grouped:
-            remark += " Of several images of a group, the one nearest to their mean is shown."
+            remark += " For each group, the image closest to the mean of the group is shown."
         sections.append(Section(titles[scores.task], remarks=[remark], examples=examples))
     groups = list(group_tables(scores))
     reported = figures_of(scores)
@@ -88,10 +91,10 @@ def html_report(
     tables += [paper_table(reported)] if reported else []
     sections += [Section(t.title.capitalize(), tables=[t], folded=True) for t in tables]
     rows = [(name, metric(name).definition) for name in in_order(scores.metrics)]
-    table = make_table("Definitions", ("metric", "of one item"), rows)
+    table = make_table("Definitions", ("metric", "value for one image or question"), rows)
     sections += [
-        Section("How each number is defined", tables=[table], folded=True),
-        Section("Where the numbers come from", notes=_origin(scores), folded=True),
+        Section("Definitions of the metrics", tables=[table], folded=True),
+        Section("Sources", notes=_origin(scores), folded=True),
     ]
     return html_page(scores.method, sections, warnings_of(scores))
 
@@ -113,7 +116,7 @@ def confidence_chart(predictions: RoomPredictions, truth: Images) -> list[Sectio
     if not curves:
         return []
     mean = np.mean(curves, axis=0)
-    chart = ("AbsRel without the least sure pixels", svg_url(draw_sparsification, mean))
+    chart = ("AbsRel without the least confident pixels", svg_url(draw_sparsification, mean))
     return [Section("Confidence", charts=[chart])]
 
 
@@ -131,8 +134,8 @@ def group_charts(files: Sequence[ScoreFile]) -> list[Section]:
         if sum(all(name in _group(file, grouping, key) for file in files) for key in groups) > 1
     ]
     charts = [(metric(n).title, svg_url(draw_groups, files, grouping, n)) for n in names]
-    titles = {"angle": "By degrees between the view and the scene's first one"}
-    title = titles.get(grouping, "Accuracy by kind of question")
+    titles = {"angle": "By angle to the first view of the scene"}
+    title = titles.get(grouping, "Accuracy by distractor type")
     return [Section(title, charts=charts)] if charts else []
 
 
@@ -167,7 +170,8 @@ def _origin(scores: ScoreFile) -> list[str]:
     counts = ", ".join(f"{name.replace('_', ' ')} {n}" for name, n in meta.counts.items())
     return [
         f"{counts}.",
-        f"Truth: {meta.truth_path}, digest {meta.truth_digest}, request {meta.truth_fingerprint}.",
+        f"Ground truth: {meta.truth_path}, hash {meta.truth_digest}, recipe hash"
+        f" {meta.truth_fingerprint}.",
         f"Scored by {meta.writer}.",
         *(f"{run.path} {run.run} {run.sha256}" for run in meta.submissions),
     ]

@@ -24,6 +24,7 @@ from metrics.scoring.metric_names import (
     metric,
 )
 from metrics.scoring.records import GROUPINGS, Meta, Score, ScoreFile, Skill
+from metrics.submissions.hints.depth import UNITS
 from metrics.views.table import Cell, Table, make_table, to_markdown, to_text
 from scenegen.common.text_table import by_number, distinct, number, plain, with_interval
 from scenegen.files.new_file import written_beside
@@ -33,31 +34,34 @@ MAIN_HEAD = ("metric", "", "value", INTERVAL, "baseline", "skill", INTERVAL)
 SKILL = "skill: 0 = baseline, 1 = perfect, negative = worse than the baseline"
 ITSELF = "baseline itself"
 NO_BASELINE = (
-    "no skill: no baseline is known of questions with these settings. `iqtt floors {} --out"
-    " floors.json` measures it, and `bench score --floors floors.json` uses it"
+    "no skill: no 2D-only baseline is known for these settings; measure it with `iqtt floors {}`,"
+    " then score with --baselines floors.json"
 )
-BY_KIND = "by kind of question"
+BY_KIND = "by distractor type"
 GROUP_TITLES = {
-    "by_view_angle": "by degrees between the view and the scene's first one",
-    "by_object_shape": "of single objects, by shape",
-    "by_object_size": "of single objects, by share of the picture in percent",
+    "by_view_angle": "by angle to the first view of the scene, degrees",
+    "by_object_shape": "single objects, by shape",
+    "by_object_size": "single objects, by area in percent of the image",
     "by_distractor": BY_KIND,
-    "by_rotation_angle": "by rotation between reference and right answer, degrees",
-    "by_position": "by place of the right answer",
-    "by_answer": "by the answer that was given",
-    "by_outcome": "by what the model's text held",
-    "by_circle": "circular: right in every order of the answers",
+    "by_rotation_angle": "by rotation between reference and correct option, degrees",
+    "by_position": "by position of the correct option",
+    "by_answer": "by selected option",
+    "by_outcome": "by outcome of reading the reply",
+    "by_circle": "CircularEval: correct in every order of the options",
 }
 ALIGNMENT_SCORES = ("abs_rel", "rmse", "delta_1")
+NOTED_ALIGNMENTS = ("none", "scale", "scale_shift", "disparity_scale_shift")
+ONE_SCALE = 1.5  # factor on depth from which another unit is suspected, as hints do
+ALIKE = 0.15  # log2 of factors by which the scales of images may differ then
 
 
 def text_report(
     scores: ScoreFile, as_markdown: bool = False, whole: bool = False, width: int | None = None
 ) -> str:
-    """Return the main metrics, as aligned text or Markdown, and accuracy by kind of question.
+    """Return the main metrics, as aligned text or Markdown, and accuracy by distractor type.
 
     Args:
-        whole: whether all metrics, and the main ones by group, stand there as well.
+        whole: whether all metrics, and the main metrics by group, are included.
         width: characters of a line, to which sentences are wrapped.
     """
     title = "\n".join([title_of(scores), *(f"WARNING  {text}" for text in warnings_of(scores))])
@@ -86,15 +90,19 @@ def write_csv(scores: ScoreFile, path: str | Path, overwrite: bool = False) -> N
 
 
 def main_names(scores: ScoreFile) -> list[str]:
-    """Return the metrics that are shown first: those of the headline, or others without any."""
+    """Return the metrics that are shown first: the main metrics, or others if there are none."""
     names = [name for name in PRINTED[scores.kind] if name in scores.metrics]
     names = [name for name in names if name != BEHIND or name in scores.headline]
     return names or in_order(scores.metrics)[:5]
 
 
 def main_table(scores: ScoreFile) -> Table:
-    """Return a row for each main metric: direction, value, baseline and skill."""
+    """Return a row for each main metric: direction, value, baseline and skill.
+
+    No skill is shown where depth seems to have another unit.
+    """
     rows: list[Sequence[str]] = []
+    head = MAIN_HEAD[:-2] if unit_warning(scores) else MAIN_HEAD
     for name in main_names(scores):
         score, skill = scores.metrics[name], scores.skills.get(name)
         value, interval = interval_cells(score)
@@ -105,18 +113,18 @@ def main_table(scores: ScoreFile) -> Table:
             rows.append((*row, "-", ""))
         else:
             rows.append((*row, *(("0", ITSELF) if skill.is_floor else interval_cells(skill))))
-    return make_table("", MAIN_HEAD, rows)
+    return make_table("", head, [row[: len(head)] for row in rows])
 
 
 def baseline_name(scores: ScoreFile, name: str) -> str:
-    """Return the name of the baseline of a score that has a skill."""
+    """Return the name of the baseline of a metric that has a skill."""
     if scores.task != "iqtt":
         return BASELINES[scores.skills[name].floor_name[: -len(name)]].name
     return " ".join(scores.skills[name].floor_name.split())
 
 
 def baseline_cell(scores: ScoreFile, name: str) -> Cell:
-    """Return what the baseline of a score reaches, with its name."""
+    """Return the value and the name of the baseline of a metric."""
     if name not in scores.skills:
         return Cell()
     value = _beside(scores.skills[name].floor, scores.metrics[name])
@@ -124,24 +132,24 @@ def baseline_cell(scores: ScoreFile, name: str) -> Cell:
 
 
 def _beside(reference: float, score: Score) -> str:
-    """Return a number as its score is shown, but never a rounded 0."""
+    """Return a number with the digits of a score, but never a rounded 0."""
     text = number(reference, (score.low, score.high))
     return number(reference) if reference and float(text) == 0 else text
 
 
 def alignment_tables(scores: ScoreFile) -> Iterator[Table]:
-    """Yield the scores of depth under each alignment side by side, the one that ranks first."""
+    """Yield depth metrics after each alignment side by side, the one that ranks first."""
     rows: list[Sequence[Cell | str]] = []
     for alignment, shown in _by_alignment(scores):
         ranks = alignment == scores.alignment
         label = f"{alignment} (ranks)" if ranks else alignment
         rows.insert(0 if ranks else len(rows), (label, *map(score_cell, shown)))
     if rows:
-        yield make_table("depth after each alignment", ("alignment", *ALIGNMENT_SCORES), rows)
+        yield make_table("depth metrics by alignment", ("alignment", *ALIGNMENT_SCORES), rows)
 
 
 def _by_alignment(scores: ScoreFile) -> Iterator[tuple[str, list[Score | None]]]:
-    """Yield each alignment that leaves as much open as the method does, and ALIGNMENT_SCORES."""
+    """Yield each alignment as loose as the declared one or looser, and ALIGNMENT_SCORES."""
     ending = "" if scores.alignment == "none" else f"_after_{scores.alignment}"
     if not all(f"{name}{ending}" in scores.metrics for name in ALIGNMENT_SCORES):
         return
@@ -153,7 +161,7 @@ def _by_alignment(scores: ScoreFile) -> Iterator[tuple[str, list[Score | None]]]
 
 
 def all_scores(scores: ScoreFile) -> Table:
-    """Return a row for each score."""
+    """Return a row for each metric."""
     rows: list[Sequence[str]] = []
     for name in in_order(scores.metrics):
         score, skill = scores.metrics[name], scores.skills.get(name)
@@ -173,7 +181,7 @@ def group_tables(scores: ScoreFile) -> Iterator[Table]:
             continue
         held = {name for group in groups.values() for name in group}
         names = [name for name in HEADLINE[scores.kind] if name in held] or in_order(held)
-        with_skills = grouping == "by_distractor"
+        with_skills = grouping == "by_distractor" and bool(scores.question_floors)
         rows: list[Sequence[Cell | str]] = []
         for key in by_number(groups):
             group = groups[key]
@@ -186,7 +194,7 @@ def group_tables(scores: ScoreFile) -> Iterator[Table]:
 
 
 def shown_key(grouping: str, key: str) -> str:
-    """Return a group's name as people see it: answers have letters."""
+    """Return the printed name of a group: options have letters."""
     numbered = grouping in ("by_position", "by_answer") and key.isdigit()
     return LETTERS[int(key)] if numbered else key
 
@@ -196,7 +204,7 @@ def _group_cell(score: Score | None) -> Cell:
 
 
 def _kind_cells(scores: ScoreFile, kind: str) -> tuple[Cell, Cell]:
-    """Return the skill in a kind of questions over the baseline of that kind, and the baseline."""
+    """Return the skill for a distractor type, and the baseline of that type."""
     accuracy = scores.by_distractor[kind]["iqtt_accuracy"]
     skill = question_skill(accuracy, {kind: accuracy.n}, scores.question_floors)
     if skill is None:
@@ -228,7 +236,7 @@ def score_cell(score: Score | Skill | None, best: bool = False, floor: float | N
 
 
 def side_by_side(files: Sequence[ScoreFile]) -> Table:
-    """Return a row for each main metric and each kind of question, with a column for each method.
+    """Return a row for each main metric and distractor type, with a column for each method.
 
     Metrics that have a skill are shown by it.
     """
@@ -263,10 +271,10 @@ def size_of(scores: ScoreFile) -> str:
 
 
 def title_of(scores: ScoreFile) -> str:
-    """Return method, truth and size; of images also what was fitted, the protocol and the unit."""
+    """Return method, ground truth and size; for images also alignment, protocol and unit."""
     texts = [f"{plain(scores.method)} on {plain(_truth_name(scores.meta))}: {size_of(scores)}"]
     if scores.task != "iqtt":
-        how = "metric" if scores.alignment == "none" else "fitted to the truth of each image"
+        how = "metric" if scores.alignment == "none" else "fitted to the ground truth per image"
         texts += [f"alignment: {scores.alignment} ({how})"]
         texts += [f"protocol: {scores.protocol}"] if scores.protocol else []
         unit = "metre" if scores.task == "measured" else scores.length
@@ -279,13 +287,31 @@ def _truth_name(meta: Meta) -> str:
 
 
 def warnings_of(scores: ScoreFile) -> list[str]:
-    """Return what is to be known before any number."""
+    """Return what a reader must know before any number."""
     return [
+        *unit_warning(scores),
         *scores.warnings,
         *few_clusters(scores),
         *partner_sentences(scores),
         *confidence_warnings(scores),
     ]
+
+
+def unit_warning(scores: ScoreFile) -> list[str]:
+    """Return a warning where one factor on depth explains most of the error; else none."""
+    if scores.alignment != "none" or "abs_rel_after_scale" not in scores.items:
+        return []
+    errors, scaled = scores.items["abs_rel"], scores.items["abs_rel_after_scale"]
+    scales = scores.items.get("scale_log2", np.zeros(1))
+    middle = float(np.nanmedian(scales)) if np.isfinite(scales).any() else 0.0
+    alike = np.mean(np.abs(scales - middle) <= ALIKE) > 0.5
+    if abs(middle) < np.log2(ONE_SCALE) or not alike or np.nanmedian(scaled / errors) > 0.5:
+        return []
+    times = 2.0**middle
+    unit = next((text for factor, text in UNITS.items() if 0.5 < times / factor < 2.0), "")
+    guess = f", possibly {unit}" if unit else ""
+    found = f"depth is {float(f'{times:.3g}'):,g} times the ground truth{guess}"
+    return [f"unit mismatch suspected, so no skill is shown: {found}"]
 
 
 def confidence_warnings(scores: ScoreFile) -> list[str]:
@@ -294,28 +320,28 @@ def confidence_warnings(scores: ScoreFile) -> list[str]:
     if gain is None:
         return []
     if (np.abs(scores.items["aurg_abs_rel"]) < 1e-12).all():
-        return ["confidence is constant in every image, so it says nothing"]
+        return ["confidence is constant in every image, so it ranks no pixels"]
     inverted = gain.value < 0.0 and (gain.high is None or gain.high < 0.0)
-    hint = "for uncertainty, say `bench import --confidence-is error`"
+    hint = "if the values are uncertainties, use `bench import --confidence-is error`"
     return [f"confidence is larger where errors are larger: {hint}"] * inverted
 
 
 def notes_of(scores: ScoreFile) -> list[str]:
-    """Return how to read the main table, and where its numbers come from: six lines at most."""
+    """Return at most six notes: how to read the main table, and where the numbers come from."""
     meta = scores.meta
     bootstrap = f"{meta.resamples} resamples, seed {meta.seed}"
-    notes = skill_notes(scores)
+    notes = [] if unit_warning(scores) else skill_notes(scores, main_names(scores))
     if scores.task != "iqtt":
         notes += _alignment_note(scores)
         over = f"{scores.unit}, {bootstrap}"
         if scores.task == "measured" and not scores.grouped:
-            over += "; images count as independent, as no groups are known"
+            over += "; images count as independent, because the file has no groups"
         notes.append(f"CIs: bootstrap over {over}")
     else:
-        how = "Wilson's" if scores.runs == 1 else f"bootstrap, {bootstrap}"
-        over = "questions, as the truth does not tell their shapes"
+        how = "Wilson" if scores.runs == 1 else f"bootstrap, {bootstrap}"
+        over = "questions"
         if "shape" in scores.items:
-            over = f"the shapes of references, {len(np.unique(scores.items['shape']))} in all"
+            over = f"{len(np.unique(scores.items['shape']))} reference shapes"
         notes.append(f"CIs: {how}, over {over}; abstentions and ties count as wrong")
         notes += unread_notes([scores])
     runs = ", ".join(run.sha256[:12] for run in meta.submissions)
@@ -325,18 +351,19 @@ def notes_of(scores: ScoreFile) -> list[str]:
     ]
 
 
-def skill_notes(scores: ScoreFile) -> list[str]:
-    """Return in two lines what skills mean; why there are none, where there are none."""
+def skill_notes(scores: ScoreFile, shown: Sequence[str] = ()) -> list[str]:
+    """Return what skill means and which baselines it uses, or why there is no skill."""
     if scores.task == "iqtt":
         if not scores.skills:
             known = bool(scores.by_distractor)
-            missing = "no skill: the truth does not tell its settings, so no baseline is known"
+            missing = "no skill: the answer key has no settings, so no baseline is known"
             return [NO_BASELINE.format(plain(scores.meta.truth_path)) if known else missing]
         chance = f"chance is {1.0 / scores.meta.counts['answers']:.2f}"
-        return [SKILL, f"baseline: best method without 3D on such questions, by kind; {chance}"]
+        return [SKILL, f"baseline: best 2D-only method for each distractor type; {chance}"]
     if not scores.skills:
         return []
-    names = [name for name in HEADLINE[scores.kind] if name in scores.skills] or [*scores.skills]
+    first = shown or HEADLINE[scores.kind]
+    names = [name for name in first if name in scores.skills] or [*scores.skills]
     begins = dict.fromkeys(scores.skills[name].floor_name[: -len(name)] for name in names)
     used = [BASELINES[begin] for begin in BASELINES if begin in begins]
     return [SKILL, f"baselines: {'; '.join(f'{base.name} = {base.gloss}' for base in used)}"]
@@ -344,62 +371,61 @@ def skill_notes(scores: ScoreFile) -> list[str]:
 
 def _alignment_note(scores: ScoreFile) -> list[str]:
     by_alignment = list(_by_alignment(scores))
-    firsts = [(name, shown[0]) for name, shown in by_alignment]
+    firsts = [(name, shown[0]) for name, shown in by_alignment if name in NOTED_ALIGNMENTS]
     values = " | ".join(f"{name} {interval_cells(first)[0]}" for name, first in firsts if first)
-    rule = "compare methods in ONE column only (bench compare --metric)"
-    return [f"abs_rel by alignment: {values}; {rule}"] * (len(by_alignment) > 1)
+    return [f"abs_rel by alignment: {values}"] * (len(by_alignment) > 1)
 
 
 def _not_scored(scores: ScoreFile) -> str:
-    """Return in words what the truth of measured images cannot tell."""
+    """Return what cannot be scored on measured ground truth."""
     if scores.task != "measured":
         return ""
-    texts = ["objects, as nobody marked them"]
+    texts = ["objects (not annotated)"]
     if scores.protocol == DECLARED.name and "boundary_f1" not in scores.items:
-        texts.append("boundaries, as depth is known at too few pixels")
+        texts.append("boundaries (depth is too sparse)")
     if scores.protocol == DECLARED.name and "normal_mean_degrees" not in scores.items:
-        texts.append("normals, unless both files have them")
+        texts.append("normals (not in both files)")
     source = BY_NAME[scores.protocol].source
     return f"; not scored: {'; '.join(texts)}; protocol: {source}"
 
 
 def unread_notes(files: Sequence[ScoreFile]) -> list[str]:
-    """Return in words the share of unread replies of each method whose replies were read."""
+    """Return the share of replies without a letter, for each method that has replies."""
     return [
-        f"unread replies of {label}: {file.unread:.0%} name no letter; they count as wrong"
+        f"replies of {label} without a letter: {file.unread:.0%}; they count as wrong"
         for file, label in zip(files, labels_of(files), strict=True)
         if file.unread is not None
     ]
 
 
 def partner_sentences(scores: ScoreFile) -> list[str]:
-    """Return a sentence where skills of relief leave out images for want of another scene."""
+    """Return a sentence where the skill of relief_iou leaves out images without another scene."""
     name = "relief_iou"
     if name not in scores.skills:
         return []
     has_score, has_floor = (
         int(np.isfinite(scores.items[column]).sum()) for column in (name, OTHER_SCENE + name)
     )
-    why = "no other scene has the view of the others"
-    text = f"skills of relief are over {has_floor} of {has_score} images: {why}"
+    why = "no other scene has the same view as the rest"
+    text = f"skill of relief_iou covers {has_floor} of {has_score} images: {why}"
     return [text] * (has_floor < has_score)
 
 
 def few_clusters(scores: ScoreFile) -> list[str]:
-    """Return a warning where bootstrapped intervals rest on too few scenes or shapes; else none."""
+    """Return a warning where bootstrap intervals use too few scenes or shapes; else none."""
     labels = scores.items.get("shape", scores.clusters)
     units = "shapes" if scores.task == "iqtt" else scores.unit
     return too_few_warning(len(np.unique(labels)), units) if scores.meta.resamples else []
 
 
 def too_few_warning(count: int, units: str) -> list[str]:
-    """Return a warning where so many scenes or shapes do not suffice for intervals; else none."""
+    """Return a warning where a number of scenes or shapes is too small for intervals."""
     text = f"{count} {units}: {CONFIDENCE:.0%} CIs under-cover below {FEW_CLUSTERS}"
     return [text] * (1 < count < FEW_CLUSTERS)
 
 
 def source_text(meta: Meta) -> str:
-    """Return in words who chose the truth, and its name among the known test sets."""
+    """Return the source of the ground truth, and the name of its benchmark."""
     test = known_test(meta.truth_digest)
     source = "from --truth" if meta.truth_source == "given" else "path stored in the predictions"
-    return f"{source}, {f'test set {test.name}' if test else 'not a named test set'}"
+    return f"{source}, {f'benchmark {test.name}' if test else 'not a named benchmark'}"

@@ -107,15 +107,16 @@ def to_text(
     Args:
         title: may have several lines.
         width: characters of a line. Notes are wrapped to it, and the heads of tables that are
-            wider; without it nothing is.
+            wider; columns that do not fit follow below, after those that name the rows. None wraps
+            nothing.
     """
     parts = [[line for text in title.splitlines() for line in _wrapped(text, width)]]
     told = set[str]()
     for table in tables:
         rows = [[printable(str(cell)) for cell in row.cells] for row in table.rows]
-        lines = _layout([[*table.head], *rows], (), "plain").splitlines()
+        lines = _lines([[*table.head], *rows])
         if width is not None and max(map(len, lines)) + 2 > width:
-            lines = _layout([_narrow(table.head, rows), *rows], (), "plain").splitlines()
+            lines = _folded([_narrow(table.head, rows), *rows], table.named_by + 1, width - 2)
         below = [line for note in _once(table.notes, told) for line in _wrapped(note, width)]
         above = [printable(table.title)] if table.title else []
         parts.append([*above, *(f"  {line}".rstrip() for line in lines), *below])
@@ -162,6 +163,30 @@ def latex(text: str) -> str:
 
 def _layout(rows: Sequence[Sequence[str]], head: Sequence[str], form: str | TableFormat) -> str:
     return tabulate(rows, head, tablefmt=form, disable_numparse=True)
+
+
+def _lines(rows: Sequence[Sequence[str]]) -> list[str]:
+    return _layout(rows, (), "plain").splitlines()
+
+
+def _folded(rows: Sequence[Sequence[str]], names: int, width: int) -> list[str]:
+    """Return lines no wider than `width`, if columns allow: those that do not fit come below.
+
+    Args:
+        names: first columns that begin each block, as they name the rows.
+    """
+    count, lines = len(rows[0]), list[str]()
+    start = names
+    while start < count:
+        stop, block = start, list[str]()
+        while stop < count:
+            wider = _lines([[*row[:names], *row[start : stop + 1]] for row in rows])
+            if stop > start and max(map(len, wider)) > width:
+                break
+            stop, block = stop + 1, wider
+        lines += [*([""] if lines else []), *block]
+        start = stop
+    return lines
 
 
 def _narrow(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

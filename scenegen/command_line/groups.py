@@ -83,10 +83,14 @@ class PackageCommands(click.Group):
             from scenegen.common.errors import SceneGenError
 
             command = self.get_command(ctx, ctx.invoked_subcommand or "")
-            options = {name for param in command.params for name in param.opts} if command else ()
+            options = {
+                re.sub("[ _]", "-", name.lstrip("-")): param.opts[0]
+                for param in (command.params if command else ())
+                for name in (param.name, *param.opts)
+            }
             if isinstance(error, SceneGenError):
-                option = "--" + re.sub("[ _]", "-", error.where)
-                error.where = option if option in options else error.where
+                setting = re.sub("[ _]", "-", error.where)
+                error.where = options.get(setting, error.where)
             raise
 
     def _loaded(self) -> list[Any]:

@@ -18,6 +18,22 @@ MOST_PROCESSES = 1024
 MOST_ITEMS = 1_000_000  # numbers of a range; keeps 0-99999999999 from filling the memory
 
 
+class Renamed(click.Option):
+    """An option that is still read under its former name, which help and errors leave out."""
+
+    def __init__(self, *arguments: Any, former: str, **attributes: Any) -> None:
+        super().__init__(*arguments, **attributes)
+        self.former = former
+
+    def add_to_parser(self, parser: Any, ctx: click.Context) -> None:
+        """Let the parser know both names."""
+        self.opts.append(self.former)
+        try:
+            super().add_to_parser(parser, ctx)
+        finally:
+            self.opts.pop()
+
+
 class _Parsed(click.ParamType):  # type: ignore[type-arg]
     """The value of an option that is not one of click's types.
 
@@ -145,44 +161,47 @@ class Reflectance(Color):
 # fmt: off
 WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
                        show_default="one a processor, up to 16",
-                       help="Processes that render; each takes about 0.4 GiB, for interiors 1.3.")
+                       help="Rendering processes. Each uses about 0.4 GiB of memory, or 1.3 GiB for"
+                       " interiors.")
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS",
-                         help="Spread the work over a Dask cluster, such as tcp://host:8786; local"
-                         " starts one on this machine.")
+                         help="Address of a Dask scheduler that distributes the work, such as"
+                         " tcp://host:8786; local starts a cluster on this machine.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,
-                      help="Where to render; auto is the CPU, which is slow without LLVM.")
+                      help="Device to render on. auto selects the CPU, which needs LLVM to be"
+                           " fast.")
 IMAGE_DTYPE = click.option("--image-dtype", type=click.Choice(["uint8", "float16", "float32"]),
-                           default="uint8", show_default=True, help="Type of stored radiance.")
+                           default="uint8", show_default=True, help="Data type of the stored"
+                                                                    " radiance.")
 COMPRESSION = click.option("--compression", type=click.Choice(["gzip", "lzf", "none"]),
                            default="gzip", show_default=True,
-                           help="How images are compressed; only h5py reads lzf.")
+                           help="Compression of the images. Only h5py reads lzf.")
 ENCODING = click.option("--encoding", "curve", type=click.Choice(["srgb", "linear"]),
                         default="srgb", show_default=True,
-                        help="Encoding of pictures: sRGB for eyes and networks, or linear radiance."
-                        " Floating-point images stay linear.")
+                        help="Encoding of the 8-bit images: sRGB, for display and for networks, or"
+                        " linear radiance. Floating-point images always stay linear.")
 SIZE = click.option("--size", type=Size(), default="128", show_default=True,
                     help="Image size in pixels.")
 SEED = click.option("--seed", type=int, default=0, show_default=True,
-                    help="Seed of every random choice.")
+                    help="Random seed.")
 UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True,
-                  help="Axis that points up in the meshes; in ShapeNet it is y.")
+                  help="Axis of the meshes that points up; y in ShapeNet.")
 CACHE_DIR = click.option("--cache-dir", type=OutputFolder(),
-                         help="Folder for meshes that are ready to render [the user's cache].")
-ASSETS = together(  # what others made for pictures of interiors
+                         help="Folder that caches cleaned meshes [the user's cache].")
+ASSETS = together(  # files of others that images of interiors are rendered with
     click.option("--materials", type=InputPath(within=PICTURE_FILES),
-                 help="Folder of materials for interiors, as ambientCG and Poly Haven deliver them:"
+                 help="Folder of materials for interiors, in the layout of ambientCG or Poly Haven:"
                  " maps of colour, roughness and normals."),
     click.option("--environment", type=InputPath(),
-                 help="Surroundings of interiors instead of sun and sky: an equirectangular HDR or"
-                 " EXR picture."),
+                 help="Environment map of interiors: an equirectangular HDR or EXR image that"
+                 " replaces sun and sky."),
 )
 MESHES = together(  # the folder of meshes that objects are taken from
     click.option("--shapenet-root", type=InputPath(within=MESH_FILES),
-                 help="Folder of ShapeNetCore 1 or 2 with the objects."),
+                 help="Folder of ShapeNetCore 1 or 2, to take meshes from."),
     click.option("--objects-root", type=InputPath(within=MESH_FILES),
-                 help="Folder with the objects, a sub-folder per class."),
+                 help="Folder to take meshes from, with one sub-folder per category."),
     UP,
     CACHE_DIR,
 )

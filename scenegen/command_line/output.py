@@ -26,12 +26,12 @@ def line_width() -> int:
 
 
 def print_checks(what: str, checks: "Sequence[Check]") -> int:
-    """Print the outcome of checks of a file or folder; return the exit code."""
-    for check in checks:
-        print_line(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
+    """Print the outcome of checks of a file or folder, then each check; return the exit code."""
     failed = sum(not check.ok for check in checks)
     outcome = f"{failed} of {len(checks)} checks failed" if failed else "verified"
     print_line(f"{what}: {outcome}")
+    for check in checks:
+        print_line(f"{'ok  ' if check.ok else 'FAIL'}  {check.name:26} {check.detail}")
     return 1 if failed else 0
 
 

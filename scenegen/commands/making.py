@@ -27,6 +27,7 @@ from scenegen.command_line.options import (
     Names,
     Range,
     Reflectance,
+    Renamed,
     Size,
 )
 from scenegen.command_line.output import on_scheduler, print_line, progress_bar
@@ -50,39 +51,46 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
 @click.command(
     epilog=f"{EXAMPLE}scenegen render --n 1000 --preset shapenet --seed 1 --out rooms.h5"
 )
-@click.option("--n", "count", type=int, required=True, help="Number of scenes.")
+@click.option("--n", "count", type=int, required=True, help="Number of scenes. Each scene has one"
+                                                            " image per view, see --views.")
 @click.option("--out", type=NewHdf5(), default="rooms.h5", show_default=True,
-              help="File to write, or a URL such as s3://bucket/rooms.h5.")
+              help="Output file, or a URL such as s3://bucket/rooms.h5.")
 @click.option("--preset", default="shapes", show_default=True, shell_complete=_presets,
-              help="Settings to start from, as `scenegen presets` lists them.")
+              help="Preset to take the defaults from. `scenegen presets` lists the presets.")
 @SEED
-@click.option("--size", type=Size(), help="Image size in pixels [128].")
-@click.option("--shapes", type=Names(), help="Basic shapes to draw from, such as box,sphere [all].")
-@click.option("--classes", type=Names(), help="Object classes to draw from, such as mug,bowl.")
+@click.option("--size", type=Size(), help="Image size in pixels [128; 256 for interiors].")
+@click.option("--shapes", type=Names(), help="Basic shapes to sample from, such as box,sphere"
+                                             " [all].")
+@click.option("--classes", type=Names(), help="Object categories to sample from, such as mug,bowl.")
 @click.option("--object-split", type=click.Choice(["all", "train", "val", "test"]),
-              help="Which models of a class to draw from [all].")
+              help="Object instances to sample from: those of one split, or all. For training"
+                   " data, use"
+              " train: the published benchmarks use test [all].")
 @MESHES
 @click.option("--reflectance", type=Reflectance(),
-              help="Reflectance of objects; also of the room, without --room-reflectance. With own,"
-              " meshes from a folder keep their colours, times 0.8 [0.8].")
+              help="Reflectance of the objects, and of the room if --room-reflectance is not given."
+              " own: meshes from a folder keep their own colours, multiplied by 0.8 [0.8].")
 @click.option("--fov", type=Range(float),
-              help="Field of view of a square image, degrees; each scene draws its own from a range"
-              " such as 20-60 [28].")
+              help="Field of view of a square image in degrees. With a range such as 20-60, each"
+                   " scene"
+              " samples its own [28].")
 @setting_options()
 @ASSETS
 @IMAGE_DTYPE
 @COMPRESSION
 @click.option("--batch", type=int, default=64, show_default=True,
-              help="Images that a process renders at once; more take more memory.")
+              help="Images that a process renders at once. Larger batches use more memory.")
 @WORKERS
 @click.option("--shard-size", type=int, default=10_000, show_default=True,
-              help="Most scenes of one file; more go to files beside --out, which shows them all as"
-              " one.")
+              help="Maximum number of scenes per file. Larger data sets are split into shards next"
+                   " to"
+              " --out, and --out reads as one file.")
 @SCHEDULER
 @DEVICE
-@click.option("--withhold-truth", is_flag=True,
-              help="Write images, cameras and row numbers to --out, to be handed out, and the whole"
-              " to a file beside it (rooms-truth.h5). Choose a large --seed that nobody guesses.")
+@click.option("--hold-out-truth", cls=Renamed, former="--withhold-truth", is_flag=True,
+              help="Write images, cameras and row numbers to --out, for release, and the full data"
+              " with the ground truth to rooms-truth.h5 next to --out. Choose a large --seed that"
+              " cannot be guessed.")
 @OVERWRITE
 def render(
     count: int,
@@ -95,15 +103,15 @@ def render(
     scheduler: str | None,
     device: str,
     compression: str,
-    withhold_truth: bool,
+    hold_out_truth: bool,
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Render rooms with objects to an HDF5 file, with exact ground truth.
+    """Render rooms with objects, with exact ground truth, to an HDF5 file.
 
-    Every image comes with its depth, normals, object ids, camera, lights and scene description.
-    Square brackets hold the defaults, which presets may change. Where a run with several files was
-    ended, the same command goes on.
+    Each image is stored with its depth, normals, object ids, camera, lights and scene description.
+    Defaults are in square brackets; a preset can change them. Re-run the same command to resume an
+    interrupted run that writes several shards.
     """
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source
@@ -125,11 +133,11 @@ def render(
     spec = _with_assets(preset_spec(preset, **chosen, **source.settings), **assets)
     spec, notes = with_denoiser(spec, chosen)
     notes += _crowded(spec)
-    images = count * len(spec.views)
+    images = count * len(spec.view_angles)
     started = time.perf_counter()
-    handed_out, out = out, _truth_place(out, overwrite) if withhold_truth else out
+    released, out = out, _truth_place(out, overwrite) if hold_out_truth else out
     with (
-        _told_how_to_go_on(out),
+        _resume_hint(out),
         on_scheduler(scheduler, workers, partial(renderer_identity, device)) as cluster,
         progress_bar(images, "image") as bar,
     ):
@@ -146,13 +154,13 @@ def render(
             command=creation_command("scenegen"),
             objects=source.objects,
             cluster=cluster,
-            progress=_telling(notes, bar.update),
+            progress=_after_lines(notes, bar.update),
         )
-    if withhold_truth:
-        from scenegen.rooms.withheld import withhold_truth as withhold
+    if hold_out_truth:
+        from scenegen.rooms.withheld import withhold_truth
 
-        withhold(out, handed_out, overwrite)
-        print_line(f"{handed_out}: images and cameras, to be handed out; {out} has the truth")
+        withhold_truth(out, released, overwrite)
+        print_line(f"{released}: images and cameras, for release; {out} has the ground truth")
     seconds = time.perf_counter() - started
     megabytes = _set_bytes(out) / 1e6
     speed = f"{images / seconds:.0f}" if images > 9 * seconds else f"{images / seconds:.2g}"
@@ -164,7 +172,7 @@ def render(
 
 # fmt: on
 def _with_assets(spec: "Request", materials: str | None, environment: str | None) -> "Request":
-    """Return a spec with materials and surroundings of others, where they are told.
+    """Return a spec with materials and surroundings of others, if they are given.
 
     Raises as `assets.use_assets`, and SpecError where other rooms than interiors should have them.
     """
@@ -180,11 +188,10 @@ def _with_assets(spec: "Request", materials: str | None, environment: str | None
 
 
 def with_denoiser(spec: Any, chosen: Mapping[str, Any]) -> tuple[Any, list[str]]:
-    """Return a spec with a denoiser, or with as many samples as do without, unless that is told.
+    """Return a spec with a denoiser, or else with more samples, unless the options decide.
 
-    `spec` has the settings `denoise` and `spp`, or neither. The lines say that there is no
-    denoiser, where it is missed. Raises BackendError where no denoiser is installed, and one is
-    asked for.
+    `spec` has the settings `denoise` and `spp`, or neither. The lines say that the denoiser is
+    missing. Raises BackendError where no denoiser is installed, and one is asked for.
     """
     from scenegen.rendering.pictures.denoiser import check_denoiser, has_denoiser
 
@@ -196,43 +203,42 @@ def with_denoiser(spec: Any, chosen: Mapping[str, Any]) -> tuple[Any, list[str]]
         return replace(spec, denoise=True), []
     if spec.denoise or "spp" in chosen:
         return spec, []
-    text = f"no denoiser: {NOISY_SPP} samples a pixel instead; the extra `denoise` has one"
+    text = f"no denoiser: {NOISY_SPP} samples per pixel instead; pip install '.[denoise]' is faster"
     return replace(spec, spp=NOISY_SPP), [] if has_denoiser() else [text]
 
 
 def _crowded(spec: "Request") -> list[str]:
-    """Return a line that says so where few rooms have room for what is asked for."""
+    """Return a warning if few rooms have space for the number of objects that is asked for."""
     from scenegen.sampling.interiors.rooms import CROWDED
 
     if not spec.interior or spec.objects[1] < CROWDED[1]:
         return []
-    return [f"few rooms hold {spec.objects[1]} objects: a scene may take minutes, or find no room"]
+    most = spec.objects[1]
+    return [f"few rooms fit {most} objects: sampling a scene may take minutes, or fail"]
 
 
-def _telling(lines: list[str], progress: Callable[[int], Any]) -> Callable[[int], None]:
-    """Return `progress`, before whose first call, when all is known to be in order, lines are told.
+def _after_lines(lines: list[str], progress: Callable[[int], Any]) -> Callable[[int], None]:
+    """Return `progress`, whose first call, after all checks, prints the lines first."""
 
-    They are gone then.
-    """
-
-    def told(done: int) -> None:
+    def print_and_progress(done: int) -> None:
         while lines:
             print_line(lines.pop(0))
         progress(done)
 
-    return told
+    return print_and_progress
 
 
 def _truth_place(out: str, overwrite: bool) -> str:
-    """Return the file of truth that belongs to a file to be handed out. Raises OSError, SpecError.
+    """Return the file of ground truth that belongs to a file for release.
 
-    Its rows are copied when it is complete, so both are files of this machine.
+    Its rows are copied when it is complete, so both are files of this machine. Raises OSError and
+    SpecError.
     """
     from scenegen.common.records import check
     from scenegen.files.new_file import check_writable
     from scenegen.rooms.withheld import truth_path
 
-    check("://" not in out, "--withhold-truth", out, "a path of this machine")
+    check("://" not in out, "--hold-out-truth", out, "a path of this machine")
     check_writable(Path(out), overwrite)
     return str(truth_path(out))
 
@@ -268,8 +274,8 @@ def _set_bytes(out: str) -> int:
 
 
 @contextmanager
-def _told_how_to_go_on(out: str) -> Iterator[None]:
-    """Say how many shards are complete, and what to do, where the block is ended from outside."""
+def _resume_hint(out: str) -> Iterator[None]:
+    """Print how many shards are complete, and how to resume, if the block is interrupted."""
     from scenegen.files.places import as_place
     from scenegen.files.sets.making import complete_parts, parts_folder
 
@@ -278,17 +284,17 @@ def _told_how_to_go_on(out: str) -> Iterator[None]:
     except KeyboardInterrupt:
         with suppress(OSError):
             if done := len(complete_parts(parts_folder(as_place(out)))):
-                told = f"{done} shards are complete; the same command goes on"
-                print_line(f"{out}: {told}", err=True)
+                text = f"{done} shards are complete; re-run the same command to resume"
+                print_line(f"{out}: {text}", err=True)
         raise
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen merge rooms.h5 --out one.h5")
 @click.argument("file", type=InputPath())
-@click.option("--out", type=NewHdf5(), required=True, help="File to write.")
+@click.option("--out", type=NewHdf5(), required=True, help="Output file.")
 @OVERWRITE
 def merge(file: str, out: str, overwrite: bool) -> None:
-    """Make one file of rooms that were rendered to several."""
+    """Merge the shards of a file of rooms into one file."""
     from scenegen.rooms.make import merge_rooms
     from scenegen.rooms.reader import RoomsFile
 
@@ -300,7 +306,7 @@ def merge(file: str, out: str, overwrite: bool) -> None:
 
 @click.command(epilog=f"{EXAMPLE}scenegen presets")
 def presets() -> None:
-    """List the presets of `render` with their settings: the paper's data sets."""
+    """List the presets of `scenegen render` with their settings."""
     from scenegen.description.presets import PRESETS
 
     def shown(value: Any) -> str:

@@ -30,10 +30,10 @@ if TYPE_CHECKING:
 )
 @click.argument("folder", type=InputPath(within=MESH_FILES))
 @UP
-@click.option("--classes", type=Names(), help="Classes to check, such as bowl,mug [default: all].")
+@click.option("--classes", type=Names(), help="Categories to check, such as bowl,mug [all].")
 @CACHE_DIR
 @click.option(
-    "--json", "json_path", type=OutputPath(), help="File to write the result for every model to."
+    "--json", "json_path", type=OutputPath(), help="Output file with the result of every mesh."
 )
 @OVERWRITE
 @click.option(
@@ -54,11 +54,11 @@ def check_objects(
     overwrite: bool,
     jobs: int,
 ) -> None:
-    """Read and clean every model of a folder, as rendering would.
+    """Read and clean every mesh of a folder, as `scenegen render` does.
 
-    The folder is ShapeNetCore's or has a sub-folder for each class. Prints counts for each class
-    and why each model is refused. Exits with 1 if no model is usable, or if files of different
-    splits have equal content.
+    FOLDER is ShapeNetCore, or has one sub-folder per category. The command prints counts per
+    category and the reason why a mesh is refused. Exits with 1 if no mesh is usable, or if two
+    splits share an object.
     """
     from scenegen.files.new_file import check_writable, write_text
     from scenegen.objects.cache import default_cache_dir
@@ -80,20 +80,23 @@ def check_objects(
         print_line(line)
     shared = shared_by_splits(found.splits)
     for first, second in shared:
-        print_line(f"error: one object in two splits: {first} and {second} have equal content")
+        print_line(
+            f"error: the same object is in two splits: {first} and {second} have equal content"
+        )
     ctx.exit(0 if any(record.ok for record in records) and not shared else 1)
 
 
 def _table(folder: "ModelFolder", records: Sequence["ModelCheck"]) -> Iterator[str]:
     by_name = {record.name: record for record in records}
     groups = {name: [by_name[file.name] for file in folder.models[name]] for name in folder.classes}
-    width = max(len(name) for name in [*groups, "class", "total"])
-    yield f"{'class':{width}}  {'models':>7} {'ok':>7} {'mended':>7} {'refused':>7} {'faces':>10}"
+    width = max(len(name) for name in [*groups, "category", "total"])
+    columns = " ".join(f"{name:>8}" for name in ("meshes", "ok", "repaired", "refused"))
+    yield f"{'category':{width}}  {columns} {'faces':>10}"
     for name, some in [*groups.items(), ("total", list(records))]:
         ok = sum(record.ok for record in some)
         mended = sum(record.was_mended for record in some)
         faces = sum(record.faces for record in some)
-        yield (f"{name:{width}}  {len(some):7} {ok:7} {mended:7} {len(some) - ok:7} {faces:10}")
+        yield f"{name:{width}}  {len(some):8} {ok:8} {mended:8} {len(some) - ok:8} {faces:10}"
     for record in records:
         if not record.ok:
             yield f"refused  {record.name}: {record.reason}"

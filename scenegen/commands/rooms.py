@@ -32,11 +32,11 @@ MOST_NAMED = 20  # exported rows whose files are listed
 @click.command(epilog=f"{EXAMPLE}scenegen preview rooms.h5 --random 12 --out sheet.png")
 @click.argument("file", type=InputPath())
 @click.option(
-    "--out", type=OutputPath(), default="sheet.png", show_default=True, help="Picture to write."
+    "--out", type=OutputPath(), default="sheet.png", show_default=True, help="Output image."
 )
-@click.option("--items", type=Items(), help="Rows to show [default: the first 12].")
+@click.option("--items", type=Items(), help="Images to show [default: the first 12].")
 @click.option(
-    "--random", "number", type=click.IntRange(1, 400), help="Number of rows to pick at random."
+    "--random", "number", type=click.IntRange(1, 400), help="Number of images to pick at random."
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of --random.")
 @OVERWRITE
@@ -48,7 +48,7 @@ def preview(
     seed: int,
     overwrite: bool,
 ) -> None:
-    """Write a picture of some rooms of a file: image, depth, normals and object ids."""
+    """Draw images of FILE in one contact sheet, each with depth, normals and object ids."""
     from scenegen.files.pictures import pick_rows, save_picture
     from scenegen.rooms.preview import contact_sheet
     from scenegen.rooms.reader import RoomsFile
@@ -57,13 +57,13 @@ def preview(
         rows = pick_rows(len(rooms), items, number, seed)
         sheet = contact_sheet([rooms[i] for i in rows])
     save_picture(sheet, out, overwrite)
-    print_line(f"{out}: {len(rows)} of {file}'s rooms")
+    print_line(f"{out}: {len(rows)} images of {file}")
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen info rooms.h5")
 @click.argument("file", type=InputPath())
 def info(file: str) -> None:
-    """Print what a file holds: settings, ranges of values, units, sizes, versions, fingerprint."""
+    """Print the contents of a file of rooms: settings, value ranges, units, sizes, versions."""
     from scenegen.rooms.info import describe
 
     click.echo(describe(file))
@@ -76,7 +76,7 @@ def info(file: str) -> None:
     type=click.IntRange(0),
     default=8,
     show_default=True,
-    help="Number of rows to draw from the seed and render again.",
+    help="Number of images to render again.",
 )
 @MESHES
 @ASSETS
@@ -92,11 +92,11 @@ def verify(
     environment: str | None,
     **meshes: Any,
 ) -> None:
-    """Check digests and values of every row of a file, and render some rows again.
+    """Check the content hashes and values of every image of a file, and render some images again.
 
-    Of a file without its truth, check the digests of what it holds.
-    Rows rendered again must agree bit for bit, or within a stated tolerance where the file was
-    rendered by other versions of Mitsuba, Dr.Jit or LLVM. Exits with 1 if a check fails.
+    Images that are rendered again must agree bit for bit, or within a stated tolerance if other
+    versions of Mitsuba, Dr.Jit or LLVM rendered the file. A file without ground truth is checked
+    for its content hashes only. Exits with 1 if a check fails.
     """
     from scenegen.objects.sources import file_objects
     from scenegen.rendering.pictures.places import ASSETS as PLACES
@@ -135,9 +135,11 @@ def _check_images(path: Path, spec: "Request") -> None:
 )
 @click.argument("file", type=InputPath())
 @click.option(
-    "--items", type=Items(), help=f"Rows to export; {', '.join(ROW_FORMATS)} need it, or --all."
+    "--items",
+    type=Items(),
+    help=f"Images to export. {', '.join(ROW_FORMATS)} need --items or --all.",
 )
-@click.option("--all", "every", is_flag=True, help="Export all rows.")
+@click.option("--all", "every", is_flag=True, help="Export all images.")
 @click.option(
     "--format",
     "form",
@@ -151,35 +153,36 @@ def _check_images(path: Path, spec: "Request") -> None:
     type=click.Choice(["8", "16"]),
     default="8",
     show_default=True,
-    help="Bits of images and normals in PNG files. Depth always has 16.",
+    help="Bit depth of images and normals in PNG files. Depth always has 16 bits.",
 )
 @click.option(
     "--exposure",
     type=click.FloatRange(0, min_open=True),
     default=1.0,
     show_default=True,
-    help="Factor of radiance in pictures and PLY files, so that bright images fit.",
+    help="Factor on the radiance in images and PLY files, to avoid clipping.",
 )
 @click.option(
     "--depth-unit",
     type=click.FloatRange(0, min_open=True),
-    help="Scene units for each of the 65,535 steps of depth in PNG files; moge needs none [1e-4; of"
-    " interiors 1e-3, millimetres].",
+    help="Scene units per step of the 16-bit depth in PNG files; not for moge [1e-4; 1e-3, which is"
+    " 1 mm, for interiors].",
 )
 @click.option(
     "--out",
     type=OutputFolder(),
-    help="Folder to write to [.; formats of many rows make one, such as rooms-parquet].",
+    help="Output folder [. for exr, png, ply and obj; else a new one, such as rooms-parquet].",
 )
 @click.option(
     "--rows-per-file",
     type=click.IntRange(1),
     default=1000,
     show_default=True,
-    help="Most rows of a file of parquet or webdataset.",
+    help="Maximum number of images per file of parquet or webdataset.",
 )
 @OVERWRITE
 @MESHES
+@ASSETS
 @DEVICE
 def export(
     file: str,
@@ -194,15 +197,20 @@ def export(
     rows_per_file: int,
     overwrite: bool,
     device: str,
+    materials: str | None,
+    environment: str | None,
     **meshes: Any,
 ) -> None:
-    """Write rows of a file in the formats of other tools.
+    """Export images of a file with their ground truth to the formats of other tools.
 
-    A value that does not fit into its encoding is refused. The message names the option that helps.
-    Masks of whole objects, for bop, are rendered (--device).
+    Values that do not fit the encoding are an error, which names the option to change. --device
+    is the device on which bop renders the masks of whole objects.
     """
     if every and items is not None:
         raise click.UsageError("--all and --items exclude each other: use one of them")
+    from scenegen.rendering.pictures.places import ASSETS as PLACES
+
+    PLACES.use(materials, environment)
     folder = out or f"{Path(file).stem}-{form}"
     how = {"curve": curve, "bits": int(bits), "exposure": exposure}
     how |= {} if depth_unit is None else {"depth_unit": depth_unit}
@@ -211,7 +219,7 @@ def export(
     elif form in FOLDER_FORMATS:
         _export_folder(file, items, form, folder, overwrite, device, meshes, how)
     elif items is None and not every:
-        raise click.UsageError(f"--format {form} needs rows: use --items 0-9, or --all")
+        raise click.UsageError(f"--format {form} needs images: use --items 0-9, or --all")
     else:
         _export_single(file, items, form, out or ".", overwrite, meshes, how)
 
@@ -267,7 +275,7 @@ def _export_folder(
     from scenegen.rooms.reader import RoomsFile
 
     with RoomsFile(file) as rooms:
-        objects = file_objects(rooms.spec, **meshes) if form == "bop" else None
+        objects = file_objects(rooms.spec, **meshes) if form in ("bop", "glb") else None
         count = len(rooms if items is None else items)
         with progress_bar(count, "image") as bar:
             export_folder(

@@ -18,19 +18,19 @@ def publication_options(title: str, license_: str) -> Callable[[Command], Comman
     """Return options for what only the publisher knows; the texts name two of their defaults."""
     return together(
         click.option("--creator", "creators", multiple=True, required=True,
-                     help="Who made the data; may be said several times."),
-        click.option("--title", help=f"Name of the data [{title}]."),
+                     help="Creator of the data. Repeatable."),
+        click.option("--title", help=f"Title of the data set [{title}]."),
         click.option("--license", "licence",
-                     help=f"SPDX identifier of the data's licence, or its address [{license_}]."),
+                     help=f"Licence of the data: an SPDX identifier or a URL [{license_}]."),
         click.option("--out", type=OutputPath(), default="README.md", show_default=True,
-                     help="Page to write."),
+                     help="Output page."),
     )  # fmt: skip
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen card train.h5 test.h5 --creator 'A. Person'")
 @click.argument("files", type=InputPath(), nargs=-1, required=True)
 @publication_options(
-    title="that of the first file", license_="CC-BY-4.0; none where rooms show meshes from a folder"
+    title="the name of the first file", license_="CC-BY-4.0; none if meshes come from a folder"
 )
 @OVERWRITE
 def card(
@@ -41,10 +41,10 @@ def card(
     out: str,
     overwrite: bool,
 ) -> None:
-    """Write a data card of files of rooms: a page with the header that Hugging Face reads.
+    """Write a data card for files of rooms, with the metadata header of Hugging Face.
 
-    Hand it on in one folder with the files, or with Parquet files of `scenegen export`, of which
-    Hugging Face makes Croissant metadata.
+    Publish the card in one folder with the files, or with the Parquet files of `scenegen export`.
+    From Parquet files, Hugging Face generates Croissant metadata.
     """
     needs("scenegen card", SHARE, "share")
     from scenegen.rooms.reader import RoomsFile

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 RECORDING = click.option(
     "--out", type=OutputPath(), metavar="FILE.rrd",
-    help="Recording to write [rooms.rrd of rooms.h5].",
+    help="Output recording [rooms.rrd for rooms.h5].",
 )  # fmt: skip
 
 
@@ -31,19 +31,19 @@ def record(
     refuse_command_inputs([path])
     count = write_recording(path, title, scenes, overwrite)
     megabytes = path.stat().st_size / 1e6
-    print_line(f"{path}: {count} images, {megabytes:.1f} MB; show them with `rerun {path}`")
+    print_line(f"{path}: {count} images, {megabytes:.1f} MB; open it with `rerun {path}`")
 
 
 @click.command(epilog=f"{EXAMPLE}scenegen view rooms.h5")
 @click.argument("file", type=InputPath())
-@click.option("--items", type=Items(), help="Rows to show [default: the first 100].")
+@click.option("--items", type=Items(), help="Images to show [default: the first 100].")
 @RECORDING
 @OVERWRITE
 def view(file: str, items: list[int] | None, out: str | None, overwrite: bool) -> None:
-    """Write a recording of the scenes of a file, for the 3D viewer Rerun.
+    """Write a recording of the scenes of a file for the 3D viewer Rerun.
 
-    It has points, cameras, image, depth, normals and object ids of every view; the viewer tells
-    their values under the mouse. Whoever has Rerun can open it.
+    The recording holds points, cameras, image, depth, normals and object ids of every view. The
+    viewer shows the values under the mouse pointer.
     """
     needs("scenegen view", ("rerun",), "view")
     from scenegen.rooms.reader import RoomsFile

@@ -9,12 +9,12 @@ from typing import Self
 
 
 class SceneGenError(ValueError):
-    """Base of every error that a caller may show to a person instead of a traceback.
+    """Base class of errors that are shown to users without a traceback.
 
     Attributes:
         where: the file, row, setting or option that is wrong, such as `rooms.h5: depth, row 3`.
-        found: what is there; empty where `where` says it all.
-        expected: what should be there instead.
+        found: what was found; empty if `where` suffices.
+        expected: what was expected instead.
         hint: what the user can do about it.
     """
 

@@ -29,7 +29,7 @@ PRESETS = {
     "shapes-single": Preset("one basic shape", {"objects": (1, 1)}),
     "shapenet": Preset("two to four household objects", {**HOUSEHOLD, "objects": (2, 4)}),
     "shapenet-single": Preset(
-        "one household object, of a known class",
+        "one household object",
         {**HOUSEHOLD, "objects": (1, 1), "object_radius": (0.16, 0.26)},
     ),
     "furniture-256": Preset(
@@ -44,16 +44,16 @@ PRESETS = {
         },
     ),
     "specular": Preset(
-        "basic shapes with highlights, after Phong",
+        "basic shapes with Phong highlights",
         {"specular": (0.3, 0.8), "shininess": (8.0, 64.0), "reflectance": (0.5, 0.5, 0.5)},
     ),
     "two-tone": Preset(
-        "objects of one colour, the room of another",
+        "objects in one colour, the room in another",
         {"reflectance": (0.85, 0.4, 0.3), "room_reflectance": (0.4, 0.6, 0.85)},
     ),
-    "albedo": Preset("every object of a colour of its own", {"random_reflectance": True}),
+    "albedo": Preset("each object in a random colour", {"random_reflectance": True}),
     "random-lights": Preset(
-        "one to five lights of any place and strong colours",
+        "one to five lights at random positions, in strong colours",
         {"lights": (1, 5), "light_saturation": 1.0},
     ),
     "interiors": Preset(

@@ -67,9 +67,9 @@ class SceneSpec:
         cameras: one for each view.
         ambient: the RGB of L_a.
         attenuation: (k_l, k_q) of the shading equation.
-        room_reflectance: the RGB of rho of floor and walls; None where there is no room.
-        background: radiance of rays that meet nothing.
-        interior: the closed room; None for the paper's floor and two walls.
+        room_reflectance: the RGB of rho of ground and walls; None without a room.
+        background: radiance of rays that hit no surface.
+        interior: the closed room; None for a box room (ground and two walls).
     """
 
     index: int
@@ -96,5 +96,5 @@ class SceneSpec:
 
     @classmethod
     def from_json(cls, text: str | bytes) -> "SceneSpec":
-        """Read what `to_json` wrote. Raises SpecError where the text is no scene description."""
+        """Read what `to_json` wrote. Raises SpecError for any other text."""
         return from_json(cls, text, "scene description")

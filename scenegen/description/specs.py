@@ -2,7 +2,7 @@
 
 `DatasetSpec` asks for the paper's rooms, and `InteriorSpec` for closed rooms with furniture. Each
 setting stands once: it is a field, whose metadata has its limits and its text for `--help`. Lengths
-are in scene units (the room's edge; metres in closed rooms), frames as in `camera.py`.
+are in scene units (side length of the room; metres in closed rooms), frames as in `camera.py`.
 """
 
 import itertools
@@ -32,7 +32,7 @@ IMAGE_DTYPES = ("uint8", "float16", "float32")
 BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES + FURNITURE_NAMES}
 FOLDERS = ("shapenet-v1", "shapenet-v2", "folder")
 SPLITS = ("all", "train", "val", "test")
-TRUTHS = ("amodal", "coordinates", "flow", "albedo")
+TRUTHS = ("amodal", "coordinates", "flow", "albedo", "layers")
 MAX_CLASSES = 4000  # their names are an attribute, of which HDF5 allows 64 kB
 MAX_LIGHTS = 16
 MAX_PIXELS = 4096 * 4096
@@ -77,22 +77,24 @@ class RoomSpec:
         seed: dataset seed, 0 to 2**63 - 1.
         height, width: image size in pixels.
         objects: fewest and most objects of a scene.
-        source: what objects are: "shapes" for basic shapes, "families" for the built-in object
-            classes, else the kind of folder that their meshes come from; the
-            classes of closed rooms that a folder lacks are built in.
-        shapes: names to draw from, each with the same probability: basic shapes, or classes.
-        object_split: which objects of a class are drawn from (see `meshes.listing.object_split`).
-        listing: digest of the names of a folder's models; empty for what is built in.
+        source: "shapes" for basic shapes, "families" for the built-in object categories, else the
+            type of the folder of meshes; closed rooms take categories that the folder lacks from
+            the built-in ones.
+        shapes: names to sample from with equal probability: basic shapes, or object categories.
+        object_split: split of object instances to sample from (see `meshes.listing.object_split`).
+        listing: hash of the names of the meshes of a folder; empty for built-in objects.
         views: degrees about the vertical axis through the target, from the input view, which is
             the first, to each view of a scene; see `sampling.cameras`.
         spp: colour samples per pixel; 1 shades the ground-truth hit itself.
         image_dtype: "uint8" (linear radiance 0..1 as 0..255), "float16" or "float32" (radiance).
-        min_visible_pixels: every object shows at least so many pixels in every view, in closed
-            rooms LEAST_SEEN objects; by default VISIBLE_SHARE of the image's, at least 1.
+        min_visible_pixels: minimum number of visible pixels of every object in every view (in
+            closed rooms, of LEAST_SEEN objects); by default VISIBLE_SHARE of the image.
         fov_degrees: field of view of a square image; others have its diagonal.
-        fov_spread_degrees: how much wider than `fov_degrees` a scene's field of view can be; each
-            scene draws its own, uniformly.
-        truth: further truth of each row, some of TRUTHS (`rooms.truth`).
+        fov_spread_degrees: range of the field of view above `fov_degrees`; each scene samples its
+            own, uniformly.
+        stereo: distance between the cameras of a stereo pair; 0 for single cameras. Each view is
+            then followed by a view whose camera is moved along its x axis.
+        truth: additional ground truth, some of TRUTHS (`rooms.truth`).
     """
 
     seed: int = setting(0)
@@ -108,23 +110,32 @@ class RoomSpec:
     listing: str = setting("")
     views: tuple[float, ...] = setting(
         (0.0,),
-        "Views of each scene, in degrees about the vertical axis from the first view, such as"
-        " 0,5,35,55,80",
+        "Views of each scene: degrees of rotation about the vertical axis from the first view,"
+        " such as 0,5,35,55,80",
     )
     spp: int = setting(
         1, "Colour samples per pixel; with --shading path, 64 by default", limits=(1, 1024)
     )
     image_dtype: str = setting("uint8", choices=IMAGE_DTYPES)
     min_visible_pixels: int = setting(
-        FROM_SIZE, "Fewest pixels that show an object, in every view", shown="0.3%"
+        FROM_SIZE,
+        "Minimum number of visible pixels of each object in every view",
+        shown="0.3% of the image",
     )
     fov_degrees: float = setting(28.0)
     fov_spread_degrees: float = setting(0.0, later=True)
+    stereo: float = setting(
+        0.0,
+        "Baseline of stereo pairs in scene units (metres in interiors), such as 0.065: each view"
+        " gets a second image, from a camera further to the right. 0 renders no pairs",
+        limits=(0.0, 0.25), later=True,
+    )  # fmt: skip
     truth: tuple[str, ...] = setting(
         (),
-        "More truth to store: some of amodal,coordinates,flow,albedo. That is masks of whole"
-        " objects and their visible fractions, object coordinates (NOCS), optical flow to the next"
-        " view with occlusion, reflectance of each pixel",
+        "Additional ground truth to store, comma-separated. amodal: masks of whole objects and"
+        " their visible fractions; coordinates: object coordinates (NOCS); flow: optical flow to"
+        " the next view, with occlusion; albedo: reflectance of each pixel; layers: all surfaces"
+        " along each ray, up to 16",
         later=True, option="with", shown="none",
     )  # fmt: skip
 
@@ -147,6 +158,12 @@ class RoomSpec:
         return max(1, self.objects[1])
 
     @property
+    def view_angles(self) -> tuple[float, ...]:
+        """Degrees from the input view to each image of a scene: one of `views`, or two of each."""
+        eyes = 2 if self.stereo else 1
+        return tuple(angle for angle in self.views for _ in range(eyes))
+
+    @property
     def fov_y_degrees(self) -> float:
         """Vertical field of view; the diagonal is that of a square image with `fov_degrees`.
 
@@ -167,28 +184,28 @@ class RoomSpec:
 
 @dataclass(frozen=True)
 class DatasetSpec(RoomSpec):
-    """A request for the paper's rooms: a floor and two walls, with objects on the floor.
+    """A request for box rooms, as in the paper: a ground and two walls, with objects on the ground.
 
     Attributes:
         object_radius: smallest and largest bounding radius of an object, scene units.
-        pose: "resting" puts every object down in a position where it would stay; "any" turns it
-            uniformly on SO(3) and lowers it until it touches the floor.
+        pose: "resting" puts each object in a stable position; "any" rotates it uniformly on SO(3)
+            and lowers it until it touches the ground.
         lights: fewest and most point lights.
         shading: "paper" for the paper's equation, "path" for a path tracer on the same scene.
         shadows: whether lights are occluded (the paper's shading equation has no visibility term).
-        allow_cropped: let the image's border cut objects (their centres stay in the image).
+        allow_cropped: allow objects that the image border crops (centres stay in the image).
         camera_radius: distance from camera to target, scene units.
         camera_target: the fixed point of the room that cameras look at, world.
         light_radius: distance from the target to each light, scene units.
         light_level: radiance of a white surface at the target that faces all lights, ambient apart.
         ambient: the RGB of L_a.
         attenuation: k_l and k_q of the shading equation.
-        light_saturation: each light's RGB is drawn from 1 - this to 1, then its largest made 1.
+        light_saturation: RGB of each light is sampled from 1 - this to 1, then scaled to maximum 1.
         reflectance, room_reflectance: the RGB of rho, of objects and of the room.
-        random_reflectance: draw every object's instead, from 0.15 to 0.95 each.
+        random_reflectance: sample the reflectance of each object, from 0.15 to 0.95 per channel.
         specular, shininess: ranges of Phong's k_s and exponent of objects; the room is matte.
         own_reflectance: multiply the reflectance of objects by the colours of their files; the
-            truth then has "albedo", as no other column tells it.
+            ground truth then has "albedo".
 
     The other settings are those of `RoomSpec`.
     """
@@ -197,52 +214,52 @@ class DatasetSpec(RoomSpec):
 
     object_radius: tuple[float, float] = setting(
         (0.11, 0.22),
-        "Bounding radius of objects in scene units; with several views the default is a quarter"
-        " smaller",
+        "Bounding radius of objects in scene units. With several views, the default is 25% smaller",
         limits=(0.005, 0.5),
     )
     pose: str = setting(
         "resting",
-        "Whether objects lie as they would stay, or are turned at random",
+        "resting: objects lie in a stable position on the ground; any: random orientation",
         choices=("resting", "any"),
     )
     lights: tuple[int, int] = setting((1, 3), "Number of lights in a scene", limits=(0, MAX_LIGHTS))
     shading: str = setting(
         "paper",
-        "The paper's shading equation, or path tracing, with shadows and indirect light; slower",
+        "paper: the paper's shading equation; path: path tracing with shadows and indirect light,"
+        " slower",
         choices=("paper", "path"),
     )
-    shadows: bool = setting(False, "Whether objects cast shadows", option="shadows/--no-shadows")
-    allow_cropped: bool = setting(False, "Let the image's border cut objects")
-    camera_radius: float = setting(1.5, "Distance of cameras from the target, scene units")
+    shadows: bool = setting(False, "Cast shadows of objects", option="shadows/--no-shadows")
+    allow_cropped: bool = setting(False, "Allow objects that the image border crops")
+    camera_radius: float = setting(1.5, "Distance of the cameras from the target, in scene units")
     camera_target: Vector3 = setting((0.3, 0.3, 0.3))
-    light_radius: float = setting(2.5, "Distance of lights from the target, scene units")
+    light_radius: float = setting(2.5, "Distance of the lights from the target, in scene units")
     light_level: float = setting(
         0.95,
-        "Radiance of a white surface at the target that faces all lights",
+        "Radiance of a white surface at the target that faces every light",
         limits=(0.0, 100.0),
     )
     ambient: Vector3 = setting((0.1, 0.1, 0.1), "Ambient light L_a")
     attenuation: tuple[float, float] = setting(
         (0.5, 0.5),
-        "k_l,k_q: how light falls off with distance and its square",
+        "Linear and quadratic attenuation of light with distance, k_l,k_q",
         shown="0.5,0.5",
     )
     light_saturation: float = setting(
-        0.7, "How coloured lights are, from 0 (white) to 1", limits=(0.0, 1.0)
+        0.7, "Colour saturation of the lights, from 0 (white) to 1", limits=(0.0, 1.0)
     )
     reflectance: Vector3 = setting((0.8, 0.8, 0.8))
-    room_reflectance: Vector3 = setting((0.8, 0.8, 0.8), "Reflectance of floor and walls")
+    room_reflectance: Vector3 = setting((0.8, 0.8, 0.8), "Reflectance of ground and walls")
     random_reflectance: bool = setting(
         False,
-        "Whether each object gets a random colour or all the same",
+        "Random reflectance for each object, or the same for all objects",
         option="random-reflectance/--same-reflectance",
     )
     specular: tuple[float, float] = setting(
-        (0.0, 0.0), "Phong's coefficient k_s of objects", limits=(0.0, 10.0)
+        (0.0, 0.0), "Phong coefficient k_s of the objects", limits=(0.0, 10.0)
     )
     shininess: tuple[float, float] = setting(
-        (1.0, 1.0), "Phong's exponent of objects", limits=(1.0, 10_000.0)
+        (1.0, 1.0), "Phong exponent of the objects", limits=(1.0, 10_000.0)
     )
     own_reflectance: bool = setting(False, later=True)
 
@@ -282,11 +299,11 @@ class InteriorSpec(RoomSpec):
     """A request for closed rooms with furniture, in metres (`description.interiors`).
 
     Attributes:
-        hours: earliest and latest hour of the day; each scene draws its own, uniformly.
+        hours: earliest and latest hour of the day; each scene samples its own, uniformly.
         denoise: whether images are denoised.
-        sensor_noise: standard deviation of noise that is added to images, as a share of white.
-        materials: digest of a folder of materials; empty for those that are drawn.
-        environment: digest of an image of the surroundings; empty for sun and sky.
+        sensor_noise: standard deviation of the noise that is added to images, relative to white.
+        materials: hash of a folder of materials; empty for procedural materials.
+        environment: hash of an environment map; empty for sun and sky.
 
     The other settings are those of `RoomSpec`. Class attributes answer for settings of
     `DatasetSpec` that the renderer asks for.
@@ -307,18 +324,18 @@ class InteriorSpec(RoomSpec):
     )  # fmt: skip
     hours: tuple[float, float] = setting(
         (7.0, 21.0),
-        "Hours of the day of interiors; it is night after 18",
+        "Hours of the day in interiors. Outside is dark after 18",
         limits=(0.0, 24.0),
         later=True,
     )
     denoise: bool = setting(
         False,
-        "Whether images of interiors are denoised",
-        later=True, option="denoise/--no-denoise", shown="if the extra `denoise` is there",
+        "Denoise the images of interiors",
+        later=True, option="denoise/--no-denoise", shown="if the extra `denoise` is installed",
     )  # fmt: skip
     sensor_noise: float = setting(
         0.0,
-        "Noise of the camera of interiors, as a share of white",
+        "Standard deviation of the sensor noise in interiors, relative to white",
         limits=(0.0, 1.0),
         later=True,
     )
@@ -454,4 +471,4 @@ def _check_truth(spec: RoomSpec) -> None:
     check(not wrong, "truth", ", ".join(wrong), f"some of {', '.join(TRUTHS)}")
     object.__setattr__(spec, "truth", tuple(name for name in TRUTHS if name in spec.truth))
     expected = "two views or more, such as --views 0,35"
-    check("flow" not in spec.truth or len(spec.views) > 1, "flow", "one view", expected)
+    check("flow" not in spec.truth or len(spec.view_angles) > 1, "flow", "one view", expected)

@@ -64,5 +64,5 @@ def exr_picture(path: Path, most: int) -> Array:
         names = grey * 3
     if len({channels[name].shape for name in names}) != 1:
         listed = f"the channels {', '.join(list(channels)[:12])}"
-        raise FileFormatError(path, listed, "R, G and B of one layer", "save that layer alone")
+        raise FileFormatError(path, listed, "R, G and B of one layer", "save only this layer")
     return np.stack([channels[name] for name in names], axis=-1).astype(np.float32)

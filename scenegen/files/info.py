@@ -19,17 +19,17 @@ def fact_lines(facts: Mapping[str, str], width: int = 15) -> list[str]:
 def setting_lines(spec: Any) -> list[str]:
     """Return a line for each setting, a star before those that differ from the default."""
     changed = changed_settings(spec)
-    lines = ["spec (* differs from the default)"]
+    lines = ["settings (* differs from the default)"]
     for name, value in vars(spec).items():
         shown = ", ".join(map(str, value)) if isinstance(value, tuple) else value
         star = "*" if name in changed and value is not None else " "
-        lines.append(f"{star} {name:24} {'not told' if value is None else shown}")
+        lines.append(f"{star} {name:24} {'not stored' if value is None else shown}")
     return lines
 
 
 def column_lines(file: RowFile) -> list[str]:
     """Return a table of the columns: row, type and unit, size on disk, and how much is saved."""
-    rows = [("dataset", "row", "type", "unit", f"{'stored':>9}", f"{'ratio':>6}")]
+    rows = [("dataset", "shape", "type", "unit", f"{'stored':>9}", f"{'ratio':>6}")]
     for name, (stored, raw) in file.stored_bytes().items():
         values = file.read(name, slice(0, 0))
         rows.append(

@@ -11,7 +11,7 @@ from scenegen.common.signals import held_back
 from scenegen.files.places import as_place, is_remote, scratch, upload
 from scenegen.files.sets.workspace import remove_leftovers, workspace
 
-EXISTS = "exists already; say --overwrite to replace it"
+EXISTS = "already exists; use --overwrite to replace it"
 
 
 @contextmanager
@@ -134,7 +134,7 @@ def check_folder(path: str | Path, names: Collection[str], overwrite: bool, own:
     ours = {own, *(name.rstrip("/") for name in names if _is_there(folder, name))}
     strangers = sorted(set(os.listdir(folder)) - ours)
     if strangers:
-        raise FileExistsError(errno.EEXIST, f"holds other files too ({strangers[0]})", str(folder))
+        raise FileExistsError(errno.EEXIST, f"also holds other files ({strangers[0]})", str(folder))
 
 
 def _is_there(folder: Path, name: str) -> bool:

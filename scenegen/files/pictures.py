@@ -54,12 +54,12 @@ def opened_picture(source: Path | IO[bytes], most: int) -> "Iterator[Image]":
                 raise FileFormatError(where, found, f"at most {most:,} pixels")
             yield picture
     except (UnidentifiedImageError, Image.DecompressionBombError) as error:
-        raise FileFormatError(where, "what is no picture", ", ".join(READ)) from error
+        raise FileFormatError(where, "not an image", ", ".join(READ)) from error
     except (OSError, ValueError, SyntaxError) as error:
         if isinstance(error, SceneGenError) or (isinstance(error, OSError) and error.filename):
             raise
         reason = " ".join(str(error).split())
-        raise FileFormatError(where, f"a picture that cannot be read ({reason:.120})") from error
+        raise FileFormatError(where, f"an unreadable image ({reason:.120})") from error
 
 
 def picture_size(path: Path, most: int) -> tuple[int, int]:
@@ -157,7 +157,7 @@ def pick_rows(
 def check_picture_name(path: Path) -> None:
     """Raise SpecError for an ending that names no picture format."""
     is_picture = path.suffix.lower() in ENDINGS
-    check(is_picture, "out", repr(path.name), "a picture's name such as sheet.png")
+    check(is_picture, "out", repr(path.name), "the name of an image, such as sheet.png")
 
 
 def check_picture_size(picture: "Image", path: Path) -> None:

@@ -42,7 +42,7 @@ class LostWorkerError(SceneGenError):
 
     def of(self, what: str) -> "LostWorkerError":
         """Return the error of a second process that ended while it made the same rows."""
-        where = f"{what}: the process that makes them ended twice"
+        where = f"{what}: the worker process was terminated twice"
         return LostWorkerError(where, self.found, "", self.hint)
 
 
@@ -135,7 +135,7 @@ class Pool:
     def _start(self) -> "Process":
         with self._lock:
             if self._killed:
-                raise LostWorkerError("The worker processes were ended")
+                raise LostWorkerError("the worker processes were terminated")
             process = Process()
             self._started.append(process)
         process.begin(self._function)
@@ -168,7 +168,7 @@ class Process:
         try:
             succeeded, result = self.answer(function)
         except LostWorkerError as error:
-            raise _not_to_be_had(f"the first ended as it began, {error.found}") from error
+            raise _not_to_be_had(f"the first one exited at start, {error.found}") from error
         if not succeeded:
             raise result
 
@@ -203,9 +203,9 @@ class Process:
         self.end()
         hint = ""
         if oom_kills() > self._oom_kills:
-            hint = "memory ran out, as the kernel says: use fewer --workers"
+            hint = "out of memory (reported by the kernel): use fewer --workers"
         elif code == -getattr(signal, "SIGKILL", 0):
-            hint = "memory may be short: use fewer --workers"
+            hint = "possibly out of memory: use fewer --workers"
         return LostWorkerError("A worker process ended", ended(code), "", hint)
 
     def end(self) -> None:

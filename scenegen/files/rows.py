@@ -197,7 +197,9 @@ class RowFile:
                 scored = [name for name in self.SCORED if name in self._stored]
                 digests = {name: str(self._stored[name].attrs.get(SHA256)) for name in scored}
                 if joint_digest(digests) != self.stored_truth_digest:
-                    problems.append(f"the digests of {', '.join(scored)} do not give the truth's")
+                    problems.append(
+                        f"the hashes of {', '.join(scored)} do not match the truth hash"
+                    )
         return problems
 
     def reopener(self) -> Callable[[], "RowFile"]:

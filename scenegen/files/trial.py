@@ -35,7 +35,7 @@ def try_file(path: str | Path) -> None:
     That its content is right is not said. Raises FileFormatError where HDF5 crashes, does not end
     in time, or takes more memory than honest files need.
     """
-    if not os.path.isfile(path) or _identity(path) in _ACCEPTED or not _is_hdf5(path):
+    if not os.path.isfile(path) or _identity(path) in _ACCEPTED or not is_hdf5(path):
         return
     identity = _identity(path)
     limit = SECONDS + os.path.getsize(path) / BYTES_A_SECOND
@@ -70,7 +70,7 @@ def _judge(path: str | Path, done: "subprocess.CompletedProcess[str]", limit: fl
     elif code in (killed, slow) and "cpu" in lower:
         why, hint = "it used all of the processor time that is allowed here", "raise ulimit -t"
     elif "memory" in lower and code != slow:
-        why = f"memory is limited here, and it ended with {ended(code)}"
+        why = f"memory is limited here, and the process exited with {ended(code)}"
         hint = "raise ulimit -v"
     elif code == killed:
         why, hint = "it was killed", "memory may be short"
@@ -103,7 +103,7 @@ def _identity(path: str | Path) -> _Identity:
     return status.st_dev, status.st_ino, status.st_size, status.st_mtime_ns
 
 
-def _is_hdf5(path: str | Path) -> bool:
+def is_hdf5(path: str | Path) -> bool:
     """Return whether the signature is at 0, 512, 1024, 2048, ...: other bytes may come first."""
     place = 0
     with open(path, "rb") as file:

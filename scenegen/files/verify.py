@@ -59,7 +59,7 @@ def read_all(
 def content_check(name: str, file: OpenFile, digests: Mapping[str, str]) -> Check:
     """Check that values and attributes are those that were written; `digests` as there."""
     problems = content_problems(file, digests)
-    return listed_check(name, "every value and attribute as written, by SHA-256", problems)
+    return listed_check(name, "all values and attributes match their SHA-256", problems)
 
 
 def spread_rows(count: int, items: int) -> list[int]:

@@ -81,12 +81,12 @@ def folder_notes(folder: ModelFolder, own_colors: bool = False) -> list[str]:
     for suffix, up in USUALLY_UP.items():
         count = sum(path.suffix.lower() == suffix for path in paths)
         if count and up != folder.up and folder.kind == "folder":
-            usual = f"note: {folder.up} is up in {count} {suffix} files, where {up} usually is"
+            usual = f"note: {folder.up} is up in {count} {suffix} files, which usually have {up} up"
             notes.append(f"{usual}; if objects lie on their side, use --up {up}")
     firsts = [files[0].path for files in folder.models.values() if files]
     colored = next(filter(_has_colors, () if own_colors else firsts), None)
     if colored:
-        grey = f"note: {colored.name} has colours, which are not shown"
+        grey = f"note: {colored.name} has colours, which are not rendered"
         notes.append(f"{grey}; scenegen render --reflectance own shows them")
     return notes
 
@@ -129,7 +129,7 @@ def object_source(
     """
     root = mesh_folder(shapenet_root, objects_root, up)
     if shapes is not None and (classes is not None or root):
-        found = "--shapes beside --classes or a folder of meshes"
+        found = "--shapes with --classes or a folder of meshes"
         raise SpecError("objects", found, "one of them")
     split = {} if object_split is None else {"object_split": object_split}
     if shapes is not None:

@@ -151,7 +151,7 @@ def trace(batch: SceneBatch, names: Sequence[str], device: str = "auto") -> dict
 
 def traced_at_once(spec: Request) -> int:
     """Return how many images should be traced in one go."""
-    views = len(spec.views)
+    views = len(spec.view_angles)
     at_once = 1 if spec.interior else MOST_PATHS // (spec.height * spec.width * spec.spp * views)
     return max(1, at_once) * views
 

@@ -7,7 +7,7 @@ import numpy as np
 from scenegen.rooms.reader import RoomsFile
 
 MANY = 0.05  # share of values that calls for a warning
-STORE_ALL = "store all radiance with --image-dtype float16"
+STORE_ALL = "store unclipped radiance with --image-dtype float16"
 Shares = tuple[float, float]  # of values that are saturated, and black
 
 

@@ -19,7 +19,7 @@ SAMPLED = 64  # rows that are read to tell the ranges of values
 
 
 def describe(path: str | Path) -> str:
-    """Return a file's spec, counts, ranges, units, sizes, versions and fingerprint, as one text.
+    """Return settings, counts, ranges, units, sizes, versions and hashes of a file, as one text.
 
     Raises FileNotFoundError, FileFormatError as `RoomsFile`.
     """
@@ -31,9 +31,9 @@ def describe(path: str | Path) -> str:
             "written by": f"{texts['writer']}, {texts['variant']}",
             "rendered by": renderer_text(texts),
             "command": texts["creation_command"] or "-",
-            "fingerprint": rooms.fingerprint,
-            "truth digest": texts[TRUTH_DIGEST],
-            "content digest": texts[CONTENT_DIGEST],
+            "recipe hash": rooms.fingerprint,
+            "truth hash": texts[TRUTH_DIGEST],
+            "content hash": texts[CONTENT_DIGEST],
             "conventions": texts["conventions"],
         }
         sampled = spread_rows(len(rooms), SAMPLED)
@@ -43,7 +43,7 @@ def describe(path: str | Path) -> str:
         parts = (
             fact_lines(facts),
             setting_lines(spec),
-            [f"ranges over {len(sampled)} rows; shapes: {shapes}", *fact_lines(ranges)],
+            [f"ranges over {len(sampled)} images; objects: {shapes}", *fact_lines(ranges)],
             column_lines(rooms),
         )
         lines = [f"{path}: {len(rooms)} images of {spec.height}x{spec.width}, {size}"]

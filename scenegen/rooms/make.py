@@ -57,25 +57,25 @@ def make_dataset(
     """Render scenes 0 .. count - 1 of `spec` to a rooms file, each with a row for each view.
 
     Args:
-        path: a file, or a URL such as `s3://bucket/rooms.h5`: what goes there is written on this
-            machine, or on a worker of the cluster, and uploaded when it is complete.
-        batch: images rendered at once; it bounds memory and changes no byte of the file.
-        workers: processes that render; 0 for one a processor where that is worth while. They
-            change no byte either. More than one need `objects` that can be pickled.
-        shard_size: if there are more scenes, they go to shards of so many beside `path`, which then
-            shows all of them as one. The same call goes on where an earlier one was killed.
+        path: a file, or a URL such as `s3://bucket/rooms.h5`. Files for a URL are written on this
+            machine, or on a worker of the cluster, and uploaded when complete.
+        batch: images rendered at once; limits the memory and changes no byte of the file.
+        workers: rendering processes; 0 for one per processor if that is faster. The number changes
+            no byte of the file. Several processes need `objects` that can be pickled.
+        shard_size: maximum number of scenes per file; more scenes are split into shards next to
+            `path`, which reads as one file. The same call resumes an interrupted one.
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
         command: stored as the file's creation command.
-        objects: what the scenes are made of; None for `objects_of(spec)`.
-        cluster: whose workers make the shards; `path` must then be in a folder that all of them
-            see, or a URL.
+        objects: source of the objects; None for `objects_of(spec)`.
+        cluster: Dask cluster that makes the shards; `path` must then be a URL, or in a folder that
+            all workers see.
         progress: called now and then with the number of rows written since the last call, first
             before anything is rendered.
 
     Raises SpecError for a setting out of range, BackendError where the device cannot render here,
     PlacementError where no scene meets the request, and others as `making.make_set`.
     """
-    views = len(spec.views)
+    views = len(spec.view_angles)
     check_batch(batch, spec, views)
     check(0 <= workers <= MAX_WORKERS, "workers", workers, f"from 0 to {MAX_WORKERS}")
     check(1 <= count <= MAX_COUNT // views, "n", count, f"from 1 to {MAX_COUNT // views:,} scenes")
@@ -118,7 +118,7 @@ def check_batch(batch: int, size: Any, views: int = 1, images: int = 1) -> None:
 
 def rooms_part(spec: Request, count: int, marks: tuple[Mark, ...] = ()) -> Part:
     """Return the rows of so many scenes."""
-    return Part("", "", count, [Sheet(columns(spec))], marks, len(spec.views), "scenes")
+    return Part("", "", count, [Sheet(columns(spec))], marks, len(spec.view_angles), "scenes")
 
 
 def merge_rooms(
@@ -131,5 +131,5 @@ def merge_rooms(
 
     Raises as `sets.merge_file`.
     """
-    part = rooms_part(rooms.spec, len(rooms) // len(rooms.spec.views))
+    part = rooms_part(rooms.spec, len(rooms) // len(rooms.spec.view_angles))
     merge_file(rooms.opened, out, [part], rooms.compression(), overwrite, progress)

@@ -88,7 +88,7 @@ def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
         **interior,
         "scene_index": batch.index[images],
         "view_index": view,
-        "view_angle_degrees": np.array(spec.views)[view],
+        "view_angle_degrees": np.array(spec.view_angles)[view],
         "camera/world_from_camera": batch.world_from_camera[images],
         "camera/fov_y_degrees": batch.fov_y_degrees[images],
         "light/count": batch.light_count[images],

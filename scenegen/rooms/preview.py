@@ -11,6 +11,7 @@ from scenegen.common.srgb import encoded
 from scenegen.rooms.reader import Room
 
 Array = NDArray[Any]
+LAYERS = "layers/depth"
 GAP = 6
 LABEL_HEIGHT = 18
 SMALLEST_TILE = 128  # pixels; narrower images are enlarged by a whole factor
@@ -22,14 +23,16 @@ PALETTE = np.array(  # of object ids: the room is grey; objects repeat Okabe and
     np.uint8,
 )  # fmt: skip
 TITLES = ("image", "depth, near is dark", "normal, xyz as rgb", "object id")
+CUTS = ("cut from above", "cut from the side")  # of files with layers
 
 
 def contact_sheet(rooms: Sequence[Room], columns: int = 2) -> Image.Image:
-    """Return a sheet with four labelled tiles for each room, `columns` rooms side by side."""
+    """Return a sheet with labelled tiles for each room, `columns` rooms side by side."""
+    titles = TITLES + (CUTS if LAYERS in rooms[0].truth else ())
     height, width = rooms[0].depth.shape
     factor = -(-SMALLEST_TILE // width) if width < SMALLEST_TILE else 1
     tile = (width * factor, height * factor)
-    cell = (4 * (tile[0] + GAP) + 2 * GAP, tile[1] + LABEL_HEIGHT + GAP)
+    cell = (len(titles) * (tile[0] + GAP) + 2 * GAP, tile[1] + LABEL_HEIGHT + GAP)
     columns = min(columns, len(rooms))
     lines = -(-len(rooms) // columns)
     sheet = Image.new(
@@ -37,7 +40,7 @@ def contact_sheet(rooms: Sequence[Room], columns: int = 2) -> Image.Image:
     )
     draw, font = ImageDraw.Draw(sheet), ImageFont.load_default(size=12)
     for column in range(columns):
-        for k, title in enumerate(TITLES):
+        for k, title in enumerate(titles):
             left = GAP + column * cell[0] + k * (tile[0] + GAP)
             draw.text((left, 3), title, fill=INK, font=font)
     for i, room in enumerate(rooms):
@@ -51,7 +54,7 @@ def contact_sheet(rooms: Sequence[Room], columns: int = 2) -> Image.Image:
 
 
 def tiles(room: Room) -> list[NDArray[np.uint8]]:
-    """Return the four pictures of a room, each (H, W, 3) uint8."""
+    """Return the pictures of a room, each (H, W, 3) uint8; those of CUTS where it has layers."""
     nothing = room.object_id < 0
     pictures = [
         srgb_bytes(room.radiance),
@@ -61,7 +64,55 @@ def tiles(room: Room) -> list[NDArray[np.uint8]]:
     ]
     for picture in pictures:
         picture[nothing] = NOTHING
+    if LAYERS in room.truth:
+        layers = [room.truth[f"layers/{x}"] for x in ("depth", "object_id", "entering")]
+        pictures += cuts(layers, *cut_places(layers[2]))
     return pictures
+
+
+def cut_places(entering: Array) -> tuple[int, int]:
+    """Return the row and the column in which most rays enter an object, of layers (H, W, L)."""
+    enters = (entering == 1).any(axis=-1)
+    return int(enters.sum(axis=1).argmax()), int(enters.sum(axis=0).argmax())
+
+
+def cuts(
+    layers: Sequence[Array], row: int, column: int, ends: tuple[float, float] | None = None
+) -> list[NDArray[np.uint8]]:
+    """Return cuts along a row and a column of an image, (H, W, 3) each, with depth on one axis.
+
+    Objects have the colours of their ids, what is behind the room's surface is grey.
+
+    Args:
+        layers: depth, object_id and entering, (H, W, L), as in `layers.Layers`.
+        ends: least and largest depth that are shown; by default those of the layers.
+    """
+    depth = layers[0]
+    height, width = depth.shape[:2]
+    known = depth[np.isfinite(depth)]
+    near, far = ends or (float(known.min(initial=1.0)), float(known.max(initial=1.0)))
+    margin = 0.05 * max(far - near, 1e-6)
+    levels = [np.linspace(near - margin, far + margin, n) for n in (height, width)]
+    above = _cut([x[row].T for x in layers], levels[0])[::-1]
+    aside = _cut([x[:, column].T for x in layers], levels[1]).transpose(1, 0, 2)
+    return [above, aside]
+
+
+def _cut(layers: Sequence[Array], levels: Array) -> NDArray[np.uint8]:
+    """Return colours at depths (K,) of N rays, (K, N, 3), from their layers, (L, N)."""
+    picture = np.full((len(levels), layers[0].shape[1], 3), 255, np.uint8)
+    inside, room = np.zeros(layers[0].shape[1], np.int64), PALETTE[0]
+    step = levels[1] - levels[0]
+    for depth, number, kind in zip(*layers, strict=True):
+        inside = np.where(kind == 1, number, np.where((kind == -1) & (inside == number), 0, inside))
+        behind = levels[:, None] >= np.where(np.isfinite(depth), depth, np.inf)
+        drawn = np.where(inside > 0, inside, 0)
+        colors = np.where((drawn > 0)[:, None], id_colors(drawn), 255)
+        colors = np.where((number == 0)[:, None], room, colors).astype(np.uint8)
+        picture = np.where(behind[..., None], colors, picture)
+        sheet = behind & (levels[:, None] < depth + step) & ((kind == 0) & (number > 0))
+        picture[sheet] = np.broadcast_to(id_colors(number), picture.shape)[sheet]
+    return picture
 
 
 def srgb_bytes(radiance: Array) -> NDArray[np.uint8]:

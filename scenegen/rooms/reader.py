@@ -11,9 +11,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import back_project, transform_points
+from scenegen.camera import back_project, pixel_size, transform_points
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
+from scenegen.derived import seen_from
 from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import request_from_json
 from scenegen.files.attributes import read_root
@@ -57,7 +58,7 @@ class Room:
 
     @property
     def radiance(self) -> Array:
-        """Linear RGB radiance, (H, W, 3) float32; of developed pictures, that which they show."""
+        """Linear RGB radiance, (H, W, 3) float32; of tone-mapped images, the displayed radiance."""
         return _linear(self.image, self.scene.interior is not None)
 
     @property
@@ -74,6 +75,46 @@ class Room:
     def points_world(self) -> Array:
         """Surfel positions in the world frame, (H, W, 3), scene units; NaN where nothing."""
         return transform_points(self.world_from_camera, self.points)
+
+
+@dataclass(frozen=True, eq=False)
+class StereoPair:
+    """Two images by cameras of the same orientation, of which the second is further to the right.
+
+    `baseline` is the distance between the cameras, in the unit of the rooms.
+    """
+
+    left: Room
+    right: Room
+    baseline: float
+
+    @property
+    def focal(self) -> float:
+        """The focal length, in pixels."""
+        return 1.0 / pixel_size(len(self.left.depth), self.left.fov_y_degrees)
+
+    @property
+    def disparity(self) -> NDArray[np.float64]:
+        """Disparity of the left and of the right image, (2, H, W), in pixels.
+
+        The point at (x, y) of the left image is at (x - d, y) of the right image. NaN where nothing
+        is hit.
+        """
+        depths = np.stack([self.left.depth, self.right.depth]).astype(float)
+        return np.asarray(self.focal * self.baseline / depths)
+
+    @property
+    def visible(self) -> NDArray[np.bool_]:
+        """Which pixels of each image show what the other image shows too, (2, H, W).
+
+        As `derived.seen_from`, so it can be wrong within half a pixel of a silhouette.
+        """
+        pairs = (self.left, self.right), (self.right, self.left)
+        return np.stack([
+            seen_from(one.points_world, one.object_id, other.depth, other.normal, other.object_id,
+                      other.world_from_camera, other.fov_y_degrees)
+            for one, other in pairs
+        ])  # fmt: skip
 
 
 def radiance_of(rooms: Any, row: int) -> Array:
@@ -98,10 +139,10 @@ class RoomsFile(RowFile):
     """An open rooms file: a sequence of `Room`s. Use it as a context manager, or close it.
 
     Attributes, besides those of `RowFile`:
-        spec: the request that it answers.
-        fingerprint: SHA-256 of request and scenes (`content.fingerprint`).
+        spec: the request that the file was made from.
+        fingerprint: recipe hash: SHA-256 of request and scenes (`content.fingerprint`).
         further: names of the columns of `layout.FURTHER` that it holds.
-        has_truth: whether it holds more than INPUT; see `rooms.withheld`.
+        has_truth: whether the file has ground truth, and not only INPUT; see `rooms.withheld`.
     """
 
     SCORED = SCORED
@@ -174,12 +215,19 @@ class RoomsFile(RowFile):
         return np.asarray(self.read("room/size", row)) if self.spec.interior else None
 
     def check_field(self, name: str) -> None:
-        """Raise SpecError unless `read` takes this name, FileFormatError if it is withheld."""
+        """Raise SpecError unless `read` takes this name, FileFormatError if it is held out."""
         if not self.has_truth and name in {c.name for c in columns(self.spec)} - {*INPUT}:
             beside = f"{self.path.stem}-truth{self.path.suffix}"
-            hint = f"the file of truth has it, such as {beside}"
-            raise FileFormatError(f"{self.path}: {name}", "rooms without truth", "it", hint)
+            hint = f"it is in the file with the ground truth, such as {beside}"
+            raise FileFormatError(f"{self.path}: {name}", "rooms without ground truth", "it", hint)
         super().check_field(name)
+
+    def stereo(self, row: int) -> StereoPair:
+        """Return the stereo pair that a row is part of. Raises SpecError where there are none."""
+        expected = "stereo pairs (render --stereo)"
+        check(self.spec.stereo > 0, str(self.path), "single images", expected)
+        left, right = self[[row - row % 2, row - row % 2 + 1]]
+        return StereoPair(left, right, self.spec.stereo)
 
     def reopener(self) -> Callable[[], "RoomsFile"]:
         """Return a function, which can be pickled, that opens the same rows again."""

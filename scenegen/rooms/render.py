@@ -73,7 +73,7 @@ class RoomsWork:
     def block(self) -> int:
         """Scenes that a worker process makes in one go."""
         images = INTERIORS if self.spec.interior else BLOCK
-        return max(1, images // len(self.spec.views))
+        return max(1, images // len(self.spec.view_angles))
 
     @property
     def worthwhile(self) -> int:
@@ -125,7 +125,7 @@ def render_items(
         kept: what stays on the device, too, as in `renderer.launch_fields`.
     """
     objects = objects or objects_of(spec)
-    views, traced = range(len(spec.views)), spec.shading == "path"
+    views, traced = range(len(spec.view_angles)), spec.shading == "path"
     pictures = [name for name in picture_fields(spec) if fields is None or name in fields]
     needed = truth_fields(spec)
     if fields is not None and not spec.truth:
@@ -196,8 +196,8 @@ def _shown(
     seen = spec.seen_enough(visible, batch.object_count)
     enough = np.asarray(seen.reshape(len(scenes), -1).all(axis=1))
     traced = _traced(batch, np.flatnonzero(enough), pictures, device)
-    for row, first in enumerate(range(0, len(batch), len(spec.views))):
-        images = slice(first, first + len(spec.views))
+    for row, first in enumerate(range(0, len(batch), len(spec.view_angles))):
+        images = slice(first, first + len(spec.view_angles))
         if not enough[row]:
             yield None
             continue
@@ -214,7 +214,7 @@ def _traced(
     batch: SceneBatch, scenes: Array, pictures: Sequence[str], device: str
 ) -> Iterator[dict[str, Array]]:
     """Yield the path-traced pictures of some scenes, of which several are traced at once."""
-    views = len(batch.spec.views)
+    views = len(batch.spec.view_angles)
     many = traced_at_once(batch.spec) // views
     for start in range(0, len(scenes), many):
         images = scenes[start : start + many, None] * views + np.arange(views)

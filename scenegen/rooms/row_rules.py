@@ -32,19 +32,21 @@ OUTSIDE = 0.25  # metres beyond the inner walls to which windows reach
 LOBE_TOLERANCE = 4e-7  # relative rounding of a highlight for each unit of its exponent
 PIXELS = ("image", "depth", "normal", "object_id")
 _RULES = {
-    "description": "the scene's JSON can be read and agrees with the arrays",
-    "depth": "finite and positive where something is hit, NaN elsewhere",
-    "normal": "unit and facing the viewer where something is hit, zero elsewhere",
-    "object_id": "from -1 to the object count; every object shows enough pixels",
-    "image": "finite, not negative, and the shading equation of the other values",
+    "description": "the JSON of the scene is readable and agrees with the arrays",
+    "depth": "finite and positive on surfaces, NaN elsewhere",
+    "normal": "unit length and facing the viewer on surfaces, zero elsewhere",
+    "object_id": "from -1 to the object count; every object has enough visible pixels",
+    "image": "finite, not negative, and equal to the shading equation",
 }
 
 
 _FURTHER_RULES = {
-    "amodal": "masks hold what shows, stay in bounding spheres and give the visible fractions",
-    "coordinates": "they follow from depth and poses",
-    "flow": "flow and occlusion follow from depth and cameras",
+    "amodal": "masks contain the visible pixels, stay in bounding spheres and give the visible"
+    " fractions",
+    "coordinates": "agree with depth and poses",
+    "flow": "flow and occlusion agree with depth and cameras",
     "albedo": "reflectance of the object ids",
+    "layers": "in order, begin with depth and object ids, and enter and leave objects in turn",
 }
 
 
@@ -58,7 +60,7 @@ def _pixel_rules(spec: Request, corrupted: bool) -> dict[str, str]:
     if spec.shading == "path" or corrupted:
         return {**_RULES, "image": "finite and not negative"}
     if spec.spp > 1 or spec.shadows:
-        return {**_RULES, "image": "finite, and no darker than ambient light alone"}
+        return {**_RULES, "image": "finite, and not darker than ambient light"}
     return _RULES
 
 
@@ -99,7 +101,7 @@ def row_problems(
 
 def _further_problems(rooms: RoomsFile, block: RowBlock, room: Room) -> Iterable[tuple[str, str]]:
     names = ("material/reflectance", "object/world_from_object")
-    other, views = room, len(rooms.spec.views)
+    other, views = room, len(rooms.spec.view_angles)
     if "flow" in rooms.spec.truth:
         first = room.index - room.index % views
         try:
@@ -117,7 +119,7 @@ def _description_problems(
     changed = changed_meshes(objects, room.scene)
     if changed:
         yield f"made from other files than the folder's: {', '.join(changed)}"
-    views = len(rooms.spec.views)
+    views = len(rooms.spec.view_angles)
     first = room.index - room.index % views
     if room.view_index != room.index - first or len(room.scene.cameras) != views:
         yield f"view_index or the number of cameras is not that of the {views} views"
@@ -146,9 +148,9 @@ def _depth_problems(room: Room, points: Array) -> Iterable[str]:
     if room.scene.interior:
         size = np.array(room.scene.interior.size) / 2
         if walls.size and not (np.abs(points[room.object_id == 0] - size) < size + OUTSIDE).all():
-            yield "a surfel of the room lies beyond its walls"
+            yield "a surfel of the room is outside its walls"
     elif walls.size and not (walls.min(axis=1) < PLANE_TOLERANCE).all():
-        yield "a surfel of the room lies off floor and walls"
+        yield "a surfel of the room is not on ground or walls"
 
 
 def _normal_problems(room: Room) -> Iterable[str]:
@@ -197,7 +199,7 @@ def _image_problems(
         darkest = (batch.reflectance[0, : batch.object_count[0] + 1] * batch.ambient[0]).min(axis=0)
         darkest = 0 * darkest if spec.own_reflectance else darkest
         if (room.object_id >= 0).all() and (radiance < darkest - 0.5 / 255 - 1e-3).any():
-            yield "a pixel is darker than ambient light alone"
+            yield "a pixel is darker than ambient light"
         return
     material = room.object_id.clip(0, spec.object_slots)
     specular, shininess = batch.gloss[0, material, 0], batch.gloss[0, material, 1]

@@ -38,7 +38,7 @@ UNUSED = {"object/shape": -1, "object/stands_on": -1, "material/shininess": 1}  
 
 
 class RoomStream(RowStream):
-    """Batches of the rows of a file of rooms, rendered while somebody learns from them.
+    """Batches of rooms, rendered during training.
 
     Row i is, bit for bit, row i of the file that `scenegen render` makes of the same request.
     Iterating gives dicts of numpy arrays (B, ...) with the names, types and units of the file's
@@ -103,7 +103,12 @@ class RoomStream(RowStream):
         makers = []
         for spec, share in zip(specs, shares.values(), strict=True):
             check_batch(batch, spec, views)
-            check(len(spec.views) == views, "views", len(spec.views), f"{views}, as in the first")
+            check(
+                len(spec.view_angles) == views,
+                "views",
+                len(spec.view_angles),
+                f"{views}, as in the first",
+            )
             own = objects_of(spec) if spec.source in BUILT_IN or objects is None else objects
             maker = partial(_rows, spec, own, common, kept, device, batch, places)
             makers.append((maker, share))
@@ -115,7 +120,7 @@ class RoomStream(RowStream):
 
 def _asked(spec: Request, fields: Sequence[str]) -> tuple[Request, Columns]:
     """Return a request for the truth that some fields need and no more, and their columns."""
-    truth = tuple(name for name in TRUTHS if name != "flow" or len(spec.views) > 1)
+    truth = tuple(name for name in TRUTHS if name != "flow" or len(spec.view_angles) > 1)
     asked = chosen_columns(fields, columns(replace(spec, truth=truth)))
     needed = tuple(n for n in truth if any(column.name in asked for column in FURTHER[n]))
     return replace(spec, truth=needed), asked
@@ -136,7 +141,7 @@ def _rows(
     MEMBER_STORE.use(places[0])
     ASSETS.use(*places[1:])
     share_processors(processes, device)
-    views = len(spec.views)
+    views = len(spec.view_angles)
     # Path tracing takes long, one image after the other: nobody waits for more than a batch.
     more = 0 if spec.shading == "path" else PIXELS // (spec.height * spec.width)
     at_once = min(DEFAULT_BATCH, max(batch, more))

@@ -1,7 +1,7 @@
 """Further truth, which `--with` adds to the rows of a file: made here, and checked here.
 
-Masks of whole objects are rendered. All else follows from depth, cameras, poses and reflectance
-(`scenegen.derived`), and is stored so that readers need no code of ours.
+Masks of whole objects are rendered, and layers are cast. All else follows from depth, cameras,
+poses and reflectance (`scenegen.derived`), and is stored so that readers need no code of ours.
 """
 
 from collections.abc import Iterable, Mapping
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from scenegen.camera import back_project, pixel_directions, transform_points, transform_vectors
 from scenegen.derived import albedo, object_coordinates, optical_flow, seen_from
 from scenegen.description.specs import Request
+from scenegen.rendering.layers import closed_objects, layers_of
 from scenegen.rendering.packing import SceneBatch
 
 Array = NDArray[Any]
@@ -75,7 +76,22 @@ def further_truth(
         made["albedo"] = np.stack(
             [albedo(v.object_id, r).astype(np.float32) for v, r in zip(views, rho, strict=True)]
         )
+    if "layers" in truth:
+        stored = [
+            stored_layers(batch, i, v.depth, v.object_id)
+            for v, i in zip(views, images, strict=True)
+        ]
+        made |= {name: np.stack([one[name] for one in stored]) for name in stored[0]}
     return made
+
+
+def stored_layers(
+    batch: SceneBatch, image: int, depth: Array, object_id: Array
+) -> dict[str, Array]:
+    """Return `layers.layers_of` and the objects that are closed, by name of the column."""
+    layers = layers_of(batch, image, depth, object_id)
+    columns = {f"layers/{name}": values for name, values in vars(layers).items()}
+    return {**columns, "object/closed": closed_objects(batch, image)}
 
 
 def visible_fraction(object_id: Array, masks: Array) -> NDArray[np.float32]:
@@ -133,9 +149,10 @@ def truth_problems(
         scene: its description.
     """
     truth = spec.truth
-    if "amodal" in truth:
-        for problem in _amodal_problems(stored, view, len(scene.objects)):
-            yield "amodal", problem
+    for name, check in (("amodal", _amodal_problems), ("layers", _layer_problems)):
+        if name in truth:
+            for problem in check(stored, view, len(scene.objects)):
+                yield name, problem
     if "coordinates" in truth:
         expected = coordinates(view, stored["object/world_from_object"])
         if not np.allclose(
@@ -152,18 +169,49 @@ def truth_problems(
             yield "flow", "flow is not that of depth and cameras"
         if (stored["flow_occluded"] != occluded).mean() > EDGE_SHARE:
             yield "flow", "occlusion is not that of depth and cameras"
-    if "albedo" in truth and spec.interior:
+    if "albedo" in truth:
+        for problem in _albedo_problems(spec, stored, view):
+            yield "albedo", problem
+
+
+def _albedo_problems(spec: Request, stored: Mapping[str, Array], view: Any) -> Iterable[str]:
+    if spec.interior:
         values, hit = stored["albedo"], view.object_id >= 0
         if not ((values[hit] >= 0) & (values[hit] <= 1)).all():
-            yield "albedo", "albedo is not from 0 to 1"
-    elif "albedo" in truth:
+            yield "albedo is not from 0 to 1"
+    else:
         rho = albedo(view.object_id, stored["material/reflectance"]).astype(np.float32)
         own = (view.object_id > 0) & spec.own_reflectance
         if not np.array_equal(stored["albedo"][~own], rho[~own], equal_nan=True):
-            yield "albedo", "albedo is not the reflectance of the object ids"
+            yield "albedo is not the reflectance of the object ids"
         shares = stored["albedo"][own] / np.maximum(rho[own], 1e-12)
         if not ((shares >= 0) & (shares <= 1 + 1e-5)).all():
-            yield "albedo", "albedo of an object exceeds its reflectance"
+            yield "albedo of an object exceeds its reflectance"
+
+
+def _layer_problems(stored: Mapping[str, Array], view: Any, count: int) -> Iterable[str]:
+    depth, ids, entering = (stored[f"layers/{x}"] for x in ("depth", "object_id", "entering"))
+    if not (
+        np.array_equal(depth[..., 0], view.depth, equal_nan=True)
+        and np.array_equal(ids[..., 0], view.object_id)
+    ):
+        yield "the first layer is not depth and object id"
+    there = ids >= 0
+    if (
+        (np.isfinite(depth) != there).any()
+        or (there[..., 1:] & ~there[..., :-1]).any()
+        or ids.max() > count
+    ):
+        yield "layers without a surface come before others, or object ids are impossible"
+    elif not (depth[..., 1:] >= depth[..., :-1])[there[..., 1:]].all():
+        yield "layers are not in order"
+    if np.abs(entering).max() > 1 or entering[ids <= 0].any():
+        yield "entering has other values than -1, 0 and 1, or is not 0 where no object is"
+    inside = [np.cumsum(np.where(ids == k + 1, entering, 0), axis=-1) for k in range(count)]
+    if any(some.min() < 0 or some.max() > 1 for some in inside):
+        yield "a ray enters an object twice, or leaves it before"
+    if (stored["object/closed"] > 1).any() or stored["object/closed"][count:].any():
+        yield "object/closed has other values than 0 and 1, or belongs to no object"
 
 
 def _amodal_problems(stored: Mapping[str, Array], view: Any, count: int) -> Iterable[str]:

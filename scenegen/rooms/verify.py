@@ -40,6 +40,7 @@ from scenegen.rooms.row_rules import (
     row_problems,
     row_rules,
 )
+from scenegen.rooms.truth import stored_layers
 from scenegen.rooms.withheld import truth_path
 from scenegen.sampling.scenes import most_attempts, sample_scenes
 
@@ -90,11 +91,11 @@ def verify_file(
     rules = row_rules(rooms)
     scenes = {"scene": digests.get("scene", "")}
     same = fingerprint(rooms.spec.to_json(), scenes) == rooms.fingerprint
-    layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
+    layout = f"{len(rooms)} images, format {rooms.attributes['format_version']}"
     return [
         listed_check("layout", layout, rooms.problems()),
         content_check("content", rooms.opened, digests),
-        *(listed_check(x, f"{rules[x]} ({len(rooms)} rows)", broken[x]) for x in rules),
+        *(listed_check(x, f"{rules[x]} ({len(rooms)} images)", broken[x]) for x in rules),
         Check("fingerprint", same, rooms.fingerprint if same else "does not match"),
         *_some_again(rooms, items, device, made_of),
     ]
@@ -110,11 +111,11 @@ def verify_withheld(
     step = max(1, BLOCK_PIXELS // (rooms.spec.height * rooms.spec.width))
     digests, _ = read_all(rooms, step, lambda block, row: (), progress)
     wrong = content_problems(rooms.opened, digests, whole=False)
-    layout = f"{len(rooms)} rows, format {rooms.attributes['format_version']}"
-    truth = f"withheld, so nothing else is checked; {truth_path(rooms.path).name} has it"
+    layout = f"{len(rooms)} images, format {rooms.attributes['format_version']}"
+    truth = f"held out in {truth_path(rooms.path).name}, so nothing else is checked"
     return [
         listed_check("layout", layout, rooms.problems(whole=False)),
-        listed_check("content", "every value as written, by SHA-256", wrong),
+        listed_check("content", "all values match their SHA-256", wrong),
         Check("truth", True, truth),
     ]
 
@@ -138,7 +139,7 @@ def _sampled_again(rooms: RoomsFile, rows: Sequence[int], objects: Objects) -> C
             same = False
         if not same:
             wrong.append(f"row {row}")
-    detail = ", ".join(wrong) + " cannot be drawn again" if wrong else f"{len(rows)} rows"
+    detail = ", ".join(wrong) + " differ" if wrong else f"{len(rows)} images, from the seed"
     return Check("drawn again from the seed", not wrong, detail)
 
 
@@ -184,8 +185,8 @@ def _rendered_again(rooms: RoomsFile, rows: Sequence[int], device: str, objects:
         if differs:
             wrong.append(f"row {row} ({', '.join(differs)})")
     within = f"within tolerances (depth {DEPTH_TOLERANCE:g}, ids equal but at edges)"
-    what = f"{off} of {len(rows)} rows {within}" if off else "bit for bit"
-    detail = "differ: " + ", ".join(wrong) if wrong else f"{len(rows)} rows, {what}"
+    what = f"{off} of {len(rows)} images {within}" if off else "bit for bit"
+    detail = "differ: " + ", ".join(wrong) if wrong else f"{len(rows)} images, {what}"
     remark = f" (the file's {'; '.join(others)})" if others else ""
     return Check("rendered again", not wrong, detail + remark)
 
@@ -213,6 +214,12 @@ def _render(
                 pixels = render(batch, device).pixels()
                 if "amodal" in rooms.spec.truth:
                     pixels[AMODAL] = amodal_masks(batch, device)
+                layers = [
+                    stored_layers(batch, i, pixels["depth"][i], pixels["object_id"][i])
+                    for i in range(len(batch) if "layers" in rooms.spec.truth else 0)
+                ]
+                names = layers[0] if layers else ()
+                pixels |= {name: np.stack([one[name] for one in layers]) for name in names}
         except (SpecError, BadMeshError):
             for room in shown if len(shown) > 1 else ():
                 draw(view, [room])
@@ -259,11 +266,16 @@ def _same_picture(name: str, a: Array, b: Array) -> bool:
 def _within_tolerance(name: str, stored: Array, again: Array, edges: Array, spec: Request) -> bool:
     """Return whether two arrays of pixels, (H, W, ...), agree as far as other variants can."""
     most: float | Array
+    if name == AMODAL:  # below, pixels come first
+        stored, again = np.moveaxis(stored, 0, -1), np.moveaxis(again, 0, -1)
+    elif stored.ndim < 2:
+        return False
     a, b = stored.astype(np.float64), again.astype(np.float64)
     if spec.interior and name in PICTURE:
         return _same_picture(name, a, b)
     if name != "image":
         tolerances = {"depth": DEPTH_TOLERANCE, "normal": NORMAL_TOLERANCE}
+        tolerances["layers/depth"] = DEPTH_TOLERANCE
         most = {**tolerances, "albedo": NORMAL_TOLERANCE}.get(name, 0.0)
     elif spec.shading == "path":
         # Rounding turns some paths, and another release draws others: only means are comparable.

@@ -45,7 +45,7 @@ def withhold_truth(truth: str | Path, out: str | Path, overwrite: bool = False) 
     with RoomsFile(truth) as rooms, new_hdf5_file(out, overwrite) as file:
         source = rooms.opened.file
         if not rooms.has_truth:
-            raise FileFormatError(truth, "rooms without truth", "a whole file of rooms")
+            raise FileFormatError(truth, "rooms without ground truth", "a whole file of rooms")
         if any(is_virtual(source[name]) for name in INPUT):
             hint = "merge it with `scenegen merge`, or render with a larger --shard-size"
             raise FileFormatError(truth, "a set of shards", "one file", hint)

@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import Camera
+from scenegen.camera import Camera, look_at
 from scenegen.common.random.seeding import Purpose, item_numbers
-from scenegen.description.specs import DatasetSpec
+from scenegen.description.specs import DatasetSpec, Request
 from scenegen.sampling.octant import octant_points
 
 Array = NDArray[Any]
@@ -28,6 +28,21 @@ def sample_cameras(spec: DatasetSpec, index: Array) -> Array:
     mirrored = (side < 0.5) & (widest > 0)
     azimuth = np.where(mirrored[:, None], 0.25 - azimuth, azimuth)
     return octant_points(spec.camera_target, spec.camera_radius, height[:, None], azimuth)
+
+
+def with_right_eyes(spec: Request, position: Array, target: Array) -> tuple[Array, Array]:
+    """Return positions and targets of cameras, (..., V, 3), with those of stereo pairs.
+
+    Each camera is then followed by one that is moved along its x axis, (..., 2 V, 3).
+    """
+    if not spec.stereo:
+        return position, target
+    across = spec.stereo * look_at(position, target)[..., :3, 0]
+    shape = (*position.shape[:-2], -1, 3)
+    position, target = (
+        np.stack([values, values + across], axis=-2).reshape(shape) for values in (position, target)
+    )
+    return position, target
 
 
 def sample_fov_y(spec: DatasetSpec, index: Array) -> Array:

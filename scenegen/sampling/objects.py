@@ -90,9 +90,9 @@ def sample_objects(spec: DatasetSpec, index: Array, objects: Objects) -> Unplace
     else:
         row, column = np.argwhere(used & (model < 0))[0].tolist()
         raise SpecError(
-            f"classes: {MAX_MODELS} models drawn from {spec.shapes[kind[row, column]]!r} cannot be"
-            f" used, the last one since {list(problems.values())[-1]}",
-            hint="`scenegen check-objects` tells of all",
+            f"classes: {MAX_MODELS} meshes drawn from {spec.shapes[kind[row, column]]!r} cannot be"
+            f" used, the last one because of {list(problems.values())[-1]}",
+            hint="`scenegen check-objects` lists all problems",
         )
     drawn = sorted(outlines)
     digests = np.array(["", *(objects.digest(names[i]) for i in drawn)], object)

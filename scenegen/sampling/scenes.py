@@ -20,7 +20,7 @@ from scenegen.description.scenes import SceneSpec
 from scenegen.description.specs import LEAST_SEEN, DatasetSpec, InteriorSpec, Request
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.sampling.bodies import MARGIN, bodies_of
-from scenegen.sampling.cameras import sample_cameras, sample_fov_y
+from scenegen.sampling.cameras import sample_cameras, sample_fov_y, with_right_eyes
 from scenegen.sampling.interiors.scenes import item_room, sample_interiors
 from scenegen.sampling.lights import sample_lights
 from scenegen.sampling.objects import Unplaced, sample_counts, sample_objects
@@ -77,13 +77,14 @@ def sample_scenes(
     def same(values: Any, *shape: int) -> Array:
         return np.broadcast_to(np.array(values, float), (len(index), *shape))
 
-    views = cameras.shape[1]
+    targets = same(spec.camera_target, cameras.shape[1], 3)
+    cameras, targets = with_right_eyes(spec, cameras, targets)
     scenes = SceneArrays(
         names=unplaced.names,
         index=index,
         camera_position=cameras,
-        camera_target=same(spec.camera_target, views, 3),
-        fov_y_degrees=same(fov_y_degrees[:, None], views),
+        camera_target=targets,
+        fov_y_degrees=same(fov_y_degrees[:, None], cameras.shape[1]),
         object_count=unplaced.count,
         shape=unplaced.model,
         mesh=unplaced.mesh,

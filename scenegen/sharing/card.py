@@ -90,7 +90,7 @@ def write_card(
 
     names = [file.name for file, _ in files]
     for name in names:
-        expected = "different names, as all lie beside the card"
+        expected = "different names, because all files are next to the card"
         check(names.count(name) == 1, "files", f"{name} twice", expected)
     license_, address = publication.license, publication.license_address
     listed = license_.lower() in HUGGING_FACE_LICENSES
@@ -127,7 +127,7 @@ def with_shards(opened: OpenFile, meaning: str) -> list[tuple[Path, str]]:
     if not opened.shards:
         return [(path, meaning)]
     shards = [(opened.folder / shard.file, f"shard of {path.name}") for shard in opened.shards]
-    return [(path, f"{meaning}; shows its shards as one file"), *shards]
+    return [(path, f"{meaning}; reads its shards as one file"), *shards]
 
 
 def _configs(stems: Sequence[str]) -> list[dict[str, str]]:

@@ -37,7 +37,7 @@ def write_rooms_card(
     for file in rooms:
         files += with_shards(file.opened, "rooms with ground truth")
     interior = {file.spec.interior for file in rooms}
-    check(len(interior) == 1, "files", "interiors and other rooms", "a card for each kind")
+    check(len(interior) == 1, "files", "interiors and other rooms", "one card for each")
     scenes = [{file.read("scene", row) for row in range(len(file))} for file in rooms]
     facts = [
         {
@@ -69,10 +69,10 @@ def default_license(rooms: Sequence[RoomsFile]) -> str:
     terms their pictures may be handed on, only the publisher can know.
     """
     for file in rooms:
-        what, source = "none, and meshes that somebody made", file.spec.source
-        expected = f"the licence under which pictures of {source} may be handed on"
+        what, source = "none, and meshes from a folder", file.spec.source
+        expected = f"the licence under which images of {source} may be published"
         check(source in BUILT_IN, "license", what, expected)
         assets = " and ".join(n for n in ("materials", "environment") if getattr(file.spec, n, ""))
-        what, expected = f"none, and {assets} of others", "the licence of their pictures"
+        what, expected = f"none, and {assets} from files", "the licence for images of these files"
         check(not assets, "license", what, expected)
     return "CC-BY-4.0"

@@ -76,7 +76,7 @@ def failing(split_folder, tmp_path, few_explained):
             edit(file)
         found = audited([folder], probed=0)
         skipped = {proof.name for proof in found.proofs if proof.status == "skipped"}
-        assert skipped <= {"splits apart"}
+        assert skipped <= {"disjoint splits"}
         failed = {proof.name for proof in found.proofs if proof.status == "FAIL"}
         assert found.passed == (not failed)
         return failed - {"content"} if "content" in failed else {"content did not change"}

@@ -147,10 +147,10 @@ MATCH_FILES = [
 MATCH = [
     ("truth not there", ["truth", "no file at", "gone/rooms.h5", "--truth"],
      attribute("truth_path", "gone/rooms.h5")),
-    ("truth not named", ["no path of a truth", "--truth"], attribute("truth_path", "")),
+    ("truth not named", ["no path of a ground truth", "--truth"], attribute("truth_path", "")),
     ("images too small", ["depth", "16x16", "expected 32x32"], made.smaller),
     ("rows missing", ["row", "3 of 8 missing", "ids 5, 6, 7)"], made.rows_kept(5)),
-    ("a row unknown", ["row", "1 that the truth does not", "ids 8)"], put("row", 3, 8)),
+    ("a row unknown", ["row", "1 that the ground truth does not", "ids 8)"], put("row", 3, 8)),
     ("counted from 1", ["row", "does not have", "ids 8)"], values("row", lambda v: v + 1)),
 ]  # fmt: skip
 
@@ -181,7 +181,7 @@ HINTS = [
 ANSWERS_OPEN = [
     ("no questions", ["question", "no such dataset"], gone("question")),
     ("neither answer nor scores", ["answer", "neither"], gone("answer", "scores")),
-    ("answer and scores disagree", ["answer", "other than scores say", "ids 2)"],
+    ("answer and scores disagree", ["answer", "that disagree with scores", "ids 2)"],
      put("answer", 2, 0)),
     ("an answer of 3", ["answer", "such as 3", "ids 4)"],
      in_all(gone("scores"), put("answer", 4, 3))),
@@ -244,7 +244,7 @@ JSON_FILES = [
 
 JSON_MATCH = [
     ("JSON: too few", ["question", "2 of 6 missing", "ids 4, 5)"], [0, 1, 2, 0]),
-    ("JSON: too many", ["1 that the truth does not have", "ids 6)"], [0] * 7),
+    ("JSON: too many", ["1 that the ground truth does not have", "ids 6)"], [0] * 7),
     ("JSON: a question left out", ["1 of 6 missing", "ids 3)"],
      {"answers": {"0": 0, "1": 1, "2": 2, "4": -1, "5": 1}, "method": "m"}),
 ]  # fmt: skip

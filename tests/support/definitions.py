@@ -452,7 +452,7 @@ def off_plane(P: Array) -> Array:
     return -P[:, 2] - x @ np.linalg.lstsq(x, -P[:, 2], rcond=None)[0]
 
 
-# Behind
+# Hidden surfaces
 
 
 def hidden(view) -> Array:
@@ -728,7 +728,7 @@ def sparsified(errors: Array, sure: Array) -> Array:
     return np.array([sorted_errors[:n].mean() for n in counts])
 
 
-# Cut-outs and guesses
+# Baselines
 
 
 def blind(view) -> dict[str, float]:

@@ -77,7 +77,7 @@ class NetworkSpec:
         check(self.rays or not self.bounded, "bounded", self.bounded, expected)
         check_choice("encoder", self.encoder, ENCODERS)
         if self.encoder == "polar" and self.condition:
-            found = "'polar' with a camera or classes that are told"
+            found = "'polar' with a camera or categories as input"
             raise SpecError("encoder", found, "'paper', or networks without them, as of questions")
 
     @property
@@ -224,7 +224,7 @@ class Decoder(nn.Module):
         They stay above the floor and before both walls, as a room whose lights all lie behind what
         they light is dark, and nothing would bring them back. Untrained, they are near (1, 1, 1).
         """
-        assert self.lights is not None, "lights are told"
+        assert self.lights is not None, "lights are an input"
         # Adam moves all weights of a sum at once, which would throw the lights about.
         place = _full(self.lights(code)).view(len(code), -1, 3) / math.sqrt(code.shape[1])
         return functional.softplus(math.log(math.e - 1) + place)

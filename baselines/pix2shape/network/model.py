@@ -140,7 +140,7 @@ class Pix2Shape(nn.Module):
         """
         if not self.config.networks.rays:
             return self.encoder(image, condition)
-        assert cameras is not None, "networks of rays are told the camera"
+        assert cameras is not None, "networks of rays take the camera as input"
         return self.encoder(image, condition, planes_of(cameras, image.shape[-1]))
 
     def relief(self, code: Tensor, condition: Tensor) -> Tensor:
@@ -163,7 +163,7 @@ class Pix2Shape(nn.Module):
         """
         raw = self.decoder(code, condition).float()
         if self.config.networks.rays:
-            assert cameras is not None, "networks of rays are told the camera"
+            assert cameras is not None, "networks of rays take the camera as input"
             smooth = self._relief(raw[:, 0])
             relief = torch.where(smooth > FLAT, smooth, 0)
             if self.config.networks.bounded:  # the same numbers, with the slopes of `smooth`
@@ -186,7 +186,7 @@ class Pix2Shape(nn.Module):
         if not self.config.lights:
             return views
         pose = views.world_from_camera
-        assert pose is not None, "lights of questions are told"
+        assert pose is not None, "lights of questions are an input"
         with torch.autocast(code.device.type, enabled=False):  # bfloat16 is too coarse for places
             world = self.decoder.light_positions(code.float())
             positions = (world - pose[:, None, :3, 3]) @ pose[:, :3, :3]

@@ -103,8 +103,8 @@ def readers_kept() -> Iterator[None]:
         ended = re.search(r"DataLoader worker .*(killed by signal|exited unexpectedly)", str(error))
         if not ended:
             raise
-        message = "that a process that reads the data ended, for want of memory perhaps"
-        hint = "`--resume` goes on from a checkpoint; `--workers 0` needs no such processes"
+        message = "that a data loading process exited, possibly out of memory"
+        hint = "`--resume` continues from a checkpoint; `--workers 0` uses no such processes"
         raise LostProcessError("training", message, hint=hint) from error
 
 

@@ -136,9 +136,14 @@ def _suited(config: ModelConfig, files: Files, labels: int, conditional: bool) -
 def _for_rooms(config: ModelConfig, spec: Request, labels: int, conditional: bool) -> ModelConfig:
     """Return the configuration for rooms; what is of questions alone is off."""
     networks = config.networks
-    check(labels == 0, "labels", labels, "0 for rooms, which ask no questions")
+    check(labels == 0, "labels", labels, "0 for rooms, which have no labels")
     check(networks.camera, "camera", networks.camera, "true: rooms are seen by known cameras")
-    check(networks.classes == 0, "classes", networks.classes, "0; --conditional tells them")
+    check(
+        networks.classes == 0,
+        "classes",
+        networks.classes,
+        "0; --conditional gives the categories as input",
+    )
     if conditional:
         single = spec.objects == (1, 1)
         check(single, "conditional", f"objects {spec.objects}", "one object in every room")

@@ -182,7 +182,7 @@ def _check_folder(folder: Path, checkpoint: tuple[int, int] | None) -> None:
     """
     if _written(folder) != checkpoint:
         message = "that another run trained there in the meantime"
-        raise SceneGenError(folder, message, hint="say --resume, or name another folder")
+        raise SceneGenError(folder, message, hint="use --resume, or another folder")
     for name in (CHECKPOINT, PICTURE, WEIGHTS):
         check_writable(folder / name, overwrite=True)
 

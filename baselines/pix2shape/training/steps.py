@@ -267,7 +267,7 @@ def check_request(model: Pix2Shape, sources: Sources, count: int) -> None:
         raise SpecError("losses", "every weight at 0", "one above 0")
     for name in ("material", "lights"):
         if getattr(config, name) and not any(weights):
-            expected = "a loss of images, such as reconstruction, which alone teaches it"
+            expected = "an image loss, such as reconstruction, which is needed to learn it"
             raise SpecError(name, "every weight of such losses at 0", expected)
 
 

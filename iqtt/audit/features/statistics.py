@@ -16,7 +16,7 @@ Array = NDArray[Any]
 THUMBNAIL = 32  # pixels a side
 LEVELS = 4  # levels of each channel in a colour histogram
 SAME = 1 / 512  # how far a channel of a floating-point image may differ from the background's
-SHAPE_STATISTICS = ("contacts of cubes", "spread of cubes", "shape met elsewhere")
+SHAPE_STATISTICS = ("contacts of cubes", "spread of cubes", "shape in other questions")
 
 
 def statistics_record(images: int) -> np.dtype[np.void]:

@@ -51,16 +51,16 @@ FAR = 60.0  # degrees, from which on questions about rooms are probed apart, too
 PATTERN_QUESTIONS = 2_000  # whose pictures are searched for small patterns
 
 _LIGHT = {
-    "brightness": "shape's brightness",
-    "contrast": "shape's contrast",
-    "colors": "shape's colours",
+    "brightness": "shape brightness",
+    "contrast": "shape contrast",
+    "colors": "shape colours",
 }
 _OUTLINE = {
-    "area": "silhouette's area",
-    "extent": "silhouette's extent",
-    "offset": "silhouette's place",
-    "moments": "silhouette's moments",
-    "image_brightness": "image's brightness",
+    "area": "silhouette area",
+    "extent": "silhouette extent",
+    "offset": "silhouette position",
+    "moments": "silhouette moments",
+    "image_brightness": "image brightness",
 }
 _SIZE, _NEARNESS = ("largest", "smallest"), ("nearest", "farthest")
 _SUMMARY = ("mean_color", "contrast", *_OUTLINE)
@@ -204,7 +204,7 @@ def _by_picture(statistics: Array, right: Array, of_rooms: bool = False) -> Iter
         yield from _by_distance(title, sees, _distances(values), right)
     yield from _by_distance("pixel distance", OUTLINE, statistics["pixel_distance"], right)
     apart = nearest_outline(statistics["outline_distance"])
-    yield from _by_distance("whole outline, turned or flipped", OUTLINE, apart, right)
+    yield from _by_distance("silhouette, rotated or flipped", OUTLINE, apart, right)
 
 
 def _by_patches(statistics: Array, right: Array) -> Iterator[_Guess]:
@@ -277,7 +277,7 @@ def _learned(evidence: Evidence) -> Iterator[_Guess]:
         "all statistics": np.concatenate(
             [statistics[name][:, 1:].reshape(alone) for name in _SUMMARY], axis=2
         ),
-        "outlines of the answers": np.concatenate(
+        "silhouettes of the options": np.concatenate(
             [outline[:, 1:], apart[:, 1:, 1:].sum(axis=2)], axis=2
         ),
     }
@@ -286,7 +286,7 @@ def _learned(evidence: Evidence) -> Iterator[_Guess]:
     yield ("small patterns of pixels", "learned", WITHOUT, _by_patterns(statistics, right))
     cubes = np.stack(list(evidence.cubes.values()), axis=2)
     for title, values, sees in (
-        ("answers' cubes", cubes, WITHOUT),
+        ("cubes of the options", cubes, WITHOUT),
         ("rotations and order of cubes", evidence.frames, FRAMES),
     ):
         whole = np.isfinite(values).all(axis=(1, 2))
@@ -297,7 +297,7 @@ def _learned(evidence: Evidence) -> Iterator[_Guess]:
 
 def _learned_outlines(statistics: Array, right: Array) -> Iterator[_Guess]:
     columns = next_to_reference(statistics["outline"], statistics["outline_distance"][:, 0, 1:])
-    yield ("outlines, by trees", "learned", OUTLINE, choose(columns, right) == right)
+    yield ("silhouettes, by trees", "learned", OUTLINE, choose(columns, right) == right)
 
 
 def _by_patterns(statistics: Array, right: Array) -> Array:
@@ -318,8 +318,8 @@ def _by_place(places: Sequence[Array], answers: int) -> list[_Guess]:
         return np.concatenate([[answers], table[:-1]]) if len(table) else table
 
     return [
-        ("place", "commonest", WITHOUT, hits(np.zeros_like)),
-        ("place", "after the last", WITHOUT, hits(before)),
+        ("position", "most frequent", WITHOUT, hits(np.zeros_like)),
+        ("position", "after the last", WITHOUT, hits(before)),
     ]
 
 

@@ -53,14 +53,14 @@ def no_other_explanation(
                 tried += len(question)
                 hiding += len(np.unique(question[alike & ~shown]))
         wrong.append(explained)
-    note = f"; {hiding:,} would, if cubes could hide" if hiding else ""
+    note = f"; {hiding:,} match with hidden cubes" if hiding else ""
     return judge(
-        "one explanation",
-        "no wrong answer laid on the reference gives its picture and shows every cube"
-        f" ({tried:,} were tried{note})",
+        "unique solution",
+        "no distractor can be rotated to give the image of the reference with all cubes visible"
+        f" ({tried:,} rotations tested{note})",
         tables,
         wrong,
-        lambda t, row: "a wrong answer looks like the reference",
+        lambda t, row: "a distractor looks like the reference",
         sum(map(len, sample)),
     )
 

@@ -28,21 +28,21 @@ def balance(tables: Sequence[AuditTable], right: Sequence[Array]) -> Proof:
     shown = [f"{tables[i].name}: {'/'.join(map(str, counts[i]))}" for i in answered]
     uneven = [text for i, text in zip(answered, shown, strict=True) if np.ptp(counts[i]) > 1]
     if not answered:
-        return Proof("answer places", "skipped", "no answers")
+        return Proof("correct positions", "skipped", "no answer key")
     if uneven:
-        detail = f"{'; '.join(uneven)} at places 0/1/...; expected: counts differ by at most 1"
-        return Proof("answer places", "FAIL", detail)
-    return Proof("answer places", "ok", "balanced: " + "; ".join(shown))
+        detail = f"{'; '.join(uneven)} at positions 0/1/...; expected: counts differ by at most 1"
+        return Proof("correct positions", "FAIL", detail)
+    return Proof("correct positions", "ok", "balanced: " + "; ".join(shown))
 
 
 def content(tables: Sequence[AuditTable]) -> Proof:
     """Prove that all datasets and attributes are those that were written, by the files' digests."""
-    rule = "every dataset and attribute is what the digests say"
+    rule = "all datasets and attributes match their content hashes"
     untold = [table.name for table in tables if not table.contents]
     if len(untold) == len(tables):
-        return Proof("content", "skipped", "no digests")
+        return Proof("content", "skipped", "no content hashes")
     wrong = content_problems(tables)
-    note = f"; no digests in {', '.join(untold)}" if untold else ""
+    note = f"; no hashes in {', '.join(untold)}" if untold else ""
     if wrong:
         return Proof("content", "FAIL", f"{'; '.join(wrong)}; expected: {rule}{note}")
     return Proof("content", "ok", rule + note)
@@ -52,7 +52,7 @@ def values(tables: Sequence[AuditTable]) -> Proof:
     """Prove that all pixel values are finite and within 0..1."""
     return judge(
         "pixel values",
-        "finite and within 0 to 1",
+        "finite, from 0 to 1",
         tables,
         [table.unfit.any(axis=1) for table in tables],
         lambda t, row: f"{tables[t].unfit[row].max()} values of an image are not",
@@ -68,13 +68,13 @@ def framing(tables: Sequence[AuditTable]) -> Proof:
         # The renderer may round a half up or down.
         step = 1 if table.questions.image_dtype == "uint8" else 1e-3
         if np.abs(table.background.astype(float) - expected).max() > step:
-            detail = f"{table.name}: the border's commonest colour is {table.background.tolist()}"
+            detail = f"{table.name}: the most frequent border colour is {table.background.tolist()}"
             return Proof("framing", "FAIL", f"{detail}; expected: {expected.tolist()} as specified")
     guessed = any(table.spec is None for table in tables)
-    note = "; background taken to be the border's commonest colour" if guessed else ""
+    note = "; background: the most frequent border colour" if guessed else ""
     return judge(
         "framing",
-        f"no pixel of a shape on the border of an image{note}",
+        f"no shape touches the image border{note}",
         tables,
         [table.on_border.any(axis=1) for table in tables],
         lambda t, row: f"{tables[t].on_border[row].max()} pixels of an image's border",
@@ -91,7 +91,7 @@ def visibility(tables: Sequence[AuditTable]) -> Proof:
     needed = [table.spec.min_cube_pixels if table.spec else 0 for table in tables]
     return judge(
         "visibility",
-        f"every cube shows {max(needed)} pixels or more; no silhouette exceeds its cubes'",
+        f"at least {max(needed)} visible pixels per cube; no silhouette exceeds its cubes",
         tables,
         [
             ((few < enough) | (table.silhouette > most)).any(axis=1)

@@ -30,8 +30,8 @@ def answers_differ(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pr
     """Prove that no two answers show the same shape, but for a mirror-pair's wrong ones."""
     same = [_twins(table, its_shapes) for table, its_shapes in zip(tables, shapes, strict=True)]
     return judge(
-        "answers differ",
-        "no two answers congruent to each other, but for two mirror images of the right one",
+        "options differ",
+        "no two options are congruent, except the two mirror images of a mirror-pair question",
         tables,
         [mask.any(axis=1) for mask in same],
         lambda t, row: (
@@ -81,11 +81,14 @@ def labels(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
         wrong.append(bad.any(axis=1) & its_shapes.whole)
     return judge(
         "labels",
-        "mirror: the reference's mirror image; near: the reference with one cube moved;"
-        " near-mirror: its mirror image with one cube moved; none but mirror is its mirror image",
+        "mirror: mirror image of the reference; near: reference with one cube moved; near-mirror:"
+        " mirror image with one cube moved; no other option is a mirror image",
         tables,
         wrong,
-        lambda t, row: f"kinds {tables[t].truth['distractor_kind'][row].tolist()} are not so",
+        lambda t, row: (
+            f"distractor types {tables[t].truth['distractor_kind'][row].tolist()} do not match the"
+            " shapes"
+        ),
     )
 
 
@@ -139,10 +142,10 @@ def mirror_images(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pro
         wrong.append(angle < least - 1e-6)
     return judge(
         "mirror images",
-        "two mirror images of the right one, from sides as far apart as the answers'",
+        "the two mirror images differ in view as much as the options must",
         tables,
         wrong,
-        lambda t, row: "they are seen from nearly one side",
+        lambda t, row: "they are seen from nearly the same side",
     )
 
 
@@ -151,12 +154,12 @@ def matched(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
     gaps = [_gaps(table, its_shapes) for table, its_shapes in zip(tables, shapes, strict=True)]
     return judge(
         "matched",
-        "matched wrong answers have the right one's bounding box and number of touching faces, and"
-        f" their seven moments are within {MOMENTS:g} cube edges of its",
+        "matched distractors equal the correct shape in bounding box and touching faces, and in"
+        f" seven moments within {MOMENTS:g} cube edges",
         tables,
         [~(gap <= MOMENTS + 1e-5) for gap in gaps],
         lambda t, row: (
-            "another box or number of contacts"
+            "another bounding box or number of touching faces"
             if np.isinf(gaps[t][row])
             else f"moments that differ by {gaps[t][row]:.3f}"
         ),

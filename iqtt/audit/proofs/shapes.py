@@ -103,11 +103,13 @@ def whole_shapes(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proo
     ]
     return judge(
         "shapes",
-        "in one piece, all of a question of as many cubes, and as many as specified",
+        "connected, with equal cube counts within each question, as specified",
         tables,
         wrong,
         lambda t, row: (
-            f"{shapes[t].count[row]} cubes" if shapes[t].whole[row] else "its cubes are no shapes"
+            f"{shapes[t].count[row]} cubes"
+            if shapes[t].whole[row]
+            else "its cubes are not connected shapes"
         ),
     )
 
@@ -123,12 +125,14 @@ def one_right_answer(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> 
     def found_instead(t: int, row: int) -> str:
         congruent = np.flatnonzero(shapes[t].right[row]).tolist()
         answers = tables[t].answers
-        stored = "" if answers is None else f", answer {answers[row]}"
+        stored = "" if answers is None else f", answer key {answers[row]}"
         kinds = tables[t].truth["distractor_kind"][row].tolist()
-        return f"congruent to the reference: {congruent or 'none'}{stored}, kinds {kinds}"
+        return (
+            f"congruent to the reference: {congruent or 'none'}{stored}, distractor types {kinds}"
+        )
 
-    rule = "exactly one answer congruent to the reference, the one that is told"
-    return judge("one right answer", rule, tables, wrong, found_instead)
+    rule = "exactly one option is congruent to the reference, as in the answer key"
+    return judge("one correct option", rule, tables, wrong, found_instead)
 
 
 def stored_ids(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
@@ -145,7 +149,7 @@ def stored_ids(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
         clash = _not_one_to_one(stored_id, computed) | _not_one_to_one(computed, stored_id)
         bad[whole] = clash.reshape(-1, tables[0].images).any(axis=1)
         wrong = [a | b for a, b in zip(wrong, np.split(bad, ends), strict=True)]
-    rule = "shape_id and class_id equal just where the cubes say so"
+    rule = "shape_id and class_id agree with the cubes"
     return judge("stored ids", rule, tables, wrong, lambda t, row: "its ids are not")
 
 

@@ -53,7 +53,7 @@ def splits_for_ever(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> P
     """
     by_hash = [table.spec is not None for table in tables]
     if not any(by_hash):
-        return Proof("splits for ever", "skipped", "released files have other splits")
+        return Proof("split by hash", "skipped", "released files have other splits")
     wrong = [np.zeros(len(table), np.bool_) for table in tables]
     for t, (table, its_shapes) in enumerate(zip(tables, shapes, strict=True)):
         chains = table.spec is not None and table.spec.shapes == "chain"
@@ -65,8 +65,8 @@ def splits_for_ever(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> P
             distinct = table.cubes[rows, :, :n].reshape(-1, n, 3)[first]
             owner = class_splits(distinct, chains)[copy.reshape(len(rows), -1)]
             wrong[t][rows] = (owner != SPLITS.index(table.questions.split or "test")).any(axis=1)
-    rule = "every class of shapes is in the split that the hash of its canonical form names"
-    return judge("splits for ever", rule, tables, wrong, lambda t, row: "a shape of another split")
+    rule = "each shape is in the split that the hash of its canonical form selects"
+    return judge("split by hash", rule, tables, wrong, lambda t, row: "a shape of another split")
 
 
 def class_splits(cubes: Array, chains: bool) -> Array:
@@ -131,16 +131,16 @@ def splits_share_nothing(tables: Sequence[AuditTable], shapes: Sequence[Shapes])
     names = [table.questions.split or "" for table in tables]
     owned: dict[str, Array] = dict.fromkeys(sorted(set(names)), np.zeros(0, np.int64))
     if len(owned) < 2:
-        return Proof("splits apart", "skipped", f"one split alone: {', '.join(owned)}")
+        return Proof("disjoint splits", "skipped", f"one split only: {', '.join(owned)}")
     for split, its_shapes in zip(names, shapes, strict=True):
         owned[split] = np.union1d(owned[split], its_shapes.class_name[its_shapes.whole])
     every, times = np.unique(np.concatenate(list(owned.values())), return_counts=True)
     shared = every[times > 1]
-    rule = "no shape, nor its mirror image, in two splits"
+    rule = "no shape and no mirror image of a shape is in two splits"
     number = ", ".join(f"{split} {len(classes):,}" for split, classes in owned.items())
     return judge(
-        "splits apart",
-        f"{rule} (classes: {number})",
+        "disjoint splits",
+        f"{rule} (shapes: {number})",
         tables,
         [np.isin(s.class_name, shared).any(axis=1) & s.whole for s in shapes],
         lambda t, row: (

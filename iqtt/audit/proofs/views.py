@@ -39,7 +39,7 @@ def rotations(tables: Sequence[AuditTable]) -> Proof:
         good = (off < ORTHONORMAL) & (np.linalg.det(matrices) > 0)
         wrong.append(~good.all(axis=1))
     rule = "orthonormal and proper"
-    return judge("rotations", rule, tables, wrong, lambda t, row: "one is no rotation")
+    return judge("rotations", rule, tables, wrong, lambda t, row: "not a rotation matrix")
 
 
 def angles(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
@@ -52,11 +52,11 @@ def angles(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Proof:
         wrong.append((s.place >= 0) & ~(as_stored & (angle >= low - LEAST_DEGREES)))
     return judge(
         "angles",
-        f"right answers turned by {max(least):g} degrees or more, and as far as told",
+        f"correct options rotated by at least {max(least):g} degrees, as stored",
         tables,
         wrong,
         lambda t, row: (
-            f"turned by {turned[t][row]:.4f} degrees,"
+            f"rotated by {turned[t][row]:.4f} degrees,"
             f" {tables[t].truth['angle_degrees'][row]:.4f} stored"
         ),
     )
@@ -72,18 +72,18 @@ def lines_of_sight(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pr
         table.spec.min_sight_angle_degrees if table.spec is not None else 0.0 for table in tables
     ]
     if not any(least):
-        return Proof("lines of sight", "skipped", "no smallest angle is specified")
+        return Proof("lines of sight", "skipped", "no minimum angle is specified")
     sights = [_right_apart(table, s)[1] for table, s in zip(tables, shapes, strict=True)]
     return judge(
         "lines of sight",
-        f"right answers seen from {max(least):g} degrees or more beside the reference's view,"
-        " from the front or from behind",
+        f"viewing directions of reference and correct option differ by at least {max(least):g}"
+        " degrees, also from opposite directions",
         tables,
         [
             (s.place >= 0) & ~(angle >= low - LEAST_DEGREES)
             for s, angle, low in zip(shapes, sights, least, strict=True)
         ],
-        lambda t, row: f"{sights[t][row]:.4f} degrees beside it",
+        lambda t, row: f"{sights[t][row]:.4f} degrees apart",
     )
 
 
@@ -147,9 +147,9 @@ def cast_again(
             if problem:
                 problems[-1][row] = problem
     return judge(
-        "cast again",
-        "images and visible pixels are what the stored cubes and lights give, and directions of"
-        f" faces differ by {FACE_STEPS} of 255 or more",
+        "ray-cast images",
+        "images and visible pixels equal a second rendering of the stored cubes and lights; colours"
+        f" of face directions differ by at least {FACE_STEPS} of 255",
         tables,
         [np.isin(np.arange(len(t)), list(p)) for t, p in zip(tables, problems, strict=True)],
         lambda t, row: problems[t][row],

@@ -62,10 +62,10 @@ def import_answers(
     except AnswerFileError as error:
         raise error.inside(path) from error
     if not values:
-        raise AnswerFileError(path, "no answers", "one for each question")
+        raise AnswerFileError(path, "no responses", "one for each question")
     if len({type(value) for value in values}) > 1 or len({type(row) for row in rows}) > 1:
         raise AnswerFileError(
-            path, "entries of two kinds", "all with a question, or none; all with scores, or none"
+            path, "entries of two types", "all with a question, or none; all with scores, or none"
         )
     ids = None if rows[0] is None else [row for row in rows if row is not None]
     form = "scores" if isinstance(values[0], list) else "answer"

@@ -101,9 +101,9 @@ class Log:
         notes = [self.failure_note, unread_note(unread, len(self.answers))]
         cut_off = sum(answer.outcome == "cut off" for answer in self.answers)
         if cut_off:
-            notes.append(f"{cut_off} of {len(self.answers)} replies reached the limit of tokens")
+            notes.append(f"{cut_off} of {len(self.answers)} replies reached --max-tokens")
         if any(self.tokens):
-            notes.append(f"{self.tokens[0]:,} + {self.tokens[1]:,} tokens")
+            notes.append(f"{self.tokens[0]:,} input and {self.tokens[1]:,} output tokens")
         return list(filter(None, notes))
 
 
@@ -144,7 +144,7 @@ def read_returned(path: str | Path) -> Log:
     for answer in log.answers:
         row = answer.question, answer.rotation
         if row in seen:
-            found = f"two answers to question {row[0]}, rotation {row[1]}"
+            found = f"two responses to question {row[0]}, rotation {row[1]}"
             raise FileFormatError(path, found, "one each")
         seen.add(row)
     failed = {place: reason for place, reason in log.failures.items() if place not in seen}
@@ -154,7 +154,7 @@ def read_returned(path: str | Path) -> Log:
         failures=failed,
     )
     if not seen:
-        raise FileFormatError(path, log.failure_note or "no answers", "at least one answer")
+        raise FileFormatError(path, log.failure_note or "no responses", "at least one response")
     return log
 
 
@@ -181,18 +181,18 @@ def write_returned(
         digest, count, offered = questions.fingerprint or "", len(questions), questions.answers
     for answer in log.answers:
         if answer.digest and digest and answer.digest != digest:
-            found = f"answers to questions with the digest {answer.digest[:12]}"
+            found = f"responses to questions with the recipe hash {answer.digest[:12]}"
             raise FileFormatError(log.path, found, f"{digest[:12]}, as {questions_file} has it")
         if not 0 <= answer.question < count:
-            found = f"an answer to question {answer.question}"
+            found = f"a response to question {answer.question}"
             raise FileFormatError(log.path, found, f"questions 0 to {count - 1}")
         if not 0 <= answer.rotation < offered:
             found = f"question {answer.question} in rotation {answer.rotation}"
             raise FileFormatError(log.path, found, f"rotations 0 to {offered - 1}")
     first = [answer for answer in log.answers if answer.rotation == 0]
     if not first:
-        found = log.failure_note or "no question with its answers in the order of the file"
-        raise FileFormatError(log.path, found, "at least one answer to a question in rotation 0")
+        found = log.failure_note or "no question with its options in the order of the file"
+        raise FileFormatError(log.path, found, "at least one response to a question in rotation 0")
     order = {answer.question: i for i, answer in enumerate(first)}
     rotated = np.full((len(first), offered), NOT_ASKED)
     for answer in log.answers:

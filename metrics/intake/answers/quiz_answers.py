@@ -111,7 +111,7 @@ def read_answers(path: str | Path) -> Answers:
     try:
         content = parse_json(read_bytes(Path(path), MOST_BYTES), 100)
         if not isinstance(content, dict) or content.get("format") != FORMAT:
-            raise QuizError(path, "no answers of a quiz", "a file that the page of a quiz saved")
+            raise QuizError(path, "no responses of a quiz", "a file that the page of a quiz saved")
         return validated(Answers, content)
     except JsonError as error:
         place = f"{path}: {error.where}" if error.where else str(path)
@@ -121,7 +121,7 @@ def read_answers(path: str | Path) -> Answers:
 def _check(path: Path, answers: Answers, digest: str, count: int, offered: int) -> None:
     """Raise QuizError unless all questions of a quiz about these ones are answered, each once."""
     if answers.digest != digest:
-        found = f"answers to questions with the digest {answers.digest:.12}"
+        found = f"responses to questions with the recipe hash {answers.digest:.12}"
         raise QuizError(path, found, f"{digest:.12}, that of the questions")
     rows = [answer.question for answer in answers.answers]
     for i, answer in enumerate(answers.answers):
@@ -135,5 +135,5 @@ def _check(path: Path, answers: Answers, digest: str, count: int, offered: int) 
             place = f"{path}: answers[{i}].question"
             raise QuizError(place, f"question {answer.question} twice", "each question once")
     if quiz_name(digest, rows) != answers.quiz:
-        found = f"{len(rows)} answers that are not those of the quiz {answers.quiz}"
-        raise QuizError(path, found, "an answer to each of its questions")
+        found = f"{len(rows)} responses that do not belong to the quiz {answers.quiz}"
+        raise QuizError(path, found, "a response to each of its questions")

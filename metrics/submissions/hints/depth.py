@@ -22,10 +22,11 @@ OTHER_UNIT = 10.0  # least factor that looks like another unit of length
 SLOPE = 0.2  # by which the slopes of distances may differ from 1
 MOST_CONDITION = 1e6  # of the equations for the slopes
 ALONG_RAY = "looks like distance along the ray, not planar depth"
-PICTURES = (255.0, 65535.0)  # largest values of pictures of 8 and 16 bits
-UNITS = {1000.0: "millimetres for metres", 100.0: "centimetres for metres"}
+IMAGES = (255.0, 65535.0)  # largest values of images of 8 and 16 bits
+SCALE = "looks like another scale"
+UNITS = {1000.0: "millimetres instead of metres", 100.0: "centimetres instead of metres"}
 # Factors that a hint names only where they fit within EXACT.
-FACTORS = {3.2808: "feet for metres", 39.37: "inches for metres", 0.5: "half", 2.0: "twice"}
+FACTORS = {3.2808: "feet instead of metres", 39.37: "inches instead of metres"}
 EXACT = 0.03
 USUAL_FOCAL = 300.0  # pixels: a network trained at this focal length is often scaled by it
 
@@ -49,7 +50,7 @@ def disparity_hints(samples: Sequence[Sample]) -> list[Problem]:
         images = [image for sample in samples if (image := _Image.of(sample)) is not None]
         if not images or np.mean([i.correlation(i.true) >= SWAPPED for i in images]) < SHARE:
             return []
-    found = "looks like depth: large where the truth is far"
+    found = "looks like depth: large where the ground truth is far"
     return [Problem("disparity", HINT, "1 / depth, large where the surface is near", found)]
 
 
@@ -90,7 +91,7 @@ def _swapped(images: Sequence[_Image]) -> str | None:
         return None
     if np.mean([np.median(image.predicted) < 0.0 for image in images]) > SHARE:
         return "looks like z in the camera frame, which is negative in front of it"
-    return "looks like disparity (1/depth): large where the truth is near"
+    return "looks like disparity (1/depth): large where the ground truth is near"
 
 
 def _shape(images: Sequence[_Image]) -> str | None:
@@ -172,13 +173,13 @@ def _scale(images: Sequence[_Image], alignment: str) -> str | None:
     normalised = low >= -1e-6 and 0.9 <= high <= 1.0 + 1e-6
     if normalised and follows and (alignment == "none" or low < 0.1):
         return "looks normalised to 0..1"
-    for most in PICTURES:
+    for most in IMAGES:
         ends = [(float(i.predicted.min()), float(i.predicted.max())) for i in images]
         if (
             follows
             and np.mean([a < 0.1 * most and 0.9 * most < b <= most for a, b in ends]) > SHARE
         ):
-            return f"looks like a picture of depth, 0..{most:g} in each image"
+            return f"looks like a depth image scaled to 0..{most:g} in each image"
     errors = [_error(image.predicted / scale, image.true) for image in images]
     near = np.mean([e <= 1.2 * i.spread for e, i in zip(errors, images, strict=True)]) >= SHARE
     alike = np.mean(np.abs(np.log(scales / scale)) <= 0.1) >= SHARE
@@ -192,9 +193,9 @@ def _scale(images: Sequence[_Image], alignment: str) -> str | None:
     if not exact and (np.abs(np.log(by_focal)) < EXACT).all():
         exact = f"multiplied by focal length / {USUAL_FOCAL:g}"
     unit = exact or unit
-    guess = f", as if {unit}" if other_unit or exact else ""
+    guess = f" ({unit}?)" if other_unit or exact else ""
     rounded = float(f"{scale:.3g}")
-    return f"looks like another scale: {rounded:,g} times the truth{guess}"
+    return f"{SCALE}: {rounded:,g} times the ground truth{guess}"
 
 
 def _error(a: Array, b: Any) -> float:
@@ -219,7 +220,7 @@ def _transposed(sample: Sample) -> Array:
 _REMEDIES: dict[str, Remedy] = {
     ALONG_RAY: lambda s: s.depth / s.stretch,
     "looks upside down": lambda s: s.depth[::-1],
-    "looks mirrored, left for right": lambda s: s.depth[:, ::-1],
-    "looks turned by 180 degrees": lambda s: s.depth[::-1, ::-1],
-    "looks transposed, rows for columns": _transposed,
+    "looks mirrored, left and right swapped": lambda s: s.depth[:, ::-1],
+    "looks rotated by 180 degrees": lambda s: s.depth[::-1, ::-1],
+    "looks transposed, rows and columns swapped": _transposed,
 }

@@ -45,8 +45,9 @@ def no_value_hints(predictions: RoomPredictions, truth: Images) -> list[Problem]
     value, found = max(images.items(), key=lambda item: len(item[1]))
     pixels, ids = sum(count for _, count in found), [row for row, _ in found]
     text = (
-        f"{value:g} at {pixels:,} pixels of {len(ids)} images looks like a mark for no value;"
-        f" say bench import --missing nearest --invalid, and the number that files have for it"
+        f"{value:g} at {pixels:,} pixels of {len(ids)} images looks like a marker of invalid"
+        " pixels;"
+        f" use bench import --missing nearest --invalid with the number in your files"
     )
     expected = "a value of the surface at each pixel"
     return [Problem(predictions.kind, HINT, expected, text, first_ids(ids))]

@@ -16,7 +16,7 @@ SHARE = 0.6  # fraction of the images in which a remedy must help so much
 CLOSE_DEGREES = 30.0  # largest mean angle after a remedy
 SIMPLER = 0.9  # fraction of its angle that a remedy must reach to win over a simpler one
 ONE_SIGN = 0.98  # fraction of the values of a coded axis that have its sign
-CODES = {1.0: "a picture, 0..1 for -1..1", 255.0: "a picture, 0..255 for -1..1"}
+CODES = {1.0: "an image, 0..1 for -1..1", 255.0: "an image, 0..255 for -1..1"}
 
 
 def normal_hints(samples: Sequence[Sample]) -> list[Problem]:
@@ -42,7 +42,7 @@ def normal_hints(samples: Sequence[Sample]) -> list[Problem]:
                     found = ", and like ".join(filter(None, (text, frame)))
     if found is None:
         return []
-    numbers = f"{np.median(given):.0f} degrees as given, {best:.0f} if so"
+    numbers = f"{np.median(given):.0f} degrees as given, {best:.0f} after the fix"
     expected = "vectors in the camera frame (x right, y up, z towards the viewer) facing the viewer"
     return [Problem("normal", HINT, expected, f"looks like {found} ({numbers})")]
 

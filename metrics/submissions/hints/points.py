@@ -43,7 +43,9 @@ def _point_hints(samples: Sequence[Sample], alignment: Alignment) -> list[Proble
         if good.mean() >= SHARE and np.median(errors) < best:
             best, text = float(np.median(errors)), words
     if text:
-        distances = f"{np.median(given):.3g} from the truth as given, {best:.3g} if so"
+        distances = (
+            f"{np.median(given):.3g} from the ground truth as given, {best:.3g} after the fix"
+        )
         found.append(f"looks like {text} ({distances})")
     expected = "points in the camera frame (x right, y up, z towards the viewer), on its rays"
     return [Problem("points", HINT, expected, words) for words in found]
@@ -61,8 +63,7 @@ def _remedies(samples: Sequence[Sample]) -> Iterator[tuple[str, Remedy]]:
             2.0 * np.arctan(np.tan(np.radians(samples[0].fov_y_degrees) / 2.0) / factor)
         )
         yield (
-            f"another field of view, {angle:.1f} degrees in place of"
-            f" {samples[0].fov_y_degrees:.1f}",
+            f"another field of view, {angle:.1f} degrees instead of {samples[0].fov_y_degrees:.1f}",
             lambda p, _: p * np.array([factor, factor, 1.0]),
         )
 

@@ -55,12 +55,12 @@ def answer_hints(predictions: QuestionPredictions, answers: NDArray[Any]) -> lis
     if predictions.scores is not None:
         lowest = predictions.scores[usable].argmin(axis=1)
         if _clear(lowest == right, predictions.scores.shape[1]):
-            found = f"the lowest score is right in {np.count_nonzero(lowest == right)} of"
+            found = f"the lowest score is correct in {np.count_nonzero(lowest == right)} of"
             found = f"{found} {len(right)} questions: scores look like distances"
             hints.append(Problem("scores", HINT, "the highest score for the best", found))
     elif (given > 0).all() and (_clear(given - 1 == right, offered) or given.max() == offered):
-        found = "none is 0, and the next lower ones are right more often: they look counted from 1"
-        hints.append(Problem("answer", HINT, "answers counted from 0", found))
+        found = "responses look counted from 1: none is 0, and response - 1 is correct more often"
+        hints.append(Problem("answer", HINT, "responses counted from 0", found))
     return hints
 
 

@@ -182,7 +182,10 @@ def compare(
         clusters=count,
         differences=tuple(replace(d, p_holm=p) for d, p in zip(differences, adjusted, strict=True)),
         comparable=all(file.comparable for file in files),
-        notes=(*left_out(as_scored, names), *_notes(files, labels, len(clusters), count)),
+        notes=(
+            *left_out(as_scored, names),
+            *_notes(files, labels, len(clusters), count, len(pairs)),
+        ),
         alignment=files[0].alignment,
         seed=seed,
         resamples=resamples,
@@ -270,28 +273,27 @@ def least_p_value(clusters: int) -> float:
 
 
 def _notes(
-    files: Sequence[ScoreFile], labels: Sequence[str], items: int, clusters: int
+    files: Sequence[ScoreFile], labels: Sequence[str], items: int, clusters: int, tests: int
 ) -> Iterator[str]:
     seen: dict[str, str] = {}
     for file, label in zip(files, labels, strict=True):
         if not file.comparable:
             why = "; ".join(map(plain, file.warnings))
-            yield f"{label} says that it is not comparable{': ' if why else ''}{why}"
+            yield f"{label}: {why or 'not comparable'}"
         if file.runs > 1:
             yield (
-                f"{label}: means over {file.runs} training runs; the tests ask whether these runs"
-                " differ, not whether other runs would"
+                f"{label}: mean of {file.runs} training runs; the tests hold for these runs, not"
+                " for training in general"
             )
         if file.declared is not None:
-            yield f"{label} declares {file.declared}, and is scored after {file.alignment}"
+            yield f"{label}: declared alignment {file.declared}, scored after {file.alignment}"
         for submission in file.meta.submissions:
             if seen.setdefault(submission.sha256, label) != label:
-                yield f"{label} and {seen[submission.sha256]} were scored from the same submission"
+                yield f"{label} and {seen[submission.sha256]} are scores of the same predictions"
     if not all(file.comparable for file in files):
-        unit = "questions" if files[0].task == "iqtt" else "rows"
-        yield f"compared over the {items} {unit} that all of the files score"
-    if files[0].task != "iqtt" and least_p_value(clusters) > ALPHA:
-        yield (
-            f"{clusters} {files[0].unit} cannot show any difference: the least possible p-value is"
-            f" {least_p_value(clusters):.3g}"
-        )
+        unit = "questions" if files[0].task == "iqtt" else "images"
+        yield f"compared over the {items} {unit} that all files score"
+    least = min(1.0, least_p_value(clusters) * tests)
+    if files[0].task != "iqtt" and least > ALPHA:
+        counted = f"{clusters} {files[0].unit}" + f" and {tests} comparisons" * (tests > 1)
+        yield f"no verdict is possible with {counted}: the least possible p (Holm) is {least:.3g}"

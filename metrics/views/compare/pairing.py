@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 IDS_SHOWN = 5
 FLOOR_AGREEMENT = 1e-6  # relative: of the empty room, drawn on other machines
 SCORE_AGAIN = "score the submissions again with this release"
-CHANGED = "one of the files was changed"
+CHANGED = "one of the files has been changed"
 
 
 class ComparisonError(SceneGenError):
@@ -39,7 +39,7 @@ def require_same_test(
         if not file.comparable and not allow_incomparable:
             why = "; ".join(file.warnings) or "not comparable"
             raise ComparisonError(
-                file.place, f"scores that are {why}", hint="or say --allow-incomparable"
+                file.place, f"scores that are {why}", hint="or use --allow-incomparable"
             )
 
     def shown() -> list[str]:  # a test set of single views, say, has nothing behind
@@ -161,7 +161,7 @@ def pair(
         rows = file.ids[orders[0]][differ]
         raise ComparisonError(
             where,
-            f"other rows without a number, such as {_listed(rows)}",
+            f"other items without a value, such as {_listed(rows)}",
             f"those of {reference.place}",
             CHANGED,
         )

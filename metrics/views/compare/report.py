@@ -1,8 +1,8 @@
 """A comparison for people, as aligned text, Markdown or a page, and for programs, as JSON."""
 
 import json
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 
 from metrics.scoring.known_tests import known_test
 from metrics.scoring.metric_names import metric
@@ -23,8 +23,10 @@ from scenegen.common.text_table import Interval, number
 
 FORMAT_NAME = "pix2shape-bench/comparison"
 FORMAT_VERSION = "1.0"
-HEAD = ("method", "score", "difference", "better/worse/same", "p", "p (Holm)",
-        "min. detectable", "verdict")  # fmt: skip
+HEAD = (
+    *("metric", "method", "value", "difference", "verdict"),
+    *("b/w/s", "p (Holm)", "MDE"),
+)
 
 
 def text_report(
@@ -33,12 +35,12 @@ def text_report(
     as_markdown: bool = False,
     width: int | None = None,
 ) -> str:
-    """Return the skills of all methods, then a table of differences in each score; and a legend.
+    """Return the skills of all methods, a table of differences, and notes.
 
     Sentences are wrapped to lines of `width` characters, where it is given.
     """
     write = to_markdown if as_markdown else to_text
-    tables = [side_by_side(files), *difference_tables(comparison)]
+    tables = [side_by_side(files), difference_table(comparison)]
     title = "\n".join([_title(comparison), *(f"WARNING  {t}" for t in _warnings(comparison))])
     return write(title, tables, _notes(comparison, files), width)
 
@@ -46,10 +48,11 @@ def text_report(
 def html_report(comparison: Comparison, files: Sequence[ScoreFile]) -> str:
     """Return a page: verdicts, differences, and charts by group; `files` are those compared."""
     verdicts = [f"{label}: {_answer(comparison, label)}" for label in comparison.methods]
-    differences = list(difference_tables(comparison))
     sections = [
         Section(remarks=[_title(comparison), *verdicts], tables=[side_by_side(files)]),
-        Section("Differences", tables=differences, notes=_notes(comparison, files)),
+        Section(
+            "Differences", tables=[difference_table(comparison)], notes=_notes(comparison, files)
+        ),
         *group_charts(files),
     ]
     title = f"Compared with {comparison.reference}"
@@ -74,17 +77,17 @@ def to_json(comparison: Comparison) -> str:
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def difference_tables(comparison: Comparison) -> Iterator[Table]:
-    """Yield for each score the methods' differences from the reference, with the paired tests."""
+def difference_table(comparison: Comparison) -> Table:
+    """Return for each metric the differences from the reference, with the paired test."""
+    rows: list[Sequence[Cell | str]] = []
     for name in dict.fromkeys(d.metric for d in comparison.differences):
         differences = [d for d in comparison.differences if d.metric == name]
-        first = differences[0]
+        first, up = differences[0], metric(name).higher_is_better
         reference = number(first.reference_value, (first.low, first.high))
-        rows: list[Sequence[Cell | str]] = [
-            (comparison.reference, reference, *[""] * len(HEAD[2:])),
-            *map(_difference_row, differences),
-        ]
-        yield make_table(f"{name} ({metric(name).unit}, {metric(name).direction})", HEAD, rows)
+        label = f"{name} {'up' if up else 'down'}"
+        rows.append((label, comparison.reference, reference, *[""] * 5))
+        rows += [("", *_difference_row(d)) for d in differences]
+    return replace(make_table("", HEAD, rows), named_by=1)
 
 
 def _difference_row(d: Difference) -> Sequence[Cell | str]:
@@ -97,20 +100,16 @@ def _difference_row(d: Difference) -> Sequence[Cell | str]:
     difference = Cell(_signed(d.difference, ends), f"[{', '.join(shown)}]" if shown else "")
     smallest = "none" if d.smallest is None else number(d.smallest)
     counts = f"{d.wins}/{d.losses}/{d.ties}"
-    p_values = (_probability(d.p_value), _probability(d.p_holm))
-    return d.method, number(d.value, ends), difference, counts, *p_values, smallest, d.verdict
+    holm = f"{d.p_holm:.4f}" if d.p_holm >= 0.0001 else "<0.0001"
+    return d.method, number(d.value, ends), difference, d.verdict, counts, holm, smallest
 
 
 def _signed(value: float, interval: Interval) -> str:
     return ("+" if value > 0.0 else "") + number(value, interval)
 
 
-def _probability(p: float) -> str:
-    return f"{p:.4f}" if p >= 0.0001 else "<0.0001"
-
-
 def _title(comparison: Comparison) -> str:
-    """Return with what methods are compared, and over how many items of which truth."""
+    """Return the reference, and how many items of which ground truth are compared."""
     size = f"{comparison.items:,} questions"
     if comparison.task == "rooms":
         size = f"{comparison.items:,} images of {comparison.clusters:,} scenes"
@@ -120,11 +119,10 @@ def _title(comparison: Comparison) -> str:
         size += groups * (comparison.clusters < comparison.items)
     test = known_test(comparison.truth_digest)
     truth = test.name if test else comparison.truth_digest[:12]
-    title = f"Against {comparison.reference}, over {size} (truth {truth})"
+    title = f"Compared with {comparison.reference}: {size}, ground truth {truth}"
     if comparison.task == "iqtt":
         return title
-    how = "as predicted" if comparison.alignment == "none" else f"after {comparison.alignment}"
-    return f"{title}, all methods scored {how}"
+    return f"{title}   alignment: {comparison.alignment}"
 
 
 def _units(comparison: Comparison) -> tuple[str, str]:
@@ -136,27 +134,28 @@ def _units(comparison: Comparison) -> tuple[str, str]:
 def _warnings(comparison: Comparison) -> list[str]:
     items, _ = _units(comparison)
     few = [] if items == "questions" else too_few_warning(comparison.clusters, items)
-    return ["not comparable, compared all the same"] * (not comparison.comparable) + few
+    return ["some scores are not comparable, see below"] * (not comparison.comparable) + few
 
 
 def _notes(comparison: Comparison, files: Sequence[ScoreFile]) -> list[str]:
-    """Return in sentences what the columns say, and what else has to be known."""
+    """Return what the columns mean, and notes on the files."""
     tests = {d.test for d in comparison.differences}
     items, apart = _units(comparison)
     if len(tests) > 1:
-        test = "exact McNemar test; sign flips for means over several runs"
+        test = "exact McNemar test, or sign flips for means over several runs"
     elif tests == {SIGN_FLIP}:
-        test = f"sign flips of the differences of each {apart[:-1]}"
+        test = f"sign flips per {apart[:-1]}"
     else:
         test = "exact McNemar test"
     return [
         *skill_notes(files[0]),
-        f"difference: method - reference, paired, with its {CONFIDENCE:.0%} bootstrap CI over"
-        f" {apart}, not corrected",
-        f"better/worse/same: {items}. p: {test}, two-sided; Holm: corrected for"
-        f" {len(comparison.differences)} comparisons; verdicts at {ALPHA:.0%}",
-        f"min. detectable: what this test set would show in {POWER:.0%} of cases after the"
-        " correction, as the differences spread here; none: no difference, or none can be told",
+        "difference: method - first method, paired, with its uncorrected"
+        f" {CONFIDENCE:.0%} bootstrap CI over {apart}",
+        f"b/w/s: number of {items} that are better, worse, the same; p: {test}, two-sided; Holm:"
+        f" corrected for {len(comparison.differences)} comparisons; verdict: at {ALPHA:.0%}",
+        "MDE: minimum detectable effect, the smallest difference that this test set detects with"
+        f" {POWER:.0%} power"
+        " after the correction",
         *unread_notes(files),
         *comparison.notes,
     ]

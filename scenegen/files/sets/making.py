@@ -258,7 +258,7 @@ def _take_over(home: Path, request: Mapping[str, Any], overwrite: bool) -> None:
     differences = "" if older is None else _differences(older, request)
     if differences and not overwrite and complete_parts(home):
         where, expected = f"{home} has parts of another request", "the same options"
-        hint = "repeat its options to go on, or start anew with --overwrite"
+        hint = "use the same options to resume, or start again with --overwrite"
         raise SpecError(where, differences, expected, hint)
     if older is None or differences:
         remove_folder(home)
@@ -273,7 +273,7 @@ def _kept(home: Path, request: Mapping[str, Any]) -> Iterator[None]:
         write_text(home / REQUEST, json.dumps(request, indent=1), overwrite=True)
         yield
     except LostWorkerError as error:
-        kept = f"{len(complete_parts(home))} complete files are kept; the same command goes on"
+        kept = f"{len(complete_parts(home))} files are kept; re-run the same command to resume"
         hint = "; ".join(filter(None, (error.hint, kept)))
         raise LostWorkerError(error.where, error.found, "", hint) from error
     finally:

@@ -103,5 +103,5 @@ def _in_processes(
                 yield future.result()
             except LostWorkerError as error:
                 name, cause = running[future].name, "too little memory, or a crash"
-                reason = f"the process that read it ended with {error.found} ({cause})"
-                yield ModelCheck(name, False, f"{reason}; simplify the model", 0)
+                reason = f"the process that read it exited with {error.found} ({cause})"
+                yield ModelCheck(name, False, f"{reason}; simplify the mesh", 0)

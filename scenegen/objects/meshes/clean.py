@@ -83,8 +83,8 @@ def clean_mesh(vertices: Array, faces: Array, up: str = "y") -> CleanMesh:
     if np.ptp(points[faces.ravel(), 1]) < LOWEST:
         raise BadMeshError(
             "height",
-            "none, so the model would be part of the floor",
-            hint="if it stands upright in other programs, another axis points up (--up)",
+            "none, so the mesh would be part of the ground",
+            hint="if the mesh is upright in other programs, another axis points up (--up)",
         )
     used = np.zeros(len(points), bool)
     used[faces] = True

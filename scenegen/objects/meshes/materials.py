@@ -100,7 +100,7 @@ def glb_material(told: Any, unread: Unread) -> MeshMaterial:
     picture, other = (None if image is None else rgb_of(image) for image in images)
     factor = None if told.baseColorFactor is None else told.baseColorFactor[:3] / 255
     if about["picture"] and picture is None:
-        words = f"names {about['picture']!r}, which cannot be read; such models are plain"
+        words = f"names {about['picture']!r}, which cannot be read; such meshes get no texture"
         unread.setdefault("picture", words)
     both = picture, other
     means = [np.ones(3) if x is None else np.asarray(x).mean((0, 1)) / 255 for x in both]

@@ -100,7 +100,7 @@ class MeshStore:
                 raise
             except Exception as error:  # one bad picture must not stop a run
                 problem = f"{type(error).__name__}: {error}"
-                raise BadMeshError("colours and pictures", problem, "readable ones") from error
+                raise BadMeshError("colours and textures", problem, "readable ones") from error
         self._warn(name, unread)
         return paint
 

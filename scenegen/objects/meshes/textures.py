@@ -46,7 +46,7 @@ class _Beside(trimesh.resolvers.Resolver):  # type: ignore[misc]
                 with opened_picture(io.BytesIO(data), sys.maxsize):
                     pass
         except Exception:  # trimesh goes on without it
-            words = f"names {name!r}, which cannot be read; such models are plain"
+            words = f"names {name!r}, which cannot be read; such meshes get no texture"
             self.unread.setdefault("picture", words)
             raise
         return data
@@ -92,7 +92,9 @@ def paint_of(path: Path, up: str, vertices: Array, faces: Array, unread: Unread)
         number, uv, color = -1, np.zeros((count, 3, 2)), np.zeros((count, 3))
         if material is not None and material.picture is not None and piece.uv is not None:
             if "color" in piece.mesh.visual.vertex_attributes:
-                unread.setdefault("both", "has colours of vertices over pictures, not shown")
+                unread.setdefault(
+                    "both", "has vertex colours on top of textures, which are ignored"
+                )
             if id(material) not in numbers:
                 numbers[id(material)] = len(textures)
                 textures.append(_texture(material))

@@ -94,7 +94,7 @@ def from_folder(folder: str | Path) -> Mapping[str, tuple[MapFiles, ...]]:
                 break
     if not served:
         words = ", ".join(words.split("|")[0] for words, *_ in _WORDS)
-        raise SpecError(root, "no name that tells a kind", f"names with one of {words}")
+        raise SpecError(root, "no file name of a known type of map", f"names with one of {words}")
     return {kind: tuple(maps) for kind, maps in served.items()}
 
 
@@ -121,7 +121,7 @@ def _decoded(path: Path) -> None:
 def _check(where: Path, files: list[tuple[str, Path]]) -> None:
     kinds = [kind for kind, _ in files]
     if "color" not in kinds:
-        raise SpecError(where, f"no colour map beside {files[0][1].name}", "one")
+        raise SpecError(where, f"no colour map next to {files[0][1].name}", "one")
     sizes = sorted({_size(path) for _, path in files})
     if len(sizes) > 1:
         listed = " and ".join(f"{w} x {h}" for w, h in sizes[:3])

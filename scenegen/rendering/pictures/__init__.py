@@ -4,7 +4,8 @@
   `tracer` makes pictures of them.
 - `matter` gathers a closed room's triangles and materials in arrays of the same form for all rooms,
   so that one compiled kernel serves them all.
-- `lights` are sun, sky and lamps, sampled by their power; `sky` draws what is outside.
+- `lights` are sun, sky and lamps, sampled by their power; `sky` draws what is outside, `sun` says
+  where the sun is.
 - `denoiser` removes noise, `development` exposes and applies the tone curve.
 
 Depth, normals and ids do not come from here. Start with `tracer`.

@@ -27,7 +27,7 @@ MEAN = 0.09  # radiance that the upper half of the surroundings is scaled to, th
 MOST_COLUMNS = 4096
 MOST_PIXELS = 2**28  # of a file
 HEAD, ORDER = 2**16, re.compile(rb"-Y +\d+ +\+X +\d+\s*")  # bytes that tell that of an HDR file
-ENVIRONMENT = "an equirectangular picture in HDR or EXR"
+ENVIRONMENT = "an equirectangular HDR or EXR image"
 
 
 def materials_of(spec: InteriorSpec) -> Mapping[str, tuple[MapFiles, ...]] | None:
@@ -112,12 +112,12 @@ def _radiance(place: Path) -> Array:
     with place.open("rb") as file:
         head, _, rest = file.read(HEAD).partition(b"\n\n")
     order, _, pixels = rest.partition(b"\n")
-    is_radiance, found = head.startswith(b"#?"), "no picture that can be read"
+    is_radiance, found = head.startswith(b"#?"), "an unreadable image"
     if is_radiance and (b"xyze" in head or not ORDER.fullmatch(order)):
         found = f"colours as XYZE, or pixels in the order {order[:40].decode(errors='replace')!r}"
         raise FileFormatError(place, found, "RGBE, in the order -Y HEIGHT +X WIDTH")
     if is_radiance and not pixels.startswith(b"\2\2") and b"\1\1\1" in pixels:
-        found = "perhaps run lengths of the oldest kind"
+        found = "possibly the old run-length encoding"
     try:
         bitmap = mi.Bitmap(str(place))
         if bitmap.component_format() in (mi.Struct.Type.Float16, mi.Struct.Type.Float32):

@@ -11,7 +11,7 @@ from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import from_json
 from scenegen.common.rotations import product
 from scenegen.description.interiors import WALLS, Interior
-from scenegen.objects.furniture.furnishing import Texture
+from scenegen.objects.furniture.furnishing import Furnishing, Texture
 from scenegen.objects.furniture.room_shell import PARTS, shell_name, shell_of
 from scenegen.rendering.materials.folders import MapFiles
 from scenegen.rendering.materials.kinds import material
@@ -63,12 +63,12 @@ class Matter(NamedTuple):
     tables: Tables
 
 
-class _Collector:
-    """Collects triangles and materials."""
+class Collector:
+    """Collects the triangles and materials of an item's room."""
 
-    def __init__(self, seed: int, index: int, colors: Palette, folder: Folder) -> None:
+    def __init__(self, seed: int, index: int, folder: Folder) -> None:
         self.folder = folder
-        self.seed, self.index, self.colors = seed, index, colors
+        self.seed, self.index, self.colors = seed, index, room_palette(seed, index)
         self.materials: list[Material] = []
         self.numbers: dict[tuple[str, int], int] = {}
         self.parts: list[tuple[Array, Array, Array, Array]] = []
@@ -92,18 +92,39 @@ class _Collector:
             self.materials.append(Material(color, roughness, metallic=metallic, wrap=wrap))
         return self.numbers[key]
 
+    def of_room(self) -> Array:
+        """Return the numbers of the materials of a shell's parts."""
+        kinds = room_kinds(self.seed, self.index)
+        return np.array([self.number(kind, "room", i) for i, kind in enumerate(kinds)])
+
+    def of_piece(self, name: str, thing: Furnishing) -> Array:
+        """Return the numbers of the materials of a piece's parts."""
+        return np.array([
+            self.textured(thing.textures[i], name, i) if i < len(thing.textures)
+            else self.number(kind, name, i) for i, kind in enumerate(thing.materials)
+        ])  # fmt: skip
+
     def add(self, corners: Array, normals: Array, uv: Array, rows: Array) -> None:
         """Add triangles with the numbers of their materials."""
         self.parts.append((corners, normals, uv, rows))
 
     def shine(self, corners: Array, normals: Array, uv: Array, flux: float) -> None:
         """Add triangles that together shine with a flux, and reflect nothing."""
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = 0.5 * float(np.sqrt((across**2).sum(axis=1)).sum())
-        radiance = np.array(WARM) * flux / (np.pi * max(area, LEAST_GLOW))
         rows = np.full(len(corners), len(self.materials))
-        self.materials.append(Material(np.ones(3), 1.0, radiance=tuple(radiance.tolist())))
+        self.materials.append(glowing(corners, flux))
         self.add(corners, normals, uv, rows)
+
+
+def area_of(corners: Array) -> float:
+    """Return the area of triangles, (F, 3, 3)."""
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return 0.5 * float(np.sqrt((across**2).sum(axis=1)).sum())
+
+
+def glowing(corners: Array, flux: float) -> Material:
+    """Return the material of triangles, (F, 3, 3), that together shine with a flux."""
+    radiance = np.array(WARM) * flux / (np.pi * max(area_of(corners), LEAST_GLOW))
+    return Material(np.ones(3), 1.0, radiance=tuple(radiance.tolist()))
 
 
 def room_palette(seed: int, index: int) -> Palette:
@@ -123,11 +144,10 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -
     """Return what image `b` of a batch shows, of materials from a folder where that has some."""
     assert batch.interior is not None
     index, seed = int(batch.index[b]), batch.spec.seed
-    collected = _Collector(seed, index, room_palette(seed, index), folder)
+    collected = Collector(seed, index, folder)
     room = shell_of(shell_name(batch.interior[b]))
     flat = np.repeat(room.normals[:, None], 3, axis=1)
-    kinds = room_kinds(seed, index)
-    rows = np.array([collected.number(kind, "room", i) for i, kind in enumerate(kinds)])
+    rows = collected.of_room()
     if from_json(Interior, batch.interior[b], "interior").mirrored:
         sides = [PARTS.index(wall) for wall in ("west", "east")]
         rows[sides] = rows[sides[::-1]]
@@ -146,10 +166,7 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -
         points = product(vertices, turned.T) + placed[:3, 3]
         normals = product(thing.corner_normals.reshape(-1, 3), turned.T / scale).reshape(-1, 3, 3)
         corners = points[thing.faces]
-        rows = np.array([
-            collected.textured(thing.textures[i], name, i) if i < len(thing.textures)
-            else collected.number(kind, name, i) for i, kind in enumerate(thing.materials)
-        ])  # fmt: skip
+        rows = collected.of_piece(name, thing)
         glows = np.array([kind == GLOW for kind in thing.materials])[thing.part] & lit
         dark = ~glows
         collected.add(corners[dark], normals[dark], thing.corner_uv[dark], rows[thing.part[dark]])

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.description.interiors import Interior
+from scenegen.rendering.pictures.sun import SUNLESS, sun_azimuth, sun_height, sunlight_of
 from scenegen.rendering.tables import upload
 
 Array = NDArray[Any]
@@ -23,10 +24,7 @@ dr: Any = drjit  # typed Any, as its stubs are not exact enough
 mi: Any = mitsuba
 ROWS, COLUMNS = 64, 128  # of the sky
 FINE = 6  # pixels of a map, along each side, for one of the sky
-LATITUDE = 47.0  # degrees, at an equinox: the sun rises at 6 and sets at 18
-SUNLESS = 2.0  # degrees of height below which there is no sun
 DUSK = 3.0  # degrees of height of the sun that lights the sky after sunset
-SUN = 1.7  # irradiance above the atmosphere, in the units of `sunsky`
 TURBIDITY = 4.0  # of the air: 2 is very clear
 GROUND = (0.13, 0.14, 0.08)  # reflectance
 TREES = (0.035, 0.055, 0.02)
@@ -48,12 +46,6 @@ class Outside:
     sunlight: Array
 
 
-def sun_height(hour: float) -> float:
-    """Return the height of the sun above the horizon, in degrees."""
-    turn = math.cos(math.radians(15 * (hour - 12))) * math.cos(math.radians(LATITUDE))
-    return math.degrees(math.asin(turn))
-
-
 def directions(rows: int, columns: int) -> Array:
     """Return the unit vectors of the pixels of a map, world, (rows, columns, 3)."""
     down = (np.arange(rows) + 0.5)[:, None] / rows * np.pi
@@ -70,10 +62,8 @@ def outside(interior: Interior) -> Outside:
         sun = seen.toward_sun * (-1, 1, 1)
         return Outside(np.ascontiguousarray(seen.radiance[:, ::-1]), sun, seen.sunlight)
     height = sun_height(interior.hour)
-    # The sun moves from the left of noon's direction to the right.
-    azimuth = math.radians(interior.facing_degrees + 15 * (interior.hour - 12))
-    level, up = math.cos(math.radians(height)), math.sin(math.radians(height))
-    sun = np.array([level * math.sin(azimuth), up, -level * math.cos(azimuth)])
+    azimuth = sun_azimuth(interior)
+    sun, sunlight = sunlight_of(interior)
     night = height < -4
     shown = np.array([math.sin(azimuth), math.tan(math.radians(max(height, DUSK))),
                       -math.cos(azimuth)])  # fmt: skip
@@ -84,14 +74,9 @@ def outside(interior: Interior) -> Outside:
         radiance = np.broadcast_to(np.array(NIGHT, np.float32), radiance.shape).copy()
     elif height < SUNLESS:
         radiance = radiance * np.float32(max(0.02, 0.5 + height / 12))
-    sunlight = np.zeros(3)
-    if height > SUNLESS:
-        # Beer and Lambert through a clear atmosphere, by its optical depth in red, green and blue.
-        mass = 1 / (up + 0.15 * (height + 3.9) ** -1.25)
-        sunlight = SUN * np.exp(-np.array([0.16, 0.22, 0.36]) * mass)
     weights = np.maximum(view[..., 1], 0) * np.sqrt(np.maximum(1 - view[..., 1] ** 2, 0))
     from_sky = np.pi * (radiance * weights[..., None]).sum((0, 1)) / weights.sum()
-    light = (from_sky + sunlight * max(up, 0.0)) / np.pi
+    light = (from_sky + sunlight * max(float(sun[1]), 0.0)) / np.pi
     radiance = radiance.repeat(FINE, axis=0).repeat(FINE, axis=1)
     return Outside(_with_ground(radiance, light, interior.facing_degrees), sun, sunlight)
 

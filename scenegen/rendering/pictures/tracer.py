@@ -30,7 +30,8 @@ from scenegen.rendering.pictures.lights import Window, lights_of
 from scenegen.rendering.pictures.matter import gather_matter
 from scenegen.rendering.pictures.paper_rooms import PaperRooms, with_intensities
 from scenegen.rendering.pictures.paths import Camera, Room, Samples, trace_paths
-from scenegen.rendering.pictures.sky import SUNLESS, Outside, outside, sun_height
+from scenegen.rendering.pictures.sky import Outside, outside
+from scenegen.rendering.pictures.sun import SUNLESS, sun_height
 from scenegen.rendering.pixel_samples import sample_positions
 from scenegen.rendering.tables import gather_row, upload
 

@@ -1,10 +1,11 @@
 """Where rays meet exact surfaces (`objects.exact_surfaces`), in numpy and double precision.
 
 It shares no formula with `in_kernel`: convex bodies are unions of simpler ones, and the torus is
-solved by eigenvalues.
+solved between the extremes of its quartic.
 """
 
 from functools import reduce
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,23 +14,28 @@ from numpy.typing import NDArray
 from scenegen.objects.exact_surfaces import FAR, Capsule, Polyhedron, Surface, Torus, Turned
 
 Array = NDArray[Any]
+STEPS = 30  # of Newton's search
+MARGIN = 1.001  # by which the search for roots exceeds the torus
 Interval = tuple[Array, Array]  # where rays enter and leave; empty where the first is larger
 
 
 def cast_at_surface(surface: Surface, origins: Array, directions: Array) -> tuple[Array, Array]:
     """Return ray parameters (R,), inf for a miss, and outward unit normals (R, 3) of first hits."""
-    squared = np.einsum("ri,ri->r", directions, directions)
-    middle = -np.einsum("ri,ri->r", origins, directions) / squared
+    middle = -_dot(origins, directions) / _dot(directions, directions)
     c = origins + middle[:, None] * directions  # the nearest points to the shape's centre
-    roots = np.stack(_roots(surface, c, directions), axis=1)
+    roots = np.stack(surface_roots(surface, c, directions), axis=1)
     roots = np.where(roots > -middle[:, None], roots, np.inf)  # behind the origin
     first = roots.min(axis=1, initial=np.inf)
     points = c + np.where(np.isfinite(first), first, 0.0)[:, None] * directions
     return middle + first, _normals(surface, points)
 
 
-def _roots(surface: Surface, c: Array, d: Array) -> list[Array]:
-    """Return all x at which c + x d is on the surface; inf for those that are none."""
+def surface_roots(surface: Surface, c: Array, d: Array) -> list[Array]:
+    """Return all x at which c + x d is on the surface, inf for those that are none.
+
+    The points c are the nearest ones of their rays to the origin. The bits are those of every
+    machine (`common.rotations`).
+    """
     if isinstance(surface, Torus):
         return _torus(surface, c, d)
     if isinstance(surface, Capsule):
@@ -53,9 +59,9 @@ def _both(a: Interval, b: Interval) -> Interval:
 
 
 def _slab(slab: Array, c: Array, d: Array) -> Interval:
-    slope = d @ slab[:3]
+    slope = _dot(d, slab[None, :3])
     slope = np.where(slope == 0, 1e-300, slope)
-    ends = (slab[3:, None] - c @ slab[:3]) / slope
+    ends = (slab[3:, None] - _dot(c, slab[None, :3])) / slope
     return ends.min(axis=0), ends.max(axis=0)
 
 
@@ -64,7 +70,7 @@ def _turned(surface: Turned, c: Array, d: Array) -> Interval:
     slab = _slab(np.array([0.0, 1.0, 0.0, surface.low, surface.high]), c, d)
     square = np.array([1.0, -surface.c, 1.0])
     pairs = (d, d), (c, d), (c, c)
-    q2, q1, q0 = (np.einsum("ri,i,ri->r", a, square, b) for a, b in pairs)
+    q2, q1, q0 = (_dot(a * square, b) for a, b in pairs)
     q1, q0 = q1 - surface.b / 2 * d[:, 1], q0 - surface.a - surface.b * c[:, 1]
     q2 = np.where(abs(q2) < 1e-14, 1e-14, q2)
     root = np.sqrt(np.maximum(q1 * q1 - q2 * q0, 0.0))
@@ -77,20 +83,58 @@ def _turned(surface: Turned, c: Array, d: Array) -> Interval:
 
 
 def _torus(surface: Torus, c: Array, d: Array) -> list[Array]:
+    """Solve the quartic between its extremes, these between those of its derivative."""
     ring, tube = surface.ring, surface.tube
     flat = np.array([1.0, 0.0, 1.0])
     pairs = (d, d), (2 * c, d), (c, c)
-    p2, p1, p0 = (np.einsum("ri,ri->r", *pair) for pair in pairs)
-    r2, r1, r0 = (np.einsum("ri,i,ri->r", a, flat, b) for a, b in pairs)
+    p2, p1, p0 = (_dot(*pair) for pair in pairs)
+    r2, r1, r0 = (_dot(a * flat, b) for a, b in pairs)
     m, f = p0 + ring**2 - tube**2, 4 * ring**2
-    lower = np.stack(
-        [2 * p2 * p1, p1**2 + 2 * p2 * m - f * r2, 2 * p1 * m - f * r1, m**2 - f * r0], axis=1
-    )
-    companion = np.zeros((len(c), 4, 4))
-    companion[:, [1, 2, 3], [0, 1, 2]] = 1.0
-    companion[:, 0] = -lower / (p2**2)[:, None]
-    roots = np.linalg.eigvals(companion)
-    return list(np.where(abs(roots.imag) < 1e-9, roots.real, np.inf).T)
+    quartic = [p2**2, 2 * p2 * p1, p1**2 + 2 * p2 * m - f * r2, 2 * p1 * m - f * r1, m**2 - f * r0]
+    cubic = [k * n for k, n in zip(quartic[:4], (4, 3, 2, 1), strict=True)]
+    a, b = 3 * cubic[0], cubic[1]
+    spread = np.sqrt(np.maximum(b * b - a * cubic[2], 0.0))
+    far = (ring + tube) * MARGIN / np.sqrt(p2)
+    bends = [-far, *(np.clip((sign * spread - b) / a, -far, far) for sign in (-1, 1)), far]
+    extremes = [_root_between(cubic, *ends)[0] for ends in pairwise(bends)]
+    parts = [_root_between(quartic, *ends) for ends in pairwise([-far, *extremes, far])]
+    return [np.where(crosses, x, np.inf) for x, crosses in parts]
+
+
+def _root_between(polynomial: list[Array], low: Array, high: Array) -> tuple[Array, Array]:
+    """Return the root of a polynomial that is monotone from low to high, and whether there is one.
+
+    Where there is none, it is the end at which the polynomial is nearer to 0. Newton's steps, and
+    halves where these leave the range.
+    """
+
+    def value(factors: list[Array], x: Array) -> tuple[Array, Array]:
+        y, slope = factors[0], np.zeros_like(x)
+        for k in factors[1:]:
+            y, slope = y * x + k, slope * x + y
+        return y, slope
+
+    at_low, at_high = value(polynomial, low)[0], value(polynomial, high)[0]
+    crosses = (at_low < 0) != (at_high < 0)
+    found = np.where(np.abs(at_low) < np.abs(at_high), low, high)
+    factors = [k[crosses] for k in polynomial]
+    low, high, negative = low[crosses], high[crosses], at_low[crosses] < 0
+    x = (low + high) / 2
+    for _ in range(STEPS):
+        y, slope = value(factors, x)
+        before = (y < 0) == negative
+        low, high = np.where(before, x, low), np.where(before, high, x)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = x - y / slope
+        last, x = x, np.where((step >= low) & (step <= high), step, (low + high) / 2)
+        if (np.abs(x - last) <= 1e-12).all():
+            break
+    found[crosses] = x
+    return found, crosses
+
+
+def _dot(a: Array, b: Array) -> Array:
+    return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])
 
 
 def _normals(surface: Surface, p: Array) -> Array:

@@ -41,22 +41,26 @@ def _by_name(formats: Iterable[Format]) -> dict[str, Format]:
 
 PICTURES = ("image", "depth", "normal", "object_id")  # a PNG file of each
 ROW_FORMATS = _by_name((
-    Format("exr", "all channels", f"{HERE}.single:exr_writers", (".exr",)),
-    Format("png", "a picture of each channel, and a JSON file that says how to decode them",
+    Format("exr", "all channels in one file", f"{HERE}.single:exr_writers", (".exr",)),
+    Format("png", "one image per channel, and a JSON file with their encodings",
            f"{HERE}.single:png_writers", (*(f"-{name}.png" for name in PICTURES), ".json")),
-    Format("ply", "the surfels", f"{HERE}.single:ply_writers", (".ply",)),
+    Format("ply", "a point cloud of surfels", f"{HERE}.single:ply_writers", (".ply",)),
     Format("obj", "the scene's mesh", f"{HERE}.single:obj_writers", (".obj", ".mtl")),
 ))  # fmt: skip
 DATA_FORMATS = _by_name((
-    Format("parquet", "all values of many rows, for data loaders",
+    Format("parquet", "Parquet files for data loaders",
            "scenegen.sharing.formats:write_parquet", (".parquet",)),
-    Format("webdataset", "the same as tar files", "scenegen.sharing.formats:write_tar", (".tar",)),
+    Format("webdataset", "tar files for data loaders",
+           "scenegen.sharing.formats:write_tar", (".tar",)),
 ))  # fmt: skip
 FOLDER_FORMATS = _by_name(
-    Format(name, f"the folder that {tool} reads", f"{HERE}.{name}:write")
+    Format(name, f"a folder in the layout of {tool}", f"{HERE}.{name}:write")
     for name, tool in (
-        ("nerfstudio", "nerfstudio"), ("colmap", "COLMAP"), ("bop", "BOP's toolkit"),
-        ("coco", "a reader of COCO"), ("moge", "MoGe"),
+        ("nerfstudio", "nerfstudio"), ("colmap", "COLMAP"), ("bop", "BOP"),
+        ("coco", "COCO"), ("moge", "MoGe"), ("stereo", "Middlebury's stereo pairs"),
     )
-)  # fmt: skip
+) | _by_name((
+    Format("glb", "a glTF 2.0 file per scene, with its materials, cameras and lights",
+           f"{HERE}.glb:write"),
+))  # fmt: skip
 FORMATS = ROW_FORMATS | DATA_FORMATS | FOLDER_FORMATS

@@ -108,7 +108,7 @@ def draw_alternatives(
     arranger = replace(arranger, draws=draws)
     fov = item_room(spec, index)[2]
     if difference == "mirror-pair":
-        found = draw_cameras(spec, arranger.space, draws, fov, (0.0, degrees))
+        found = _cameras(spec, arranger.space, draws, fov, degrees)
         if found is not None:
             drawn: Drawn = (arranger.room, arranger.space.placed, *found)
             other = _mirrored(drawn)
@@ -202,7 +202,7 @@ def _varied(
     if difference == "turned":
         fitting = [(pieces[0], turn) for turn in _directions(draws)]
     focuses = [placed[support[0] - 1].box] if parent else _free(empty, *fitting[0])
-    cameras = draw_cameras(spec, space, draws, fov, (0.0, degrees), focuses) if focuses else None
+    cameras = _cameras(spec, space, draws, fov, degrees, focuses) if focuses else None
     if cameras is None:
         return
     fov_y = Camera.fov_y_from_square(fov, spec.height, spec.width)
@@ -219,6 +219,22 @@ def _varied(
         things = [found for found in rooms if found is not None]
         if len(things) == 3:
             yield Alternatives(tuple((arranger.room, x, *cameras) for x in things), numbers)
+
+
+def _cameras(
+    spec: InteriorSpec,
+    space: Space,
+    draws: Draws,
+    fov: float,
+    degrees: float,
+    focuses: Sequence[Box] = (),
+) -> tuple[list[Place], Place] | None:
+    """Draw the positions of both cameras, and the point that both look at; None for none."""
+    found = draw_cameras(spec, space, draws, fov, (0.0, degrees), focuses)
+    if found is None:
+        return None
+    places, targets = ([(x, y, z) for x, y, z in values.tolist()] for values in found)
+    return places, targets[0]
 
 
 def _furnished(

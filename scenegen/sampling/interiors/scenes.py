@@ -33,7 +33,7 @@ from scenegen.sampling.interiors.viewpoints import draw_cameras
 Array = NDArray[Any]
 STREET = 32  # rooms beside each other that are furnished from the same stock
 STOCK = 10  # models of each family in it: models take longer to make than rooms to furnish
-Drawn = tuple[Room, list[Placed], list[tuple[float, float, float]], tuple[float, float, float]]
+Drawn = tuple[Room, list[Placed], Any, Any]  # camera positions and targets, (V, 3)
 
 
 def item_room(spec: InteriorSpec, index: int) -> tuple[Room, int, float]:
@@ -45,7 +45,7 @@ def item_room(spec: InteriorSpec, index: int) -> tuple[Room, int, float]:
 
 
 def draw_interior(spec: InteriorSpec, index: int, attempt: int, objects: Objects) -> Drawn | None:
-    """Return room, objects, camera positions and target of a proposal; None if it found no room."""
+    """Return room, objects, camera positions and targets; None if the proposal found no room."""
     arranger = furnished(spec, index, attempt, objects)
     if arranger is None:
         return None
@@ -105,7 +105,7 @@ def scene_arrays(
     spec: InteriorSpec, index: Array, drawn: Sequence[Drawn], objects: Objects
 ) -> SceneArrays:
     """Return drawn rooms, with as many cameras as the spec has views, as arrays."""
-    count, slots, views = len(drawn), spec.object_slots, len(spec.views)
+    count, slots, views = len(drawn), spec.object_slots, len(spec.view_angles)
     number = _numbers(objects, spec.shapes)
     shape, mesh = np.full((count, slots), -1, np.int32), np.full((count, slots), "", object)
     position, scale = np.zeros((count, slots, 3)), np.zeros((count, slots))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scenegen.camera import Camera, half_angle
 from scenegen.common.rotations import cos_sin
 from scenegen.description.specs import InteriorSpec
+from scenegen.sampling.cameras import with_right_eyes
 from scenegen.sampling.interiors.draws import Draws
 from scenegen.sampling.interiors.spaces import Box, Space
 
@@ -39,8 +40,8 @@ def draw_cameras(
     fov_degrees: float,
     views: Sequence[float] | None = None,
     focuses: Sequence[Box] = (),
-) -> tuple[list[Place], Place] | None:
-    """Draw the positions of the cameras of all views, and the point they look at; None for none.
+) -> tuple[Array, Array] | None:
+    """Draw positions and targets of the cameras of all views, (V, 3); None for none.
 
     The input view is turned about the vertical axis through that point for the other views.
 
@@ -54,7 +55,7 @@ def draw_cameras(
     floor = floor or [thing.box for thing in space.placed]
     fov_y = Camera.fov_y_from_square(fov_degrees, spec.height, spec.width)
     cosine, sine = cos_sin(np.array(spec.views if views is None else views) / 360)
-    found: list[tuple[float, list[Place], Place]] = []
+    found: list[tuple[float, Array, Array]] = []
     for _ in range(TRIES):
         if len(found) == CHOICES:
             break
@@ -76,9 +77,11 @@ def draw_cameras(
             (tx + c * dx + s * dz, y, tz - s * dx + c * dz)
             for c, s in zip(cosine.tolist(), sine.tolist(), strict=True)
         ]
-        shown = [_shown(place, target, space, boxes, fov_y, spec) for place in places]
+        cameras = with_right_eyes(spec, np.array(places), np.tile(target, (len(places), 1)))
+        pairs = zip(*(values.tolist() for values in cameras), strict=True)
+        shown = [_shown(place, at, space, boxes, fov_y, spec) for place, at in pairs]
         if all(shown):
-            found.append((min(shown), places, target))
+            found.append((min(shown), *cameras))
     return max(found, key=lambda one: one[0])[1:] if found else None
 
 

@@ -98,10 +98,10 @@ def test_planes_stay_planes_when_enlarged(size):
 @pytest.mark.parametrize(
     ("data", "settings", "words"),
     [
-        ("rooms", {"classes": 2}, "a model that is told classes"),
-        ("rooms", {"camera": False}, "a model that is not told it"),
+        ("rooms", {"classes": 2}, "a model that takes categories"),
+        ("rooms", {"camera": False}, "a model that does not take it"),
         ("rooms", {"size": 64}, "images of 32x32"),
-        ("iqtt", {}, "a model that is told the camera"),
+        ("iqtt", {}, "a model that takes the camera as input"),
         ("iqtt", {"size": 64, "camera": False}, "images of 32x32"),
     ],
 )

@@ -23,11 +23,17 @@ from iqtt.shapes.polycube import ROTATIONS, canonical, canonical_class, set_ids
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.content import column_digest, row_digest, seal
 
-OF_IMAGES = ("answer places", "pixel values", "framing", "distinct images", "distinct questions")
+OF_IMAGES = (
+    "correct positions",
+    "pixel values",
+    "framing",
+    "distinct images",
+    "distinct questions",
+)
 BY_CUBES = {
-    *("shapes", "one right answer", "answers differ", "labels", "mirror images", "matched"),
-    *("stored ids", "splits apart", "splits for ever", "rotations", "angles", "lines of sight"),
-    *("visibility", "cast again", "one explanation"),
+    *("shapes", "one correct option", "options differ", "labels", "mirror images", "matched"),
+    *("stored ids", "disjoint splits", "split by hash", "rotations", "angles", "lines of sight"),
+    *("visibility", "ray-cast images", "unique solution"),
 }
 PROOFS = {"content", *OF_IMAGES, *BY_CUBES}
 Edit = Callable[[h5py.File], Any]
@@ -90,15 +96,15 @@ VAL, TEST, TRAIN = "iqtt-val.h5", "iqtt-test-answers.h5", "iqtt-train.h5"
 ALL, VIEWS = slice(None), "truth/world_from_shape"
 # File, what is done to it, and the proofs that fail; others may fail too where it ends in dots.
 DAMAGES: list[tuple[str, Edit, str]] = [
-    (VAL, changed("answers", ALL, lambda a: (a + 1) % 3), "one right answer"),
-    (TEST, changed("answers", ALL, lambda a: (a + 1) % 3), "one right answer"),
-    (VAL, second_right_answer, "one right answer, answers differ, ..."),
-    (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one right answer, ..."),
+    (VAL, changed("answers", ALL, lambda a: (a + 1) % 3), "one correct option"),
+    (TEST, changed("answers", ALL, lambda a: (a + 1) % 3), "one correct option"),
+    (VAL, second_right_answer, "one correct option, options differ, ..."),
+    (TRAIN, changed("truth/unlabeled/distractor_kind", 2, np.flip), "one correct option, ..."),
     (VAL, changed("truth/cubes", 3, in_pieces), "shapes, ..."),
     (VAL, changed("truth/shape_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
     (VAL, changed("truth/class_id", 4, lambda ids: ids[[1, 2, 3, 0]]), "stored ids"),
-    (VAL, at_the_border, "framing, cast again"),
-    (VAL, changed("questions", ALL, another_background), "framing, cast again, ..."),
+    (VAL, at_the_border, "framing, ray-cast images"),
+    (VAL, changed("questions", ALL, another_background), "framing, ray-cast images, ..."),
     *(
         (
             VAL,
@@ -107,8 +113,8 @@ DAMAGES: list[tuple[str, Edit, str]] = [
         )
         for by in (-1.0, 1.001, np.nan)
     ),
-    (VAL, changed("truth/light_color", 3, scaled(2, 1.05)), "cast again"),
-    (VAL, changed("questions", 3, lambda images: images[[0, 2, 1, 3]]), "cast again, ..."),
+    (VAL, changed("truth/light_color", 3, scaled(2, 1.05)), "ray-cast images"),
+    (VAL, changed("questions", 3, lambda images: images[[0, 2, 1, 3]]), "ray-cast images, ..."),
 ]
 
 
@@ -124,12 +130,12 @@ def test_an_image_twice_in_two_files(failing, split_folder):
     with h5py.File(split_folder / "iqtt-train.h5") as train:
         image = train["unlabeled/questions"][3, 2]
     failed = failing(lambda file: file["questions"].__setitem__((5, 0), image), VAL, TRAIN)
-    assert failed >= {"distinct images", "cast again"}
+    assert failed >= {"distinct images", "ray-cast images"}
 
 
 def test_faces_are_told_apart(failing, monkeypatch):
     monkeypatch.setattr("iqtt.audit.proofs.views.FACE_STEPS", 60)
-    assert failing(lambda file: file.attrs.__setitem__("command", "")) == {"cast again"}
+    assert failing(lambda file: file.attrs.__setitem__("command", "")) == {"ray-cast images"}
 
 
 def test_a_fair_split_passes_and_all_is_told(split_folder, monkeypatch):
@@ -173,7 +179,7 @@ def test_a_file_of_answers_stands_for_its_questions(split_folder):
     test, answers = (split_folder / f"iqtt-test{kind}.h5" for kind in ("", "-answers"))
     found = audited([test])
     assert audited([answers, test]).tables == found.tables
-    assert {p.name for p in found.proofs if p.status == "skipped"} == {"splits apart"}
+    assert {p.name for p in found.proofs if p.status == "skipped"} == {"disjoint splits"}
 
 
 @pytest.mark.usefixtures("few_explained")
@@ -183,7 +189,7 @@ def test_questions_without_answers(split_folder, tmp_path):
     assert found.passed
     assert found.probes == ()
     skipped = {proof.name for proof in found.proofs if proof.status == "skipped"}
-    assert skipped == BY_CUBES | {"answer places"}
+    assert skipped == BY_CUBES | {"correct positions"}
     both = audited([tmp_path, split_folder / "iqtt-val.h5"])
     assert "iqtt-test.h5" in both.proofs[0].detail
 
@@ -214,7 +220,7 @@ def test_released_files(failed):
     fair = np.arange(7) % 3
     assert failed(plain(), fair) == set()
     assert failed(plain(), [0, 1, 2, 0, 1, 2, 2]) == set()
-    assert failed(plain(), [0, 1, 2, 0, 1, 0, 0]) == {"answer places"}
+    assert failed(plain(), [0, 1, 2, 0, 1, 0, 0]) == {"correct positions"}
     for value in (np.nan, np.inf, -0.5, 1.01):
         images = plain()
         images[4, 2, 7, 7, 1] = value
@@ -376,12 +382,12 @@ CASES = [
     (GOOD, set()),
     ({**GOOD, "key": 1}, {"wrong key"}),
     ({**GOOD, "key": 2}, {"wrong key"}),
-    ({**GOOD, "answers": GOOD["answers"][1:] * 2}, {"no right answer", "equal pictures"}),
+    ({**GOOD, "answers": GOOD["answers"][1:] * 2}, {"no correct option", "equal images"}),
     (
         {"reference": view(FLAT), "answers": [view(FLAT, OTHER), view(mirrored(FLAT), TILTED)]},
-        {"more than one right answer"},
+        {"more than one correct option"},
     ),
-    ({**GOOD, "answers": [view(L, OTHER), view(L[:4], OTHER)]}, {"unlike cube counts"}),
+    ({**GOOD, "answers": [view(L, OTHER), view(L[:4], OTHER)]}, {"different cube counts"}),
     ({**GOOD, "answers": [view(L, OTHER), view([*L[:4], [5, 5, 5]])]}, {"more than one piece"}),
     (
         {**GOOD, "reference": view(L, np.eye(3).tolist())},

@@ -71,7 +71,7 @@ def test_every_option_is_recorded(run, monkeypatch, tmp_path):
         "audit x/iqtt-test.h5 --json x/iqtt-test-answers.h5 --overwrite",
         "audit x/iqtt-test-answers.h5 --json x/iqtt-test.h5 --overwrite",
         "audit x --json x/iqtt-test-answers.h5 --overwrite",
-        "show x/iqtt-test.h5 --answers --out x/iqtt-test-answers.h5 --overwrite",
+        "show x/iqtt-test.h5 --mark-correct --out x/iqtt-test-answers.h5 --overwrite",
     ],
 )
 def test_files_that_are_read_beside_another_are_no_outputs(run, tmp_path, line, check_refusal):
@@ -143,7 +143,7 @@ def test_a_mistake_is_one_line_and_leaves_nothing(run, options, words, tmp_path,
     ("arguments", "rows"),
     [
         (["iqtt-val.h5"], 3),
-        (["iqtt-test.h5", "--answers"], 3),
+        (["iqtt-test.h5", "--mark-correct"], 3),
         (["iqtt-train.h5", "--part", "unlabeled", "--items", "0,2"], 2),
     ],
 )
@@ -172,5 +172,5 @@ def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path, check_refus
 
 def test_show_needs_answers_to_show_them(run, split, tmp_path, check_refusal):
     shutil.copy(split / "iqtt-test.h5", tmp_path)
-    result = run("show", "iqtt-test.h5", "--answers")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("no answers",))
+    result = run("show", "iqtt-test.h5", "--mark-correct")
+    check_refusal(result.exit_code, result.stdout, result.stderr, ("iqtt-test.h5",))

@@ -20,7 +20,7 @@ def test_card(run, refuses, split_folder, tmp_path):
     assert told.stdout == "README.md: 24 questions\n"
     assert "iqtt-test-answers.h5" not in (tmp_path / "README.md").read_text()
     refuses("card", split_folder, *WHO, words=("README.md", "--overwrite"))
-    again = run("card", split_folder, *WHO, "--with-answers", "--title", "All", "--overwrite")
+    again = run("card", split_folder, *WHO, "--with-answer-key", "--title", "All", "--overwrite")
     assert again.exit_code == 0, again.output
     page = (tmp_path / "README.md").read_text()
     assert "# All" in page.splitlines()
@@ -40,4 +40,4 @@ def test_export(form, run, refuses, split_folder, tmp_path):
     ]  # fmt: skip
     refuses("export", train, "--format", form, words=("labeled or unlabeled",))
     answers = split_folder / "iqtt-test-answers.h5"
-    refuses("export", answers, "--format", form, words=("answers but no images",))
+    refuses("export", answers, "--format", form, words=("an answer key without images",))

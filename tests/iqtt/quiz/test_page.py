@@ -1,4 +1,4 @@
-"""The page of the quiz: its pictures are those of the file, and it tells no right answer."""
+"""The page of the quiz: its pictures are those of the file, and it tells no correct option."""
 
 import base64
 import io

@@ -105,5 +105,5 @@ def test_nothing_is_told_of_the_test_answers(kind, splits, tmp_path):
     digests = [hashlib.sha256(p.read_bytes()).hexdigest() for p in private if p.exists()]
     assert not [text for text in (command, *digests) if text in page]
     assert kind != "shards" or str(seed) not in page
-    assert "are not part of this data" in page
+    assert "is held out" in page
     assert "iqtt-test-answers" not in page

@@ -40,7 +40,7 @@ def test_a_baseline_goes_all_the_way(truths, folder):
         assert "chamfer" in scored.stdout
         for ending in ("json", "csv", "html"):
             assert (folder / f"{name}.{ending}").stat().st_size > 1000
-    beside = ("--html", "both.html", "--beside", "empty-room.json")
+    beside = ("--html", "both.html", "--compare-with", "empty-room.json")
     assert bench("score", "oracle.h5", *truth, *beside).exit_code == 0
     assert "empty-room" in (folder / "both.html").read_text()
     assert read_scores(folder / "oracle.json").metrics["chamfer"].value == 0
@@ -49,6 +49,7 @@ def test_a_baseline_goes_all_the_way(truths, folder):
     )
     assert (compared.exit_code, "better" in compared.stdout) == (0, True), compared.output
     assert "better in" in (folder / "c.html").read_text()
+    assert bench("compare", "empty-room.h5", "oracle.h5", *truth).stdout == compared.stdout
     for form, word in (("markdown", "| "), ("html", "<table"), ("latex", "\\toprule")):
         ranked = bench("leaderboard", "empty-room.json", "oracle.json", "--format", form)
         assert (ranked.exit_code, word in ranked.stdout) == (0, True), ranked.output
@@ -61,7 +62,7 @@ def test_scores_of_another_truth_do_not_stand_beside(truths, folder, check_refus
     bench("baseline", "oracle", "--data", truths.rooms, "--out", "oracle.h5")
     bench("score", "oracle.h5", "--json", "oracle.json")
     for options, word in ((["--html", "x.html"], "iqtt"), ([], "--html")):
-        told = bench("score", "chance.h5", *options, "--beside", "oracle.json")
+        told = bench("score", "chance.h5", *options, "--compare-with", "oracle.json")
         check_refusal(told.exit_code, told.stdout, told.stderr, (word,))
     assert not (folder / "x.html").exists()
 
@@ -80,7 +81,7 @@ def test_a_page_that_cannot_be_made_loses_no_score(truths, folder, monkeypatch):
     other = (folder / "b.json").read_text()
     digest = json.loads(other)["meta"]["truth_digest"]
     (folder / "other.json").write_text(other.replace(digest, "0" * 64))
-    beside = ("--html", "c.html", "--json", "c.json", "--beside", "other.json")
+    beside = ("--html", "c.html", "--json", "c.json", "--compare-with", "other.json")
     assert bench("score", "b.h5", *beside).exit_code == 2
     assert not (folder / "c.json").exists(), "refused before anything is scored"
 
@@ -174,7 +175,7 @@ def test_a_folder_is_imported_and_scored(home, truths):
 def test_answers_are_imported(truths, tmp_path):
     (tmp_path / "a.json").write_text(json.dumps(list("ABCCBA")))
     out = tmp_path / "a.h5"
-    done = bench("import", "--answers", tmp_path / "a.json", "--data", truths.iqtt, "--out", out)
+    done = bench("import", "--responses", tmp_path / "a.json", "--data", truths.iqtt, "--out", out)
     assert done.exit_code == 0, done.output
     with open_predictions(out) as found:
         assert (found.answers.tolist(), found.method) == ([0, 1, 2, 2, 1, 0], "a")
@@ -215,7 +216,7 @@ def test_an_error_of_the_model_is_one_line_unless_all_is_asked_for(truths, tmp_p
     ("line", "word"),
     [
         ("import", "--depth"),
-        ("import --depth mine --answers mine", "--depth"),
+        ("import --depth mine --responses mine", "--depth"),
         ("import --depth mine --unit mm --scale 2", "--unit"),
         ("import --depth mine --scale 1/0", "1/0"),
         ("import --depth mine --alignment scale --kind disparity --scale -1", "-1"),

@@ -88,7 +88,7 @@ def test_a_run_is_the_import_of_the_same_arrays_and_says_what_it_was(folders, tr
     with opened_model(f"hf:{folder}") as model:
         said = run_model(model, truths.rooms, out, call=Call(batch=3), method=model.title)
         told = model.provenance
-    assert said == "depth_metric of 8 rows"
+    assert said == "depth_metric of 8 images"
     assert [p for p in validate(out, truths.rooms) if not p.is_hint] == []
     here = load(f"hf:{folder}")
     with open_predictions(out) as found, RoomsFile(truths.rooms) as rooms:
@@ -277,7 +277,7 @@ def test_both_versions_of_moge(truths, tmp_path, monkeypatch):
         with opened_model(f"moge:{tmp_path / name}") as model:
             call = Call(intrinsics=True, batch=3, missing="nearest")
             said = run_model(model, truths.rooms, out, call=call, method=model.title)
-        assert said == f"{key} of 8 rows"
+        assert said == f"{key} of 8 images"
         with open_predictions(out) as found, RoomsFile(truths.rooms) as rooms:
             assert (found.kind, found.alignment) == ("points", "scale")
             assert found.has_normals == (name == "v2")

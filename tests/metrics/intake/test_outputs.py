@@ -26,7 +26,8 @@ def tensor(values):
 def test_the_keys_say_what_is_predicted(key):
     """The first of `KEYS` that is there is taken, unless one is asked for."""
     kind, alignment = KEYS[key]
-    stored, expected = (POINTS, OURS) if kind == "points" else (D, D)
+    layers = np.dstack([D, D + 1])
+    stored, expected = {"points": (POINTS, OURS), "layers": (layers, layers)}.get(kind, (D, D))
     others = dict.fromkeys(list(KEYS)[list(KEYS).index(key) + 1 :], stored + 9)
     for output in ({key: stored, "other": "x"}, {key: stored, **others}):
         got = read(**output)

@@ -66,7 +66,7 @@ def test_a_model_of_any_shape(name, tmp_path):
 
 @pytest.mark.parametrize("name", ["function", "batch"])
 def test_a_model_in_its_process(name, run, truths):
-    assert run(SHAPES[name], batch=3) == "depth_metric of 8 rows"
+    assert run(SHAPES[name], batch=3) == "depth_metric of 8 images"
     assert [p for p in validate(run.out, truths.rooms) if not p.is_hint] == []
     with open_predictions(run.out) as found:
         assert (found.rows.tolist(), (found.depth(7) == 1.5).all()) == (list(range(8)), True)
@@ -154,8 +154,8 @@ def test_a_stop_loses_nothing(error, run, tmp_path):
     assert len(list((tmp_path / "p.h5.rows").glob("*.npz"))) == 5
     if "Key" not in error:
         assert "row 5" in caught.value.where
-        assert "5 rows are kept" in caught.value.hint
-    assert run(text) == "depth_metric of 8 rows, 5 of them from an earlier run"
+        assert "5 images are kept" in caught.value.hint
+    assert run(text) == "depth_metric of 8 images, 5 of them from an earlier run"
     assert calls.read_text() == "." * 9
     assert not (tmp_path / "p.h5.rows").exists()
     with open_predictions(run.out) as found:
@@ -182,7 +182,7 @@ def test_the_model_may_change_its_folder(run, tmp_path, monkeypatch, truths):
     monkeypatch.chdir(tmp_path)
     run.out = Path("p.h5")
     assert run("import os; os.chdir('/')\n" + INFER, Path(os.path.relpath(truths.rooms))) == (
-        "depth_metric of 8 rows"
+        "depth_metric of 8 images"
     )
     assert (tmp_path / "p.h5").exists()
 
@@ -224,7 +224,7 @@ def gone(group):
 ENDS = {
     "crash": ("import ctypes; ctypes.string_at(0)", "SIGSEGV"),
     "exit": ("import os; os._exit(0)", "exit code 0"),
-    "hang in C": ("import ctypes; ctypes.PyDLL(None).sleep(1000)", "no answer after 2 s"),
+    "hang in C": ("import ctypes; ctypes.PyDLL(None).sleep(1000)", "no result after 2 s"),
     "child": ("import os; os.fork() and os._exit(3); import time; time.sleep(1000)", "code 3"),
 }
 
@@ -391,7 +391,7 @@ def folder(tmp_path):
 
     with pytest.raises(SceneGenError):
         fail()
-    assert "2 rows" in error.hint
+    assert "2 images" in error.hint
     return tmp_path / "p.h5.rows"
 
 

@@ -108,7 +108,7 @@ def test_two_answers_are_scored_against_a_half(tmp_path):
         write_answers(tmp_path / "b.h5", test, method="m", scores=np.zeros((8, 3)))
 
 
-NEAR = Floor("near", "outlines, by trees", 0.6, 6000)
+NEAR = Floor("near", "silhouettes, by trees", 0.6, 6000)
 MIRROR = Floor("mirror", CHANCE, 1 / 3, 6000)
 
 

@@ -142,25 +142,25 @@ MISTAKES = {
     "ray, scaled": (lambda d, s: 1.2 * d * s, "distance along the ray"),
     "upside down, wavy": (lambda d, s: d[:, ::-1] + smooth(6, d.shape, 8, 0.03), "upside down"),
     "mirrored": (lambda d, s: d[:, :, ::-1], "mirrored"),
-    "turned": (lambda d, s: d[:, ::-1, ::-1], "turned by 180"),
+    "turned": (lambda d, s: d[:, ::-1, ::-1], "by 180"),
     "disparity, wavy": (lambda d, s: 1 / (d + smooth(7, d.shape, 8, 0.05)), "disparity"),
     "disparity from 0 to 1": (lambda d, s: (1 / d - 0.4) / 0.7, "disparity"),
     "far minus depth": (lambda d, s: 3 - d, "disparity"),
     "z, blurred": (lambda d, s: -ndimage.gaussian_filter(d, (0, 6, 6)), "negative"),
 }  # fmt: skip
 SCALES = {
-    "millimetres": (lambda d: 1000 * d, "1,000 times the truth, as if millimetres"),
-    "centimetres": (lambda d: 100 * d, "100 times the truth, as if centimetres"),
-    "kilometres": (lambda d: d / 1000, "0.001 times the truth, as if another unit"),
-    "a room of edge 2": (lambda d: 2 * d, "2 times the truth"),
-    "a constant in millimetres": (lambda d: np.full_like(d, 1600.0), "as if millimetres"),
+    "millimetres": (lambda d: 1000 * d, "1,000 times the ground truth (millimetres"),
+    "centimetres": (lambda d: 100 * d, "100 times the ground truth (centimetres"),
+    "kilometres": (lambda d: d / 1000, "0.001 times the ground truth (another unit"),
+    "a room of edge 2": (lambda d: 2 * d, "2 times the ground truth"),
+    "a constant in millimetres": (lambda d: np.full_like(d, 1600.0), "millimetres"),
     "from 0 to 1, each": (
         lambda d: (d - d.min((1, 2), keepdims=True)) / np.ptp(d, axis=(1, 2), keepdims=True),
         "normalised to 0..1"),
     "from 0 to 65535, each, wavy": (
         lambda d: 65535 * np.clip((d - d.min((1, 2), keepdims=True)) / np.ptp(
             d, axis=(1, 2), keepdims=True) + smooth(9, d.shape, 8, 0.05), 0, 1),
-        "picture of depth, 0..65535"),
+        "0..65535"),
     "from 0 to 1, all": (lambda d: (d - d.min()) / np.ptp(d), "normalised to 0..1"),
     "at most 1": (lambda d: d / d.max(), "normalised to 0..1"),
 }  # fmt: skip

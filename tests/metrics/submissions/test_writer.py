@@ -261,14 +261,14 @@ EYE = np.eye(3)[[0, 1, 2, 0, 1, 2]]
 @pytest.mark.parametrize(
     ("given", "where", "found"),
     [
-        ({}, "", "neither answer nor scores"),
+        ({}, "", "neither a response nor scores"),
         ({"answer": [0, 1, 2]}, ": answer", "3 rows"),
         ({"answer": np.ma.masked_array([0, 1, 2] * 2, [1, 0] * 3)}, ": answer", "3 masked"),
         ({"scores": np.ma.masked_array(EYE, EYE == 1)}, ": scores", "6 NaN"),
         ({"answer": [0, 1, 2, 3, 0, 1]}, ": answer", "such as 3 (ids 3)"),
         ({"answer": [1, 1, 2, 3, 2, 1]}, ": answer", "counted from 1"),
         ({"scores": EYE * [1, 1, np.nan]}, ": scores", "(ids 0, 1, 2"),
-        ({"scores": 0 * EYE, "answer": [0] * 6}, ": answer", "6 other"),
+        ({"scores": 0 * EYE, "answer": [0] * 6}, ": answer", "6 that disagree"),
         ({"answer": [0] * 6, "outcome": [0, 1, 2, 4, 0, -1]}, ": outcome", "2 outside"),
         ({"answer": [0] * 6, "rotated": [[0, 0, 3]] + [[0] * 3] * 5}, ": rotated", "(ids 0)"),
         ({"answer": [0] * 6, "rotated": [[0] * 3] * 5 + [[1, 0, 0]]}, ": rotated", "(ids 5)"),

@@ -209,7 +209,7 @@ def test_methods_that_see_the_first_view_alone_are_ranked_apart():
     methods = [[file.method for file in r.files] for r in (looks, first, none)]
     assert methods == [["a"], ["b", "d"], ["c"]]
     heads = [ranking.table.head[2:] for ranking in (looks, first, none)]
-    assert [head[0].split()[0] for head in heads] == ["Shape", "Depth", "Shape"]
+    assert [head[0].split()[0] for head in heads] == ["Shape", "Hidden", "Shape"]
     assert not any("behind" in column for column in heads[0])
     alone = [replace(file, columns={**file.columns, "view_index": 0 * file.ids}) for file in files]
     (together,) = rankings(alone, paper=False)

@@ -239,6 +239,6 @@ def test_every_figure_is_there_once():
 def test_questions_are_spread_over_the_file():
     right = np.arange(100) % 2 == 0
     chosen = chosen_questions(right)
-    assert chosen["right"] == [0, 20, 40, 58, 78, 98]
+    assert chosen["correct"] == [0, 20, 40, 58, 78, 98]
     assert all(not right[i] for i in chosen["wrong"])
-    assert chosen_questions(np.array([True])) == {"right": [0]}
+    assert chosen_questions(np.array([True])) == {"correct": [0]}

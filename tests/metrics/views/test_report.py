@@ -27,6 +27,8 @@ from metrics.views.score_tables import (
     main_table,
     side_by_side,
     text_report,
+    unit_warning,
+    warnings_of,
     write_csv,
 )
 from metrics.views.table import (
@@ -258,8 +260,8 @@ def test_examples_of_questions_say_what_is_right(truths, tmp_path):
     with open_runs([path], answers) as runs:
         page = Page(html_report(scores, runs))
     right = int(scores.items["iqtt_accuracy"].sum())
-    for count, how in ((right, "rightly"), (6 - right, "wrongly")):
-        assert f"{count} of {count} questions answered {how}" in page.text
+    for count, how in ((right, "correct"), (6 - right, "wrong")):
+        assert f"{count} of {count} {how} responses" in page.text
     assert len(page.pictures) == 6 * 4
 
 
@@ -269,3 +271,17 @@ def test_groups_stand_in_the_order_of_their_numbers():
     scores = iqtt_scores("a", [1, 0], by_rotation_angle=dict.fromkeys(spans, group))
     shown = re.findall(r"\b(?:\d+)-(?:\d+)\b", text_report(scores, whole=True))
     assert shown == ["30-60", "60-90", "90-120", "120-150", "150-180"]
+
+
+@pytest.mark.parametrize(("factor", "shown"), [(1.0, True), (1000.0, False), (0.4, False)])
+def test_depth_in_another_unit_has_a_warning_and_no_skill(truths, tmp_path, factor, shown):
+    with RoomsFile(truths.rooms) as rooms, RoomPredictionWriter(
+        tmp_path / "p.h5", truths.rooms, method="m"
+    ) as out:  # fmt: skip
+        noise = np.random.default_rng(0).uniform(0.99, 1.01, len(rooms))
+        for row in range(len(rooms)):
+            out.add(row, rooms[row].depth * factor * noise[row])
+    scores = score([tmp_path / "p.h5"], truths.rooms)
+    assert ("skill" in main_table(scores).head) == shown
+    assert bool(unit_warning(scores)) != shown
+    assert unit_warning(scores) == warnings_of(scores)[: len(unit_warning(scores))]

@@ -3,7 +3,16 @@
 import click
 import pytest
 
-from scenegen.command_line.options import MOST_ITEMS, Color, Items, Names, Numbers, Range, Size
+from scenegen.command_line.options import (
+    MOST_ITEMS,
+    Color,
+    Items,
+    Names,
+    Numbers,
+    Range,
+    Renamed,
+    Size,
+)
 
 READ = [
     (Range(int), "3", (3, 3)),
@@ -49,3 +58,13 @@ def test_other_texts_are_refused(kind, text):
         kind.convert(text, None, None)
     assert repr(text)[:50] in caught.value.message
     assert kind.expected in caught.value.message
+
+
+@pytest.mark.parametrize(("more", "given"), [({"is_flag": True}, True), ({"type": int}, 3)])
+def test_a_former_name_is_read_and_not_shown(more, given):
+    option = Renamed(["--new", "chosen"], former="--old", **more)
+    command = click.Command("make", params=[option])
+    for name in ("--new", "--old"):
+        words = [name] if more.get("is_flag") else [name, "3"]
+        assert command.make_context("make", words).params["chosen"] == given
+    assert "--old" not in command.get_help(click.Context(command))

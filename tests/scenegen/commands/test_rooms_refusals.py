@@ -19,7 +19,7 @@ RENDER_MISTAKES = [
     ("--object-radius 0.5", "item 0", "objects", "smaller --object-radius"),
     ("--min-visible-pixels 1024", "item ", "1024 pixels", "--min-visible-pixels"),
     ("--preset nosuch", "preset: found 'nosuch'", "shapes-single", "views"),
-    ("--shapes box --classes mug", "--shapes beside --classes", "one of them"),
+    ("--shapes box --classes mug", "--shapes with --classes", "one of them"),
     ("--object-split train", "--object-split: found train", "'all' for shapes"),
     ("--shapenet-root . --objects-root .", "--shapenet-root and --objects-root", "one of them"),
     ("--shapenet-root . --up z", "up: found 'z'", "expected 'y' with --shapenet-root"),

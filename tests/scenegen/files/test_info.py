@@ -51,10 +51,10 @@ def test_facts_and_settings_are_those_of_the_file(file):
         assert value(text, name) == expected
     for name in ("content_digest", *(x for x in root if re.match("fingerprint|truth_digest", x))):
         assert f" {root[name]}\n" in text
-    text = text.partition("spec (")[2]
+    text = text.partition("settings (")[2]
     for name, setting in json.loads(root["spec"]).items():
         shown = ", ".join(map(str, setting)) if isinstance(setting, list) else str(setting)
-        assert value(text, name) == ("not told" if setting is None else shown)
+        assert value(text, name) == ("not stored" if setting is None else shown)
 
 
 def test_ranges_of_rooms(float_path):

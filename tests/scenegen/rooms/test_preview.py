@@ -5,7 +5,14 @@ import pytest
 from PIL import Image
 
 from scenegen import open_rooms
-from scenegen.rooms.preview import contact_sheet, depth_bytes, srgb_bytes
+from scenegen.rooms.preview import (
+    contact_sheet,
+    cut_places,
+    cuts,
+    depth_bytes,
+    id_colors,
+    srgb_bytes,
+)
 
 
 @pytest.fixture(scope="module")
@@ -44,3 +51,22 @@ def test_the_command(run, rooms_path, rooms):
     with first, second, other:
         assert np.array_equal(np.asarray(first), np.asarray(second))
         assert not np.array_equal(np.asarray(first), np.asarray(other))
+
+
+def test_cuts_show_what_is_inside_of_objects():
+    """An object from depth 2 to 3 in the left of two columns, a room at 4, and a sheet at 3.5."""
+    depth = np.full((2, 2, 4), np.nan)
+    depth[0, 0], depth[0, 1, 0], depth[1, :, 0] = (2, 3, 3.5, 4), 4, 4
+    ids, kinds = np.full((2, 2, 4), -1), np.zeros((2, 2, 4), int)
+    ids[0, 0], ids[0, 1, 0], ids[1, :, 0], kinds[0, 0, :2] = (1, 1, 2, 0), 0, 0, (1, -1)
+    assert cut_places(kinds) == (0, 0)
+    wide = [np.repeat(np.repeat(x, 50, axis=0), 50, axis=1) for x in (depth, ids, kinds)]
+    above, aside = cuts(wide, 10, 10, (2.0, 4.0))
+    assert above.shape == aside.shape == (100, 100, 3)
+    levels = np.linspace(1.9, 4.1, 100)[::-1]
+    names = {tuple(id_colors(np.array([k]))[0]): k for k in range(3)} | {(255, 255, 255): -1}
+    at = [names[tuple(color)] for color in above[:, 10].tolist()]
+    for level, name in zip(levels, at, strict=True):
+        sheet = 3.5 <= level < 3.5 + 2.2 / 99
+        assert name == (1 if 2 <= level < 3 else 0 if level >= 4 else 2 if sheet else -1)
+    np.testing.assert_array_equal(aside[10], above[::-1, 10])

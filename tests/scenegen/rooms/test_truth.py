@@ -65,6 +65,12 @@ def test_what_is_stored(full):
             np.testing.assert_allclose(
                 room.truth["albedo"][hit], rho[room.object_id[hit]], rtol=1e-7
             )
+            np.testing.assert_array_equal(room.truth["layers/depth"][..., 0], room.depth)
+            np.testing.assert_array_equal(room.truth["layers/object_id"][..., 0], room.object_id)
+            ids = room.truth["layers/object_id"]
+            np.testing.assert_array_equal(
+                masks, [(ids == k + 1).any(axis=-1) for k in range(len(masks))]
+            )
             coordinates = room.truth["object_coordinates"]
             np.testing.assert_array_equal(np.isnan(coordinates[..., 0]), room.object_id <= 0)
             assert 0.5 < np.nanmax(np.abs(coordinates)) < 1 + 1e-5
@@ -88,7 +94,7 @@ def test_masks_are_those_of_each_object_rendered_alone(full):
 def test_all_that_handles_files_knows_it(full, merged, tmp_path, run):
     checks = checks_of(full)
     assert [check for check in (*checks, *checks_of(merged, 1)) if not check.ok] == []
-    assert {"amodal", "coordinates", "flow", "albedo"} <= {check.name for check in checks}
+    assert set(TRUTHS) <= {check.name for check in checks}
     described = describe(full)
     assert all(name in described for name in COLUMNS)
     row = RoomsDataset(full, fields=COLUMNS)[1]
@@ -118,6 +124,11 @@ def mask_of_no_object(file):
         (values("flow", lambda stored: stored + 0.01), "flow"),
         (values("flow_occluded", lambda stored: 1 - stored), "flow"),
         (values("albedo", lambda stored: stored + 1e-3), "albedo"),
+        (values("layers/depth", lambda stored: stored + 1e-3), "layers"),
+        (values("layers/depth", lambda stored: stored[..., ::-1]), "layers"),
+        (values("layers/object_id", lambda stored: stored.clip(0)), "layers"),
+        (values("layers/entering", lambda stored: -stored), "layers"),
+        (put("object/closed", (0, 2), 7), "layers"),
     ],
 )
 def test_each_is_checked_against_depth_and_poses(edit, check, merged, tmp_path):

@@ -47,7 +47,12 @@ UNUSABLE = "2 of 6 rows without a usable number: 1, 3"
 @pytest.mark.parametrize(
     ("files", "where", "found", "expected"),
     [
-        ([A, OTHER_BITS], "", "rooms, truth of digest ffff", f"{DIGEST[:12]}, as a.json has"),
+        (
+            [A, OTHER_BITS],
+            "",
+            "rooms, ground truth with hash ffff",
+            f"{DIGEST[:12]}, as a.json has",
+        ),
         ([A, iqtt_scores("b", [1])], "", "iqtt", f"{DIGEST[:12]}, as a.json has"),
         ([], "comparison", "0 score file", "two or more"),
         ([A], "comparison", "1 score file", "two or more"),
@@ -76,7 +81,7 @@ def test_scores_of_an_older_format_compare_where_their_definition_is_the_same():
 def test_files_that_are_not_comparable_need_leave():
     part = without(rooms("b", shift=0.1), [0, 1])
     for files in ([A, part], [part, A]):
-        with refused(ComparisonError, "b.json", "only 4 of 6 rows", hint="--allow-incomparable"):
+        with refused(ComparisonError, "b.json", "only 4 of 6 images", hint="--allow-incomparable"):
             compare(files, ["chamfer"])
         found = compare(files, ["chamfer"], allow_incomparable=True)
         assert (found.items, found.clusters, found.comparable) == (4, 2, False)
@@ -95,8 +100,8 @@ NAN = float("nan")
 @pytest.mark.parametrize(
     ("name", "column", "found"),
     [
-        ("relief_iou", [0.1, 0.2, NAN, NAN, NAN, 0.3], "other rows without a number, such as 4"),
-        ("relief_iou", [0.1, 0.2, NAN, 0.3, 0.1, 0.3], "other rows without a number, such as 3"),
+        ("relief_iou", [0.1, 0.2, NAN, NAN, NAN, 0.3], "other items without a value, such as 4"),
+        ("relief_iou", [0.1, 0.2, NAN, 0.3, 0.1, 0.3], "other items without a value, such as 3"),
         ("empty_room_chamfer", [0.1, 0.2, 0.3, 0.2, 0.1, 0.3001], "0.3001"),
     ],
 )
