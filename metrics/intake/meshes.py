@@ -138,8 +138,8 @@ def mesh_layers(
     alone = sheets[(rank % 2 == 0) & np.append(new[1:], True)[: len(at)]]
     kept = np.delete(np.arange(len(pixel)), alone)
     crossings = Crossings(pixel[kept], depth[kept], kind[kept])
-    layers = stacked([crossings], np.ones(len(kept), np.int64), height, width)
-    ends = entered_spans(*(x.reshape(-1, MOST_LAYERS).T for x in (layers.depth, layers.entering)))
+    stored, _, kinds = stacked([crossings], np.ones(len(kept), np.int64), height, width)
+    ends = entered_spans(*(x.reshape(-1, MOST_LAYERS).T for x in (stored, kinds)))
     image = np.full((height, width, MOST_LAYERS), np.nan, np.float32)
     pairs = np.stack(ends, axis=1).reshape(-1, height, width).transpose(1, 2, 0)
     image[..., : pairs.shape[2]] = np.where(np.isfinite(pairs), pairs, np.nan)

@@ -6,9 +6,10 @@ A reader returns the views of each scene in order, each as a function that reads
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import h5py
 import numpy as np
@@ -29,22 +30,15 @@ WRONG = (KeyError, TypeError, ValueError, IndexError)  # what readers of broken 
 Scenes = list[list[Load]]
 
 
-class Layout(NamedTuple):
-    """A layout: the file by which it is told, as a pattern below a folder, and its reader."""
-
-    file: str
-    read: Callable[[list[Path]], Scenes]
-
-
 def scenes_of(folder: Path) -> tuple[str, Scenes]:
     """Return the name of a folder's layout, and the views of its scenes.
 
     Raises FileFormatError where it has none of LAYOUTS, or a file is damaged; OSError.
     """
-    for name, layout in LAYOUTS.items():
-        if paths := sorted(folder.rglob(layout.file)):
-            return name, layout.read(paths)
-    files = ", ".join(layout.file for layout in LAYOUTS.values())
+    for name, (file, read) in LAYOUTS.items():
+        if paths := sorted(folder.rglob(file)):
+            return name, read(paths)
+    files = ", ".join(file for file, _ in LAYOUTS.values())
     raise FileFormatError(folder, "no layout that is known", f"one of the files {files}")
 
 
@@ -173,12 +167,8 @@ def _of_colmap(folder: Path) -> list[Load]:
             places = np.array([points[point] for point in seen[:, 2]], float)
             view = View(cameras[about[8]], world_from_camera=np.linalg.inv(pose), points=places,
                         pixels=seen[:, :2].astype(float))  # fmt: skip
-            found.append(partial(_same, view))
+            found.append(partial(replace, view))
     return found
-
-
-def _same(view: View) -> View:
-    return view
 
 
 def bop(paths: list[Path]) -> Scenes:
@@ -265,10 +255,10 @@ def _hdf5(path: Path) -> Array:
         raise FileFormatError(path, f"{error!s:.60}", "a file of Hypersim") from error
 
 
-LAYOUTS = {
-    "nerfstudio": Layout("transforms.json", nerfstudio),
-    "COLMAP": Layout("cameras.txt", colmap),
-    "BOP": Layout("scene_camera.json", bop),
-    "MoGe": Layout("meta.json", moge),
-    "Hypersim": Layout("frame.*.depth_meters.hdf5", hypersim),
+LAYOUTS: dict[str, tuple[str, Callable[[list[Path]], Scenes]]] = {  # told by a file, and read
+    "nerfstudio": ("transforms.json", nerfstudio),
+    "COLMAP": ("cameras.txt", colmap),
+    "BOP": ("scene_camera.json", bop),
+    "MoGe": ("meta.json", moge),
+    "Hypersim": ("frame.*.depth_meters.hdf5", hypersim),
 }
