@@ -152,8 +152,8 @@ def test_the_edge_between_two_triangles_is_crossed_once():
     half = np.sqrt(0.5)
     turn = np.array([[1, 0, 0], [0, half, half], [0, -half, half]])
     assert along_the_axis(cube(1, 0) @ turn + [0, 0, -3])[1] == [1, -1]
-    ends = unit_shape("octahedron").triangles + [0, 0, -3]
-    assert along_the_axis(ends)[1] == [1, -1]
+    corners = unit_shape("octahedron").triangles - np.array([0, 0, 3])
+    assert along_the_axis(corners)[1] == [1, -1]
 
 
 def test_open_parts_have_no_inside():
