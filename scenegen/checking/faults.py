@@ -27,7 +27,8 @@ Array = NDArray[Any]
 Error = Callable[[Sequence[View]], float]
 Undo = Callable[[View], View]
 BETTER = 0.5  # share of a disagreement that may remain
-# The same of a principal point, between posed views: half a pixel of a large image is little beside the steps of depths.
+# The same of a principal point, between posed views: beside the steps in which depths are stored,
+# half a pixel of a large image is little.
 BETTER_SHIFT = 0.75
 BETTER_COLORS = 0.6  # the same of colours, which differ where surfaces shine
 ALIKE = 1.05  # factor within which two explanations count as the same: the first is taken
