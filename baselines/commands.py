@@ -49,6 +49,7 @@ UNTRAINED = {
     "nearest": "rooms: the heights of the most similar image of --train",
     "oracle": "the ground truth, which scores perfectly",
     "chance": "questions: random options",
+    "oracle-warp": "questions: true depth of rooms, warped into the other camera",
     "cubes": "questions: images decoded to 3D cubes; nothing is learned",
     "outline": "questions: the most similar silhouette, without labels or 3D",
     "features": "questions: features of a frozen encoder, given by --features",
@@ -58,6 +59,15 @@ UNTRAINED = {
     "pix2shape-rays": "rooms: Pix2Shape, given the walls, trained on several views",
     "pix2shape-views": "questions: Pix2Shape with a separate encoder",
 }
+OF_SHAPES = (
+    "cubes",
+    "depth-match",
+    "ptn",
+    "rezende",
+    "pix2shape",
+    "pix2shape-compact",
+    "pix2shape-views",
+)  # which know the camera of shapes, and no rooms
 REFERENCE = ("pix2shape", "pix2shape-compact", "pix2shape-rays", "pix2shape-views")
 # Baselines that are trained with `bench train NAME`: the modules of their `BASELINE`, and what they
 # are. A new one is a line here.
@@ -180,6 +190,10 @@ def baseline(
                 from baselines.training.baseline import write_submission
 
                 write_submission(_baseline(name), data, out, weights, **how)
+            elif name == "oracle-warp":
+                from baselines.warp import write_warp
+
+                write_warp(data, out, **how)
             elif name == "cubes":
                 needs("cubes", ("numba",), "cubes")
                 from baselines.cubes.answer import write_cubes
@@ -223,6 +237,7 @@ def _check_options(
 
 def _check_task(name: str, data: str) -> None:
     """Raise UsageError for questions given to a baseline of rooms, or rooms to one of questions."""
+    from iqtt.perspective.specs import MARK
     from metrics.submissions.layout import DATA_FORMATS
     from scenegen.files.attributes import read_text
     from scenegen.files.sets.shards import OpenFile
@@ -232,6 +247,10 @@ def _check_task(name: str, data: str) -> None:
     task = ALL[name].partition(":")[0]
     with OpenFile(data, "file of rooms or questions") as opened:
         stored = DATA_FORMATS.get(read_text(opened.file, "format", data) or "", task)
+        of_rooms = stored == "questions" and MARK in str(opened.file.attrs.get("spec", ""))
+    if of_rooms and name in OF_SHAPES:
+        expected = "try oracle-warp, outline, features, cnn or siamese"
+        raise click.UsageError(f"{name} knows shapes alone, and {data} shows rooms; {expected}")
     if task in ("rooms", "questions") and task != stored:
         others = ", ".join(other for other in ALL if ALL[other].startswith(f"{stored}:"))
         raise click.UsageError(f"{name} predicts {task}, and {data} holds {stored}; try {others}")

@@ -14,7 +14,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal
 
-from iqtt.questions.specs import SplitSpec
+from iqtt.questions.specs import QuestionSpec, SplitSpec
 from scenegen.common.records import check, from_json
 
 SHIPPED = "floors.json"
@@ -97,7 +97,7 @@ def to_json(measured: Sequence[Measured]) -> str:
     return json.dumps(record)[:-1] + ',\n  "measured": [\n' + ",\n".join(lines) + "]}\n"
 
 
-def floors_of(spec: SplitSpec | None, path: str | Path | None = None) -> dict[str, Floor]:
+def floors_of(spec: QuestionSpec | None, path: str | Path | None = None) -> dict[str, Floor]:
     """Return the floors of questions of these settings by kind; none where they are not known.
 
     Args:
@@ -107,7 +107,7 @@ def floors_of(spec: SplitSpec | None, path: str | Path | None = None) -> dict[st
     Raises OSError, and SpecError where the file is none of floors.
     """
     ours = () if path is None else read_floors(Path(path).read_bytes())
-    if spec is None:
+    if not isinstance(spec, SplitSpec):  # released, or about rooms
         return {}
     groups = [group for group in (*shipped_floors(), *ours) if group.settings == settings_of(spec)]
     return {floor.kind: floor for group in groups for floor in group.floors}

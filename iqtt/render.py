@@ -8,9 +8,11 @@ from typing import Any, TypeAlias
 
 from numpy.typing import NDArray
 
-from iqtt.questions.distractors import Pools, answer_positions
+from iqtt.perspective.rooms import RenderedRooms, Rooms, make_rooms, render_rooms
+from iqtt.perspective.specs import PerspectiveSpec
+from iqtt.questions.distractors import Pools, answer_positions, make_pools
 from iqtt.questions.packing import Question, pack_questions
-from iqtt.questions.specs import SplitSpec
+from iqtt.questions.specs import QuestionSpec, SplitSpec
 from iqtt.questions.views import Tally, sample_questions
 from scenegen.rendering.ground_truth import KEPT, visible_pixels
 from scenegen.rendering.renderer import launch_fields
@@ -40,10 +42,20 @@ class Rendered:
 
 
 Fetch: TypeAlias = Callable[[], list[Rendered]]
+Source: TypeAlias = Pools | Rooms
+"""What questions are drawn from."""
+
+
+def make_source(spec: QuestionSpec) -> Source:
+    """Return what questions are drawn from. Raises as `make_pools` and `make_rooms`."""
+    if isinstance(spec, PerspectiveSpec):
+        return make_rooms(spec)
+    assert isinstance(spec, SplitSpec)
+    return make_pools(spec)
 
 
 def render_questions(
-    pools: Pools,
+    source: Source,
     split: str,
     first: int,
     count: int,
@@ -53,7 +65,7 @@ def render_questions(
     device: str = "auto",
     tally: Tally | None = None,
     kept: Collection[str] = (),
-) -> Iterator[list[Rendered]]:
+) -> Iterator[list[Rendered] | list[RenderedRooms]]:
     """Yield questions first .. first + count - 1 of a split in order, at most `batch` at a time.
 
     The positions of the right answers are balanced over just these questions. Of these, only `rows`
@@ -62,10 +74,14 @@ def render_questions(
 
     Raises PlacementError where the bounded search finds no question that meets the spec.
     """
-    spec, tally = pools.spec, tally or Tally()
-    places = answer_positions(spec, split, first, count)
+    tally, rows = tally or Tally(), range(count) if rows is None else rows
+    places = answer_positions(source.spec, split, first, count)
+    if isinstance(source, Rooms):
+        asked = [(first + i, int(places[i])) for i in rows]
+        yield from ([one] for one in render_rooms(source, split, asked, tally, device))
+        return
+    pools, spec = source, source.spec
     pending = deque[Fetch]()
-    rows = range(count) if rows is None else rows
     few = SAMPLED if rows and rows[0] else FIRST_SAMPLED
     starts = [0, *range(min(few, len(rows)), len(rows), SAMPLED), len(rows)]
     for start, stop in itertools.pairwise(starts):
@@ -79,7 +95,9 @@ def render_questions(
         yield _checked(pools, split, pending.popleft()(), tally, device, kept)
 
 
-def render_question(pools: Pools, split: str, index: int, device: str = "auto") -> Rendered:
+def render_question(
+    source: Source, split: str, index: int, device: str = "auto"
+) -> Rendered | RenderedRooms:
     """Make one question of a split again, bit for bit as its file has it.
 
     Args:
@@ -88,18 +106,20 @@ def render_question(pools: Pools, split: str, index: int, device: str = "auto") 
 
     Raises IndexError where the split has no such question.
     """
-    spec = pools.spec
+    spec = source.spec
     for first, count in groups(spec, split).values():
         if first <= index < first + count:
             place = int(answer_positions(spec, split, first, count)[index - first])
             tally = Tally()
-            questions = sample_questions(pools, split, [(index, place, 0)], tally)
-            done = _launch(spec, questions, device)()
-            return _checked(pools, split, done, tally, device)[0]
+            if isinstance(source, Rooms):
+                return next(render_rooms(source, split, [(index, place)], tally, device))
+            questions = sample_questions(source, split, [(index, place, 0)], tally)
+            done = _launch(source.spec, questions, device)()
+            return _checked(source, split, done, tally, device)[0]
     raise IndexError(f"{split} has {getattr(spec, split)} questions, none with index {index}")
 
 
-def groups(spec: SplitSpec, split: str) -> dict[str, tuple[int, int]]:
+def groups(spec: QuestionSpec, split: str) -> dict[str, tuple[int, int]]:
     """Return for each HDF5 group of a split its first question and their number."""
     if split == "train":
         return {

@@ -15,12 +15,13 @@ from numpy.typing import NDArray
 from iqtt.audit.features.frames import stored_frames
 from iqtt.audit.features.statistics import SHAPE_STATISTICS, shape_statistics
 from iqtt.audit.probes.rules import Evidence, Probe, run_probes
-from iqtt.audit.proofs import explanations, images, kinds, splits, views
+from iqtt.audit.proofs import explanations, images, kinds, rooms, splits, views
 from iqtt.audit.proofs import shapes as shape_proofs
 from iqtt.audit.proofs.shapes import Shapes
 from iqtt.audit.proofs.verdict import Proof
 from iqtt.audit.table import AuditTable, read_table
 from iqtt.files.reader import QuestionsFile
+from iqtt.perspective.specs import PerspectiveSpec
 from scenegen.common.threads import one_thread
 from scenegen.files.row_file import writer_name
 from scenegen.files.sets.cluster import Cluster
@@ -165,10 +166,13 @@ def _prove(
         images.content(tables),
         images.balance(tables, right),
         images.values(tables),
-        images.framing(tables),
         images.distinct_images(tables),
         images.distinct_questions(tables),
     ]
+    if any(isinstance(table.spec, PerspectiveSpec) for table in tables):
+        told = [table for table in tables if "scene" in table.truth]
+        return [*rooms.prove_rooms(told, _spread([len(t) for t in told], CAST)), *proofs]
+    proofs.insert(3, images.framing(tables))
     with_cubes = [table for table in tables if table.truth]
     shapes = [its_shapes for table, its_shapes in zip(tables, shapes, strict=True) if table.truth]
     if not with_cubes:
@@ -206,12 +210,13 @@ def _evidence(
         [its_shapes.class_name for its_shapes in shapes],
         [its_shapes.whole for its_shapes in shapes],
     )
-    parts = []
+    parts, angles = [], []
     for table, its_shapes, place, described in zip(tables, shapes, right, numbers, strict=True):
         answered = place[table.measured] >= 0
         rows = table.measured[answered]
         mirrored = _mirror_images(its_shapes, place, rows)
         stored = _frames(table, its_shapes, rows)
+        angles.append(table.truth.get("angle_degrees", np.zeros(len(table)))[rows])
         parts.append((table.statistics[answered], place[rows], mirrored, described[rows], stored))
     statistics, places, mirrored, cubes, frames = map(np.concatenate, zip(*parts, strict=True))
     return Evidence(
@@ -221,12 +226,14 @@ def _evidence(
         cubes={name: cubes[:, :, i] for i, name in enumerate(SHAPE_STATISTICS)},
         frames=frames,
         places=[place[place >= 0] for place in right],
+        of_rooms=isinstance(tables[0].spec, PerspectiveSpec),
+        angles=np.concatenate(angles),
     )
 
 
 def _frames(table: AuditTable, shapes: Shapes, rows: Array) -> Array:
     """Return `frames.stored_frames` of some rows; NaN where the file does not tell the shapes."""
-    if not table.truth:
+    if "world_from_shape" not in table.truth:
         return np.full((len(rows), table.images - 1, 19), np.nan)
     views = table.truth["world_from_shape"][rows]
     return stored_frames(table.cubes[rows], views, shapes.whole[rows])
@@ -243,7 +250,7 @@ def _mirror_images(shapes: Shapes, place: Array, rows: Array) -> Array:
 
 
 def _audited(table: AuditTable, right: Array) -> AuditedTable:
-    answers = "from the cubes" if table.truth else "unknown"
+    answers = "from the cubes" if "cubes" in table.truth else "unknown"
     if table.answers is not None:
         answers = "stored"
     answered = int(np.count_nonzero(right[table.measured] >= 0))

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from iqtt.audit.features.statistics import border, border_color, measure, silhouettes
 from iqtt.files.layout import FORMAT, NO_CUBE, SCORED
 from iqtt.files.reader import QuestionsFile, answers_beside, table_names
-from iqtt.questions.specs import SplitSpec
 from scenegen.common.records import check
 from scenegen.files.content import ColumnDigest, column_digest, dataset_digest, joint_digest
 from scenegen.files.input_file import checking
@@ -29,6 +28,7 @@ CHUNKS = 8  # of them that a worker of a cluster reads in one go
 TRUTH = (
     *("cubes", "shape_id", "class_id", "world_from_shape"),
     *("distractor_kind", "angle_degrees", "visible_pixels", "camera_distance"),
+    *("scene", "in_play", "whole_pixels", "exposure", "picture_seed"),
 )
 
 
@@ -40,7 +40,7 @@ class AuditTable:
         name: short name, such as "iqtt-train.h5 labeled"; no two tables have the same.
         questions: the open table.
         answers: which of the answers is right, (Q,); None if the file does not tell.
-        truth: the datasets `TRUTH` by name, (Q, ...) each; empty if the file has no shapes.
+        truth: those of the datasets `TRUTH` that there are by name, (Q, ...) each.
         contents: digest of each dataset that was read, by its file and its name there; empty if
             the file has no digests to compare them with.
         truth_changed: whether the file's `truth_digest` is another one than that of its answers.
@@ -68,8 +68,8 @@ class AuditTable:
     statistics: Array
 
     @property
-    def spec(self) -> SplitSpec | None:
-        """The settings of the file; None for a released one."""
+    def spec(self) -> Any:
+        """The settings of the file, of cubes or of rooms; None for a released one."""
         return self.questions.spec
 
     @property
@@ -81,7 +81,7 @@ class AuditTable:
     def cubes(self) -> Array:
         """Cubes of the images' shapes as stored, (Q, I, most, 3); NO_CUBE if the file has none."""
         blank = (len(self), self.images, 1, 3)
-        return self.truth["cubes"] if self.truth else np.full(blank, NO_CUBE)
+        return self.truth.get("cubes", np.full(blank, NO_CUBE))
 
     def __len__(self) -> int:
         return len(self.digests)
@@ -200,8 +200,7 @@ def read_table(
         digests_of_images.append(digest)
         progress(sum(len(part[0]) for part in parts))
     scans = scans or [_scan(first, background, measured)]
-    names = TRUTH if questions.has_truth else ()
-    truth = {name: questions.read(name, everything) for name in names}
+    truth = {n: questions.read(n, everything) for n in TRUTH if n in questions.fields}
     answers = questions.read("answers", everything) if questions.has_answers else None
     read = truth if answers is None else {"answers": answers, **truth}
     digests = {name: dataset_digest(values) for name, values in read.items()}

@@ -4,13 +4,14 @@ They parse options, call the library once, and print. Heavy modules are imported
 """
 
 import time
+from dataclasses import fields
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
-from iqtt.questions.kinds import DISTRACTORS, QUESTION_KINDS
+from iqtt.questions.kinds import DISTRACTORS, QUESTION_KINDS, ROOM_KINDS
 from scenegen.command_line import groups, options, output
 from scenegen.command_line.groups import EXAMPLE
 from scenegen.command_line.options import Color, Range, Renamed
@@ -49,12 +50,13 @@ option = partial(click.option, show_default=True)
 )
 @option(
     "--preset",
-    type=click.Choice(["small", "v2", "paper", "suite"]),
+    type=click.Choice(["small", "v2", "paper", "suite", "perspective", "perspective-suite"]),
     default="small",
     help="Numbers of questions. small: 1,000 for training (100 of them labelled), 200 for"
     " validation, 200 for testing; v2: as in the released data, in float32; paper: as in the paper;"
     " suite: one folder per distractor type, each with 5,000 for training (1,000 labelled), 500 and"
-    " 2,000.",
+    " 2,000; perspective: furnished rooms, 100, 40 and 60; perspective-suite: one folder per"
+    " distractor type of rooms.",
 )
 @option("--train", type=int, help="Number of training questions, labelled and unlabelled.")
 @option(
@@ -80,10 +82,12 @@ option = partial(click.option, show_default=True)
 )
 @option(
     "--distractors",
-    type=click.Choice(DISTRACTORS),
+    type=click.Choice(list(dict.fromkeys((*DISTRACTORS, *ROOM_KINDS)))),
     default="mixed",
     help="Distractor type: what the wrong options show. "
     + "".join(f"{name}: {kind.meaning}; " for name, kind in QUESTION_KINDS.items())
+    + "of rooms "
+    + "".join(f"{name}: {kind.meaning}; " for name, kind in ROOM_KINDS.items())
     + "mixed: one of these types per question.",
 )
 @option(
@@ -93,7 +97,25 @@ option = partial(click.option, show_default=True)
     former="--answers",
     type=int,
     default=3,
-    help="Number of options per question, 3 or 2. One option is correct.",
+    help="Number of options per question, 3 or 2. One option is correct. A mirror-pair of rooms has"
+    " 2.",
+)
+@click.option(
+    "--angle",
+    type=Range(float),
+    help="Degrees between the views of reference and options, of rooms [default: 20-120].",
+)
+@click.option("--objects", type=Range(int), help="Number of objects of a room [default: 12-40].")
+@click.option(
+    "--object-split",
+    type=click.Choice(["all", "train", "val", "test"]),
+    help="Objects of which split furnish rooms [default: all].",
+)
+@click.option("--spp", type=int, help="Colour samples per pixel of rooms.")
+@click.option(
+    "--denoise/--no-denoise",
+    default=None,
+    help="Whether images of rooms are denoised [default: if the extra `denoise` is there].",
 )
 @option(
     "--min-angle",
@@ -167,26 +189,39 @@ def make_split(
     """
     from iqtt.files import make
     from iqtt.files.split import ALL_FILES
+    from iqtt.perspective import specs as rooms
     from iqtt.questions import specs
+    from scenegen.commands.making import with_denoiser
     from scenegen.common.errors import SpecError
     from scenegen.files.places import as_place
     from scenegen.rendering.sameness import renderer_identity
 
-    suite, context = preset == "suite", click.get_current_context()
-    given = click.core.ParameterSource.DEFAULT
+    of_rooms, suite = preset in rooms.PRESETS, preset.endswith("suite")
+    context, default = click.get_current_context(), click.core.ParameterSource.DEFAULT
+    given = {x for x in context.params if context.get_parameter_source(x) is not default}
+    kind = rooms.PerspectiveSpec if of_rooms else specs.SplitSpec
+    known = {field.name for field in fields(kind)}
+    _refuse_others(given & settings.keys(), known, preset, of_rooms)
+    if secret_seed is not None and "seed" in given:
+        raise SpecError("--secret-seed", "--seed as well", "only one of the two")
+    chosen = {x: v for x, v in settings.items() if x in known and v is not None}
+    if of_rooms:  # other defaults than those of the options
+        chosen = {name: value for name, value in chosen.items() if name in given}
+    if not of_rooms or "size" in given:
+        chosen |= {"height": size[0], "width": size[1]}
     if secret_seed is not None:
-        if context.get_parameter_source("seed") is not given:
-            raise SpecError("--secret-seed", "--seed as well", "only one of the two")
-        folders = [Path(out) / name for name in specs.SUITE] if suite else [Path(out)]
-        refuse_command_inputs(folder / name for folder in folders for name in ALL_FILES)
-        settings["seed"] = specs.secret_seed(secret_seed)
-    for name in ("distractors", "answers") if suite else ():
-        if context.get_parameter_source(name) is not given:
-            flag = {"answers": "options"}.get(name, name)
-            raise SpecError(f"--{flag}", "--preset suite as well", "only one of the two")
-    chosen = {name: value for name, value in settings.items() if value is not None}
-    spec = specs.preset_spec(preset, height=size[0], width=size[1], **chosen)
-    splits = len(specs.SUITE) if suite else 1
+        chosen["seed"] = specs.secret_seed(secret_seed)
+    spec: specs.QuestionSpec
+    if of_rooms:
+        spec, notes = with_denoiser(rooms.perspective_spec(preset, **chosen), chosen)
+        for line in notes:
+            click.echo(line, err=True)
+    else:
+        spec = specs.preset_spec(preset, **chosen)
+    names = list(make.suite_of(spec)) if suite else [""]
+    if secret_seed is not None:
+        refuse_command_inputs(Path(out) / name / file for name in names for file in ALL_FILES)
+    splits = len(names)
     count = splits * (spec.train + spec.val + spec.test)
     started = time.perf_counter()
     with (
@@ -208,19 +243,32 @@ def make_split(
             secret=secret_seed is not None,
             progress=bar.update,
         )
-    seconds = time.perf_counter() - started
+    rate = count / (time.perf_counter() - started)
     megabytes = sum(path.stat().st_size for path in as_place(out).rglob("*.h5")) / 1e6
     print_line(
         f"{out}: {f'{splits} splits of ' if suite else ''}{spec.train} + {spec.val} + {spec.test}"
         f" questions ({spec.labeled} of training labelled), {megabytes:.1f} MB,"
-        f" {count / seconds:.0f} questions/s"
+        f" {rate:.{0 if rate >= 10 else 2}f} questions/s"
     )
+    refused = "rooms were rejected" if of_rooms else "views hid a cube and were rejected"
     print_line(
-        f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} sampled views"
-        " hid a cube and were rejected"
+        f"{out}: {tally.refused / max(1, tally.proposed):.0%} of {tally.proposed} sampled {refused}"
     )
     if spec.test and secret_seed is None:
         click.echo(KNOWN_SEED, err=True)
+
+
+def _refuse_others(given: set[str], known: set[str], preset: str, of_rooms: bool) -> None:
+    """Raise SpecError for a setting that a preset does not have."""
+    from scenegen.common.errors import SpecError
+
+    for name in sorted(given):
+        flag = {"answers": "options"}.get(name, name.removesuffix("_degrees").replace("_", "-"))
+        if name not in known:
+            which = "--preset perspective" if of_rooms else "a preset other than perspective"
+            raise SpecError(f"--{flag}", f"{which} as well", "only one of the two")
+        if preset.endswith("suite") and name in ("distractors", "answers"):
+            raise SpecError(f"--{flag}", f"--preset {preset} as well", "only one of the two")
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt merge iqtt-split/iqtt-train.h5 --out iqtt-train.h5")

@@ -205,6 +205,7 @@ def floors(
     from iqtt.files.reader import open_tables
     from iqtt.floor_probes import floor_specs, measure_floors
     from iqtt.floors import to_json
+    from iqtt.questions.specs import SplitSpec
     from scenegen.common.errors import SpecError
     from scenegen.files.new_file import check_writable, write_text
 
@@ -214,6 +215,8 @@ def floors(
         with open_tables(path)[0] as table:
             if table.spec is None:
                 raise SpecError(path, "a file without settings", "one that iqtt make-split wrote")
+            if not isinstance(table.spec, SplitSpec):
+                raise SpecError(path, "questions about rooms", "questions about shapes")
             specs.append(table.spec)
     with progress_bar(2 * questions * len(floor_specs(specs, questions)), "question") as bar:
         found = measure_floors(

@@ -15,7 +15,6 @@ from scenegen.files.info import column_lines, fact_lines, setting_lines, size_te
 from scenegen.files.sets.shards import name_of_set
 from scenegen.files.verify import spread_rows
 from scenegen.rendering.backend import renderer_text
-from scenegen.rendering.ground_truth import decode_image
 
 Array = NDArray[Any]
 SAMPLED = 64  # rows that are read for the range of the images
@@ -92,7 +91,7 @@ def _facts(table: QuestionsFile) -> dict[str, str]:
     everything = slice(0, len(table))
     if table.has_images:
         rows = spread_rows(len(table), SAMPLED)
-        images = [decode_image(table.read("questions", row)) for row in rows]
+        images = [table[row].radiance for row in rows]
         low, high = min(i.min() for i in images), max(i.max() for i in images)
         facts["radiance"] = f"{low:.4g} to {high:.4g} over {len(rows)} questions"
     if table.has_answers:
@@ -103,6 +102,7 @@ def _facts(table: QuestionsFile) -> dict[str, str]:
         quantiles = np.quantile(table.read("angle_degrees", everything), np.linspace(0, 1, 5))
         shown = ", ".join(f"{q:.0f}" for q in quantiles)
         facts["rotation"] = f"{shown} degrees (minimum, quartiles, maximum)"
+    if "cube_count" in table.fields:
         facts["cubes"] = _counts(table.read("cube_count", everything))
     return facts
 

@@ -12,8 +12,10 @@ from typing import Any
 import h5py
 from numpy.typing import NDArray
 
-from iqtt.questions.kinds import DISTRACTOR_KINDS
-from iqtt.questions.specs import SPLITS, SplitSpec
+from iqtt.perspective import columns as rooms
+from iqtt.perspective.specs import PerspectiveSpec
+from iqtt.questions.kinds import DISTRACTOR_KINDS, OF_CUBES
+from iqtt.questions.specs import SPLITS, QuestionSpec, SplitSpec
 from iqtt.shapes.polycube import MAX_CUBES
 from scenegen.common.records import LARGEST
 from scenegen.files.content import CONTENT_DIGEST
@@ -26,7 +28,7 @@ Array = NDArray[Any]
 FORMAT_NAME = "pix2shape-bench/iqtt"
 FORMAT_VERSION = "1.1"
 # The datasets that scores depend on; `truth_digest` is the joint digest of those there.
-SCORED = ("answers", "distractor_kind", "angle_degrees")
+SCORED = ("answers", "distractor_kind", "angle_degrees", "scene")
 NO_CUBE = -128
 ID_BYTES = 2 * MAX_CUBES
 CONVENTIONS = (
@@ -51,7 +53,7 @@ FORMAT = Format(
         "spec": ".+",
         "split": "|".join(SPLITS),
         "task": ".+",
-        "conventions": re.escape(CONVENTIONS),
+        "conventions": f"{re.escape(CONVENTIONS)}|{re.escape(rooms.CONVENTIONS)}",
         "creation_command": ".*",
         CONTENT_DIGEST: DIGEST,
     },
@@ -60,11 +62,12 @@ FORMAT = Format(
 ROOT_TEXTS = ("format", "format_version", *FORMAT.texts)
 
 
-def question_columns(spec: SplitSpec) -> list[Column]:
+def question_columns(spec: QuestionSpec) -> list[Column]:
     """Return the column of the images; with three answers it is that of the released files."""
     shape = (1 + spec.answers, spec.height, spec.width, 3)
     scale = {"scale": 1 / 255 if spec.image_dtype == "uint8" else 1.0}
-    unit, frame = "linear radiance, times `scale`", "pixels: row 0 on top"
+    unit = rooms.developed(spec).get("unit", "linear radiance, times `scale`")
+    frame = "pixels: row 0 on top"
     meaning = f"reference, then {spec.answers} answers; RGB"
     return [
         Column(
@@ -84,13 +87,16 @@ def named(attribute: str, part: str) -> str:
     return f"{attribute}_{part}".rstrip("_")
 
 
-def truth_columns(spec: SplitSpec, kinds: Sequence[str] = DISTRACTOR_KINDS) -> list[Column]:
-    """Return the columns of `truth`: shapes, views, lights and difficulty of each question.
+def truth_columns(spec: QuestionSpec, kinds: Sequence[str] = OF_CUBES) -> list[Column]:
+    """Return the columns of `truth`: what images show, and the difficulty of each question.
 
     Args:
         kinds: the distractor types that there were when the file was made (`known_kinds`). Files
             of 1.0 did not name `near-mirror`, and called it `mirror`.
     """
+    if not isinstance(spec, SplitSpec):
+        assert isinstance(spec, PerspectiveSpec)
+        return rooms.room_columns(spec)
     most, lights, images = spec.cubes[1], spec.lights[1], 1 + spec.answers
     coordinates = f"integer coordinates of the cubes of each shape; {NO_CUBE} in unused rows"
     shape_id = "canonical shape under the 24 rotations: its sorted cubes, two bytes each"
@@ -133,16 +139,18 @@ def truth_columns(spec: SplitSpec, kinds: Sequence[str] = DISTRACTOR_KINDS) -> l
 def known_kinds(group: Any) -> Sequence[str]:
     """Return the distractor types that the truth of a file names, if DISTRACTOR_KINDS begins so.
 
-    Otherwise return DISTRACTOR_KINDS, which the file is then found not to name.
+    Otherwise return OF_CUBES, which the file is then found not to name.
     """
     stored = group.get("distractor_kind") if isinstance(group, h5py.Group) else None
     names: Any = getattr(stored, "attrs", {})
     count = names.get_id("names").shape if "names" in names else (0,)
     earlier = DISTRACTOR_KINDS[: math.prod(count)]
-    return earlier if earlier and list(names["names"]) == list(earlier) else DISTRACTOR_KINDS
+    return earlier if earlier and list(names["names"]) == list(earlier) else OF_CUBES
 
 
-def root_attributes(spec: SplitSpec, renderer: Mapping[str, str], command: str) -> dict[str, Any]:
+def root_attributes(
+    spec: QuestionSpec, renderer: Mapping[str, str], command: str
+) -> dict[str, Any]:
     """Return the root attributes of a file.
 
     Args:
@@ -150,20 +158,23 @@ def root_attributes(spec: SplitSpec, renderer: Mapping[str, str], command: str) 
         command: the command that made the file; empty where it must not be told, as it names the
             seed.
     """
+    about = rooms if isinstance(spec, PerspectiveSpec) else None
     attributes = {
         "format": FORMAT_NAME,
         "format_version": FORMAT_VERSION,
         "writer": writer_name(),
         **renderer,
         "spec": spec.to_json(),
-        "task": TASK,
-        "conventions": CONVENTIONS,
+        "task": about.TASK if about else TASK,
+        "conventions": about.CONVENTIONS if about else CONVENTIONS,
     }
     return {**attributes, "creation_command": command} if command else attributes
 
 
-def truth_attributes(spec: SplitSpec) -> dict[str, Any]:
-    """Return the attributes of `truth`: what all images of a split share."""
+def truth_attributes(spec: QuestionSpec) -> dict[str, Any]:
+    """Return the attributes of `truth`: what all images of a split share; nothing of rooms."""
+    if not isinstance(spec, SplitSpec):
+        return {}
     return {
         "fov_y_degrees": spec.fov_y_degrees,
         "ambient": spec.ambient,

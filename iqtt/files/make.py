@@ -9,10 +9,11 @@ from typing import Any
 from iqtt.files.reader import QuestionsFile
 from iqtt.files.split import split_files, split_part, split_request
 from iqtt.files.work import QuestionsWork
-from iqtt.questions.distractors import make_pools
-from iqtt.questions.specs import SUITE, SplitSpec
+from iqtt.perspective.specs import SUITE as ROOM_SUITE
+from iqtt.perspective.specs import PerspectiveSpec
+from iqtt.questions.specs import SUITE, QuestionSpec
 from iqtt.questions.views import Tally
-from iqtt.render import DEFAULT_BATCH
+from iqtt.render import DEFAULT_BATCH, make_source
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
 from scenegen.files.new_file import check_place
@@ -29,7 +30,7 @@ SHARD_SIZE = 10_000  # questions
 
 def make_split(
     folder: str | Path,
-    spec: SplitSpec,
+    spec: QuestionSpec,
     *,
     suite: bool = False,
     batch: int = DEFAULT_BATCH,
@@ -74,7 +75,7 @@ def make_split(
     if suite:
         splits = {
             name: replace(spec, distractors=kind, answers=answers)
-            for name, (kind, answers) in SUITE.items()
+            for name, (kind, answers) in suite_of(spec).items()
         }
     count = spec.train + spec.val + spec.test
     check(count > 0, "train, val and test", count, "at least 1 question in all")
@@ -88,14 +89,19 @@ def make_split(
     images = len(splits) * count * (1 + spec.answers)
     tally = Tally()
     with _folder(as_place(folder), splits) as place:
-        pools = {name: make_pools(of_split) for name, of_split in splits.items()}
+        pools = {name: make_source(of_split) for name, of_split in splits.items()}
+        work = QuestionsWork(pools, batch, device, compression)
         make_set(
-            place, files, split_request(spec, renderer, secret),
-            QuestionsWork(pools, batch, device, compression), shard_size,
-            workers=workers or useful_workers(images, variant),
+            place, files, split_request(spec, renderer, secret), work, shard_size,
+            workers=workers or useful_workers(images, variant, work.worthwhile),
             cluster=cluster, overwrite=overwrite, progress=progress, note=tally.add,
         )  # fmt: skip
     return tally
+
+
+def suite_of(spec: QuestionSpec) -> dict[str, tuple[str, int]]:
+    """Return the splits of a suite: folder, kind of questions, and number of answers."""
+    return ROOM_SUITE if isinstance(spec, PerspectiveSpec) else SUITE
 
 
 @contextmanager
@@ -142,7 +148,7 @@ def merge_questions(
     merge_file(first.opened, out, parts, compression, overwrite, progress)
 
 
-def _stored_part(table: QuestionsFile, spec: SplitSpec, split: str) -> Part:
+def _stored_part(table: QuestionsFile, spec: QuestionSpec, split: str) -> Part:
     """Return the part of a split that a table holds; a file of images lacks some of its sheets."""
     part = split_part(spec, split, table.part, len(table), 0)
     columns = set(table.fields)

@@ -24,7 +24,9 @@ from iqtt.files.layout import (
     truth_columns,
 )
 from iqtt.files.truth import QuestionTruth, question_truth
-from iqtt.questions.specs import SplitSpec
+from iqtt.perspective.columns import RoomTruth, developed, room_truth
+from iqtt.perspective.specs import split_spec
+from iqtt.questions.specs import QuestionSpec, SplitSpec
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.description.specs import IMAGE_DTYPES
 from scenegen.files.attributes import read_digest, read_root, read_text
@@ -32,7 +34,7 @@ from scenegen.files.input_file import checking, describing
 from scenegen.files.rows import RowDataset, RowFile, chosen_rows
 from scenegen.files.sets.shards import OpenFile
 from scenegen.layout import TRUTH_DIGEST
-from scenegen.rendering.ground_truth import decode_image
+from scenegen.rendering.ground_truth import decode_image, undeveloped
 
 Array = NDArray[Any]
 PARTS = ("labeled", "unlabeled")
@@ -56,18 +58,20 @@ class QuestionRecord:
         index: row of the question.
         images: the reference, then K options, (1 + K, H, W, 3), as stored.
         answer: index of the correct option, 0 to K - 1; None if the file has no answer key.
-        truth: shapes, views and lights; None if the file does not have them.
+        truth: shapes, views and lights, or rooms; None if the file does not have them.
+        is_developed: whether images are developed, not radiance.
     """
 
     index: int
     images: Array
     answer: int | None
-    truth: QuestionTruth | None
+    truth: QuestionTruth | RoomTruth | None
+    is_developed: bool = False
 
     @property
     def radiance(self) -> Array:
-        """Linear RGB radiance, (1 + K, H, W, 3) float32."""
-        return decode_image(self.images)
+        """Linear RGB radiance, (1 + K, H, W, 3) float32; of developed images, what they show."""
+        return undeveloped(self.images) if self.is_developed else decode_image(self.images)
 
 
 def open_questions(
@@ -160,7 +164,7 @@ class QuestionsFile(RowFile):
             SpecError: `part` is not given where there are two, or names none of them; or `answers`
                 is given for a file that has its own.
         """
-        self.spec: SplitSpec | None = None
+        self.spec: QuestionSpec | None = None
         self.fingerprint: str | None = None
         self.beside: QuestionsFile | None = None
         self.height, self.width, self.image_dtype = 0, 0, ""
@@ -179,7 +183,7 @@ class QuestionsFile(RowFile):
         if "format" in file.attrs:
             self.attributes = read_root(file, self.path, FORMAT)
             with describing(f"{self.path}: attribute 'spec'"):
-                self.spec = SplitSpec.from_json(self.attributes["spec"])
+                self.spec = split_spec(self.attributes["spec"])
         self.split = self.attributes.get("split")
         self.answers = self.spec.answers if self.spec else RELEASED_ANSWERS
         self.tables = table_names(self.opened, self.CONTENT)
@@ -282,8 +286,8 @@ class QuestionsFile(RowFile):
 
     @property
     def has_truth(self) -> bool:
-        """Whether the file has shapes, views and lights."""
-        return "cubes" in self._stored
+        """Whether the file has shapes, views and lights, or rooms."""
+        return "distractor_kind" in self._stored
 
     def table(self, part: str) -> Self:
         """Return another table of the same open file; raises as when one is opened."""
@@ -309,6 +313,7 @@ class QuestionsFile(RowFile):
             images=self.read("questions", row),
             answer=int(self.read("answers", row)) if self.has_answers else None,
             truth=self.truth(row),
+            is_developed=bool(developed(self.spec)),
         )
 
     def __iter__(self) -> Iterator[QuestionRecord]:
@@ -323,16 +328,19 @@ class QuestionsFile(RowFile):
             return self._known_answers[rows]
         return super().read(name, rows)
 
-    def truth(self, row: int) -> QuestionTruth | None:
+    def truth(self, row: int) -> QuestionTruth | RoomTruth | None:
         """Return the ground truth of a question, apart from the correct option; or None.
 
         Raises as `read`.
         """
         if not self.has_truth:
             return None
-        assert self.spec is not None  # truth is read only where there is one
         names = (name for name in self.fields if name not in ("questions", "answers"))
-        return question_truth({name: self.read(name, row) for name in names}, self.spec)
+        values = {name: self.read(name, row) for name in names}
+        if isinstance(self.spec, SplitSpec):
+            return question_truth(values, self.spec)
+        with describing(self.place("scene", row)):
+            return room_truth(values)
 
     def reopener(self) -> "Callable[[], QuestionsFile]":
         """Return a function, which can be pickled, that opens the same table again."""

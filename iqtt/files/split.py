@@ -16,7 +16,7 @@ from iqtt.files.layout import (
     truth_attributes,
     truth_columns,
 )
-from iqtt.questions.specs import SPLITS, SplitSpec
+from iqtt.questions.specs import SPLITS, QuestionSpec
 from iqtt.render import groups
 from scenegen.files.row_file import writer_name
 from scenegen.files.sets.plan import Mark, Part, Piece, Sheet, whole
@@ -30,11 +30,14 @@ FILES = {
 }  # of images, and of what is known of the questions
 ALL_FILES = tuple(name for split in SPLITS for name in FILES[split])
 # What tells questions apart; the answer is where the kind of distractor is -1.
-FINGERPRINTED = ("cubes", "world_from_shape", "light_position", "light_color", "distractor_kind")
+FINGERPRINTED = (
+    *("cubes", "world_from_shape", "light_position", "light_color", "distractor_kind"),
+    *("scene", "in_play"),
+)  # of those there
 
 
 def split_files(
-    spec: SplitSpec,
+    spec: QuestionSpec,
     renderer: Mapping[str, str],
     command: str = "",
     secret: bool = False,
@@ -70,7 +73,7 @@ def split_files(
     ]
 
 
-def split_request(spec: SplitSpec, renderer: Mapping[str, str], secret: bool) -> dict[str, Any]:
+def split_request(spec: QuestionSpec, renderer: Mapping[str, str], secret: bool) -> dict[str, Any]:
     """Return what the bytes of the files of a split depend on, as anybody may read it."""
     public = spec.public().to_json()
     # This tells two seeds apart. It does not help to find a seed: to try one takes longer here than
@@ -86,7 +89,7 @@ def split_request(spec: SplitSpec, renderer: Mapping[str, str], secret: bool) ->
 
 
 def split_part(
-    spec: SplitSpec, split: str, name: str, count: int, truth: int, folder: str = ""
+    spec: QuestionSpec, split: str, name: str, count: int, truth: int, folder: str = ""
 ) -> Part:
     """Return a part of a split: images in the first of its files, the rest in file `truth`."""
     with_answers = name != "unlabeled"
@@ -95,8 +98,11 @@ def split_part(
         Sheet(truth_columns(spec), truth, f"truth/{name}".rstrip("/"), truth_attributes(spec)),
         *([Sheet([answer_column()], truth, name)] if with_answers else []),
     ]
+    known = {column.name for sheet in sheets for column in sheet.columns}
     request = f"{spec.public().to_json()} {split} {name}"
-    marks = [Mark(named("fingerprint", name), FINGERPRINTED, range(truth + 1), request)]
+    told = [column for column in FINGERPRINTED if column in known]
+    marks = [Mark(named("fingerprint", name), told, range(truth + 1), request)]
     if with_answers:
-        marks.append(Mark(named(TRUTH_DIGEST, name), SCORED, [truth]))
+        scored = [column for column in SCORED if column in known]
+        marks.append(Mark(named(TRUTH_DIGEST, name), scored, [truth]))
     return Part(f"{folder}/{split}".lstrip("/"), name, count, sheets, marks)

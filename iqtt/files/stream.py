@@ -8,10 +8,9 @@ from typing import Any
 
 from iqtt.files.layout import answer_column, question_columns, truth_columns
 from iqtt.files.work import question_rows
-from iqtt.questions.distractors import Pools, make_pools
 from iqtt.questions.kinds import DISTRACTORS
-from iqtt.questions.specs import SPLITS, SplitSpec
-from iqtt.render import DEFAULT_BATCH, groups, render_questions
+from iqtt.questions.specs import SPLITS, QuestionSpec, SplitSpec
+from iqtt.render import DEFAULT_BATCH, Source, groups, make_source, render_questions
 from scenegen.common.names import check_choice
 from scenegen.files.stream import (
     Columns,
@@ -42,7 +41,7 @@ class QuestionStream(RowStream):
 
     def __init__(
         self,
-        kind_or_spec: "str | SplitSpec | Mapping[str | SplitSpec, float]",
+        kind_or_spec: "str | QuestionSpec | Mapping[str | QuestionSpec, float]",
         *,
         fields: Sequence[str] = ("questions", "answers"),
         batch: int = DEFAULT_BATCH,
@@ -70,7 +69,7 @@ class QuestionStream(RowStream):
         check_choice("split", split, SPLITS)
         makers, asked, told = [], [], list[str]()
         kept = [n for n in ON_DEVICE if n in fields and on_device and variant != "scalar_rgb"]
-        for request, share in requests_and_shares(kind_or_spec, SplitSpec).items():
+        for request, share in requests_and_shares(kind_or_spec, QuestionSpec).items():
             if isinstance(request, str):
                 check_choice("kind", request, DISTRACTORS)
             spec = SplitSpec(distractors=request) if isinstance(request, str) else request
@@ -79,7 +78,7 @@ class QuestionStream(RowStream):
             known = [*question_columns(every), answer_column(), *truth_columns(every)]
             asked.append(chosen_columns(fields, known))
             common_columns(asked)  # before pools are made, which takes a second
-            pools = make_pools(replace(spec, with_depth="depth" in fields))
+            pools = make_source(replace(spec, with_depth="depth" in fields))
             told.append(f"{split} {spec.to_json()}")
             makers.append((partial(_rows, pools, split, asked[0], kept, device, batch), share))
         super().__init__(
@@ -93,7 +92,7 @@ def _stacked(rows: list[Any], shape: tuple[int, ...]) -> Any:
 
 
 def _rows(
-    pools: Pools,
+    pools: Source,
     split: str,
     fields: Columns,
     kept: Sequence[str],
@@ -117,7 +116,7 @@ def _rows(
                 yield {name: values[name][place] for name in fields}
 
 
-def _block(spec: SplitSpec, split: str, number: int) -> tuple[int, int]:
+def _block(spec: QuestionSpec, split: str, number: int) -> tuple[int, int]:
     """Return first question and number of those with which a question's answer is balanced."""
     end = 0
     for first, count in groups(spec, split).values():

@@ -4,15 +4,16 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from iqtt.files.layout import FORMAT_VERSION
 from iqtt.files.reader import QuestionsFile, open_tables
 from iqtt.files.split import FILES
-from iqtt.questions.distractors import make_pools
-from iqtt.questions.specs import SPLITS, SplitSpec
-from iqtt.render import groups, render_question
+from iqtt.files.work import question_rows
+from iqtt.questions.specs import SPLITS, QuestionSpec
+from iqtt.render import groups, make_source, render_question
 from scenegen.common.errors import FileFormatError
 from scenegen.files.rows import content_problems
 from scenegen.files.verify import (
@@ -45,7 +46,7 @@ def verify_split(
         raise FileNotFoundError(2, "holds no question files of iqtt make-split", str(folder))
     with ExitStack() as stack:
         opened: dict[str, list[QuestionsFile]] = {}
-        spec: SplitSpec | None = None
+        spec: QuestionSpec | None = None
         for name in names:  # the file of answers, which may tell the seed, comes after the others
             tables = opened[name] = open_tables(folder / name)
             stack.enter_context(tables[0])
@@ -62,7 +63,13 @@ def verify_split(
         return [*checks, _made_again(opened, again, items, device)]
 
 
-def _gaps(opened: Mapping[str, Sequence[QuestionsFile]], spec: SplitSpec) -> Iterator[str]:
+def _same(stored: Any, value: Any) -> bool:
+    if np.asarray(stored).dtype.kind in "OS":
+        return [bytes(text).decode() for text in stored] == list(value)
+    return np.array_equal(stored, value, equal_nan=np.asarray(stored).dtype.kind == "f")
+
+
+def _gaps(opened: Mapping[str, Sequence[QuestionsFile]], spec: QuestionSpec) -> Iterator[str]:
     """Yield which files have too few or too many questions."""
     for split in SPLITS:
         for name in FILES[split]:
@@ -72,7 +79,7 @@ def _gaps(opened: Mapping[str, Sequence[QuestionsFile]], spec: SplitSpec) -> Ite
 
 
 def _made_again(
-    opened: Mapping[str, Sequence[QuestionsFile]], spec: SplitSpec, items: int, device: str
+    opened: Mapping[str, Sequence[QuestionsFile]], spec: QuestionSpec, items: int, device: str
 ) -> Check:
     """Make some questions of each file again; `opened` are the tables of each, by its name."""
     title = "made again from the seed"
@@ -85,7 +92,7 @@ def _made_again(
     others = made_elsewhere(told[-1], here)
     if others:
         return Check(title, True, f"not checked: {'; '.join(others)}")
-    pools, wrong, count = make_pools(spec), [], 0
+    source, wrong, count = make_source(spec), [], 0
     for split in SPLITS:
         name, answers = FILES[split][0], FILES[split][-1]
         for part, (first, rows) in groups(spec, split).items() if name in opened else ():
@@ -93,12 +100,8 @@ def _made_again(
             if answers != name and answers in opened:
                 table.join(opened[answers][0])
             for row in spread_rows(rows, items):
-                again = render_question(pools, split, first + row, device)
-                stored, count = table[row], count + 1
-                same = np.array_equal(stored.images, again.images)
-                if stored.truth is not None:
-                    cubes = again.question.shapes.cubes
-                    same &= np.array_equal(stored.truth.cubes, cubes)
-                if not same:
+                again = render_question(source, split, first + row, device)
+                values, count = question_rows(spec, [again]), count + 1  # type: ignore[arg-type]
+                if not all(_same(table.read(x, row), values[x][0]) for x in table.fields):
                     wrong.append(f"{name} {part} row {row}".replace("  ", " "))
     return listed_check(title, f"{count} questions, bit for bit", wrong)

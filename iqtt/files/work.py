@@ -8,18 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.files.layout import ID_BYTES, NO_CUBE
-from iqtt.questions.distractors import Pools
-from iqtt.questions.specs import SplitSpec
+from iqtt.perspective.rooms import RenderedRooms, Rooms, room_rows
+from iqtt.questions.specs import QuestionSpec, SplitSpec
 from iqtt.questions.views import Tally
-from iqtt.render import Rendered, groups, render_questions
+from iqtt.render import Rendered, Source, groups, render_questions
 from iqtt.shapes.polycube import canonical, canonical_class, set_ids
 from scenegen.files.sets.plan import Block
 from scenegen.files.sets.sets import Packed
 from scenegen.files.sets.workers import in_threads
 from scenegen.files.table import pack_rows, packing_threads
-from scenegen.rendering.renderer import share_processors
+from scenegen.rendering.renderer import WORTHWHILE, share_processors
 
 BLOCK = 128  # questions that a worker process makes in one go
+ROOMS = 8  # of those about rooms, which take seconds; neighbours share their furniture
 PACKED = 8  # questions that a thread packs in one go
 OF_QUESTION = (
     *("world_from_shape", "light_count", "light_position", "light_color"),
@@ -37,7 +38,7 @@ class QuestionsWork:
         device, compression: as in `backend.DEVICES` and `table.COMPRESSIONS`.
     """
 
-    pools: Mapping[str, Pools]
+    pools: Mapping[str, Source]
     batch: int
     device: str
     compression: str
@@ -45,7 +46,12 @@ class QuestionsWork:
     @property
     def block(self) -> int:
         """Questions that a worker process makes in one go."""
-        return BLOCK
+        return ROOMS if any(isinstance(x, Rooms) for x in self.pools.values()) else BLOCK
+
+    @property
+    def worthwhile(self) -> int:
+        """Images for which another worker process is worth while."""
+        return 4 * ROOMS if self.block == ROOMS else WORTHWHILE
 
     def packed_rows(self, block: Block, workers: int) -> Generator[Packed, None, Tally]:
         """Render questions in order, and meanwhile pack them in threads; return their tally."""
@@ -60,7 +66,7 @@ class QuestionsWork:
         )  # fmt: skip
         pieces = (some[i : i + PACKED] for some in rendered for i in range(0, len(some), PACKED))
 
-        def packed(questions: list[Rendered]) -> Packed:
+        def packed(questions: list[Rendered] | list[RenderedRooms]) -> Packed:
             values = question_rows(spec, questions)
             sheets = block.part.sheets
             return [pack_rows(values, sheet.columns, self.compression) for sheet in sheets]
@@ -70,8 +76,16 @@ class QuestionsWork:
         return tally
 
 
-def question_rows(spec: SplitSpec, rendered: Sequence[Rendered]) -> dict[str, Any]:
+def question_rows(
+    spec: QuestionSpec, rendered: list[Rendered] | list[RenderedRooms]
+) -> dict[str, Any]:
     """Return the values of each question, by column: images, answer, and `truth_columns`."""
+    if isinstance(spec, SplitSpec):
+        return _cube_rows(spec, rendered)  # type: ignore[arg-type]
+    return room_rows(rendered)  # type: ignore[arg-type]
+
+
+def _cube_rows(spec: SplitSpec, rendered: Sequence[Rendered]) -> dict[str, Any]:
     most, images = spec.cubes[1], 1 + spec.answers
     cubes = np.full((len(rendered), images, most, 3), NO_CUBE, np.int8)
     shape_ids, class_ids = np.zeros((2, len(rendered), images, ID_BYTES), np.uint8)

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from iqtt.questions.kinds import DISTRACTOR_KINDS
-from iqtt.questions.specs import SPLITS, SplitSpec
+from iqtt.questions.specs import SPLITS, QuestionSpec, SplitSpec
 from iqtt.shapes.matched import matched_rows
 from iqtt.shapes.near import move_cubes
 from iqtt.shapes.polycube import canonical_class, is_chiral, mirror, set_ids
@@ -146,7 +146,7 @@ def _has_distractors(pools: Pools, kind: str, cubes: int) -> bool:
     return True
 
 
-def answer_positions(spec: SplitSpec, split: str, first: int, count: int) -> Array:
+def answer_positions(spec: QuestionSpec, split: str, first: int, count: int) -> Array:
     """Return the position of the right answer of each of some questions, (count,) uint8, from 0.
 
     They are the questions first .. first + count - 1. The positions come equally often, as nearly

@@ -5,7 +5,11 @@ from dataclasses import dataclass
 
 # What a wrong option is to the reference; "near-mirror" mirrors a "near" shape. Files name those of
 # their time, so this is append only: readers take every beginning of it.
-DISTRACTOR_KINDS = ("other", "near", "mirror", "matched", "near-mirror")
+DISTRACTOR_KINDS = (
+    *("other", "near", "mirror", "matched", "near-mirror"),
+    *("moved", "swapped", "turned"),  # of furnished rooms
+)
+OF_CUBES = DISTRACTOR_KINDS[:5]
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,12 @@ QUESTION_KINDS = {  # `mixed` draws from them in this order
     "mirror": QuestionKind("the mirror image and a shape with one cube moved", options=(3,)),
     "matched": QuestionKind("different shapes with similar silhouettes"),
     "mirror-pair": QuestionKind("the mirror image only"),
+}
+ROOM_KINDS = {  # of furnished rooms; `mixed` draws from those with three options
+    "moved": QuestionKind("one object at other places", options=(3,)),
+    "swapped": QuestionKind("three objects in another order", options=(3,)),
+    "turned": QuestionKind("one object in other directions", options=(3,)),
+    "mirror-pair": QuestionKind("the mirror image of the room", options=(2,)),
 }
 DISTRACTORS = (*QUESTION_KINDS, "mixed")  # what `--distractors` takes
 

@@ -2,11 +2,12 @@
 
 import hashlib
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, ClassVar, Self, get_args
 
-from iqtt.questions.kinds import DISTRACTORS, QUESTION_KINDS
+from iqtt.questions.kinds import QUESTION_KINDS, QuestionKind
 from iqtt.shapes.chains_and_trees import Kind
 from iqtt.shapes.polycube import MAX_CUBES
 from scenegen.camera import Camera, half_angle
@@ -38,20 +39,87 @@ SUITE = {  # the splits of the suite: the kind and the number of answers of each
 
 
 @dataclass(frozen=True)
-class SplitSpec:
-    """The settings of a split. With a seed, they determine every bit of its files.
+class QuestionSpec:
+    """What the settings of all splits share. With a seed, they determine every bit of its files.
 
     Attributes:
         seed: random seed, 0 to 2**256 - 1; None in files that must not reveal it (see `public`).
         train, val, test: numbers of questions; at least one question in all.
         labeled: number of labelled training questions.
-        cubes: fewest and most cubes of a shape; every number in between is equally likely.
-        shapes: "chain" for self-avoiding chains of cubes, "tree" for shapes that may branch.
-        distractors: distractor type, one of QUESTION_KINDS, or "mixed", where each question samples
-            one of the types that `cubes` allow.
+        distractors: distractor type, one of `KINDS`, or "mixed", where each question samples one of
+            those that have so many options.
         answers: number of options, 3 or 2; one option is correct.
         height, width: size of an image, pixels.
-        image_dtype: "uint8", "float16" or "float32"; radiance lies within 0..1.
+        image_dtype: "uint8", "float16" or "float32".
+        with_depth: whether the files also hold planar depth.
+    """
+
+    KINDS: ClassVar[Mapping[str, QuestionKind]]
+    SMALLEST: ClassVar[int] = 16  # side of an image, pixels
+
+    seed: int | None = 0
+    train: int = 1_000
+    labeled: int = 100
+    val: int = 200
+    test: int = 200
+    distractors: str = "mixed"
+    answers: int = 3
+    height: int = 128
+    width: int = 128
+    image_dtype: str = "uint8"
+    with_depth: bool = False
+
+    def __post_init__(self) -> None:
+        normalise(self)
+        if self.seed is not None:
+            object.__setattr__(self, "seed", int(self.seed))
+        check(self.seed is None or 0 <= self.seed < 2**256, "seed", self.seed, "0 to 2**256 - 1")
+        for name in ("train", "val", "test"):
+            _check_within(name, getattr(self, name), 0, MAX_QUESTIONS, " questions")
+        _check_within("labeled", self.labeled, 0, self.train, " training questions")
+        check_choice("distractors", self.distractors, (*self.KINDS, "mixed"))
+        check_choice("image dtype", self.image_dtype, IMAGE_DTYPES)
+        _check_within("answers", self.answers, 2, 3)
+        if self.distractors != "mixed":
+            options = self.KINDS[self.distractors].options
+            expected = f"{options[0]} with the distractors {self.distractors}"
+            check(self.answers in options, "answers", self.answers, expected)
+        sides = f"{self.height}x{self.width}"
+        small, large = min(self.height, self.width), max(self.height, self.width)
+        least = self.SMALLEST
+        check(
+            small >= least and large <= 4096, "size", sides, f"from {least} to 4096 pixels a side"
+        )
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """The kinds of questions there are, of KINDS."""
+        if self.distractors != "mixed":
+            return (self.distractors,)
+        kinds = self.KINDS.items()
+        return tuple(name for name, it in kinds if it.mixed and self.answers in it.options)
+
+    def public(self) -> Self:
+        """Return the spec without its seed, which would reveal the answer key."""
+        return replace(self, seed=None)
+
+    def to_json(self) -> str:
+        """Return the settings as one line of JSON with sorted keys."""
+        return to_json(self, sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str | bytes) -> Self:
+        """Read what `to_json` wrote. Raises SpecError on anything else."""
+        return from_json(cls, text, "split spec")
+
+
+@dataclass(frozen=True)
+class SplitSpec(QuestionSpec):
+    """The settings of a split of polycubes; see `QuestionSpec`.
+
+    Attributes:
+        cubes: fewest and most cubes of a shape; every number in between is equally likely.
+        shapes: "chain" for self-avoiding chains of cubes, "tree" for shapes that may branch.
         min_angle_degrees: minimum rotation between the views of the reference and of each option,
             and between the views of two options with the same shape.
         min_sight_angle_degrees: minimum angle between the viewing directions of these views, as
@@ -64,21 +132,12 @@ class SplitSpec:
         light_level: radiance of a white surface at the origin that faces all lights. With the
             defaults, every surface is darker than the background.
         fov_degrees: field of view across the shorter side of the image.
-        with_depth: whether the files also hold planar depth.
     """
 
-    seed: int | None = 0
-    train: int = 1_000
-    labeled: int = 100
-    val: int = 200
-    test: int = 200
+    KINDS: ClassVar[Mapping[str, QuestionKind]] = QUESTION_KINDS
+
     cubes: tuple[int, int] = (8, 11)
     shapes: Kind = "chain"
-    distractors: str = "mixed"
-    answers: int = 3
-    height: int = 128
-    width: int = 128
-    image_dtype: str = "uint8"
     min_angle_degrees: float = 30.0
     min_sight_angle_degrees: float = 40.0
     min_cube_pixels: int = 30
@@ -89,32 +148,13 @@ class SplitSpec:
     reflectance: Vector3 = (0.8, 0.8, 0.8)
     light_level: float = 0.85
     fov_degrees: float = 28.0
-    with_depth: bool = False
 
     def __post_init__(self) -> None:
-        normalise(self)
-        if self.seed is not None:
-            object.__setattr__(self, "seed", int(self.seed))
-        check(self.seed is None or 0 <= self.seed < 2**256, "seed", self.seed, "0 to 2**256 - 1")
-        for name in ("train", "val", "test"):
-            _check_within(name, getattr(self, name), 0, MAX_QUESTIONS, " questions")
-        _check_within("labeled", self.labeled, 0, self.train, " training questions")
+        super().__post_init__()
+        sides = f"{self.height}x{self.width}"
         check_range("cubes", self.cubes, 3, MAX_CUBES)
         check_range("lights", self.lights, 1, MAX_LIGHTS)
-        for name, value, choices in (
-            ("shapes", self.shapes, get_args(Kind)),
-            ("distractors", self.distractors, DISTRACTORS),
-            ("image dtype", self.image_dtype, IMAGE_DTYPES),
-        ):
-            check_choice(name, value, choices)
-        _check_within("answers", self.answers, 2, 3)
-        if self.distractors != "mixed":
-            options = QUESTION_KINDS[self.distractors].options
-            expected = f"{options[0]} with the distractors {self.distractors}"
-            check(self.answers in options, "answers", self.answers, expected)
-        sides = f"{self.height}x{self.width}"
-        small, large = min(self.height, self.width), max(self.height, self.width)
-        check(small >= 16 and large <= 4096, "size", sides, "from 16 to 4096 pixels a side")
+        check_choice("shapes", self.shapes, get_args(Kind))
         _check_within("min angle", self.min_angle_degrees, 0, 90, " degrees")
         _check_within("min sight angle", self.min_sight_angle_degrees, 0, 60, " degrees")
         _check_within("max radius", self.max_radius, 1.5, 10, " cube edges")
@@ -126,14 +166,6 @@ class SplitSpec:
         for name in ("background", "ambient", "reflectance"):
             color = getattr(self, name)
             check(all(0 <= c <= 1 for c in color), name, color, "channels from 0 to 1")
-
-    @property
-    def kinds(self) -> tuple[str, ...]:
-        """The kinds of questions there are, of QUESTION_KINDS."""
-        if self.distractors != "mixed":
-            return (self.distractors,)
-        kinds = QUESTION_KINDS.items()
-        return tuple(name for name, it in kinds if it.mixed and self.answers in it.options)
 
     @property
     def camera_distance(self) -> float:
@@ -180,19 +212,6 @@ class SplitSpec:
             image_dtype=self.image_dtype,
             min_visible_pixels=0,
         )
-
-    def public(self) -> "SplitSpec":
-        """Return the spec without its seed, which would reveal the answer key."""
-        return replace(self, seed=None)
-
-    def to_json(self) -> str:
-        """Return the settings as one line of JSON with sorted keys."""
-        return to_json(self, sort_keys=True)
-
-    @classmethod
-    def from_json(cls, text: str | bytes) -> "SplitSpec":
-        """Read what `to_json` wrote. Raises SpecError on anything else."""
-        return from_json(cls, text, "split spec")
 
 
 def secret_seed(path: str | Path) -> int:

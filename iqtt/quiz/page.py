@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from iqtt.files.reader import NoAnswersError, QuestionsFile, answers_beside
+from iqtt.perspective.specs import PerspectiveSpec
 from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.common.records import check
@@ -35,7 +36,7 @@ PAGE = """<!doctype html>
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="robots" content="noindex">
 <meta http-equiv="Content-Security-Policy" content="{policy}">
-<title>Which shape is the same, rotated? A quiz</title>
+<title>A quiz</title>
 <link rel="icon" href="data:,">
 <style>{style}</style>
 </head>
@@ -98,6 +99,7 @@ def write_quiz(
             "digest": digest,
             "contact": study.contact,
             "post": study.post,
+            "about": "rooms" if isinstance(file.spec, PerspectiveSpec) else "cubes",
             "answers": file.answers,
             "practice": practice,
             "questions": [{"row": row, "pictures": _pictures(file, row)} for row in chosen],

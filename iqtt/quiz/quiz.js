@@ -3,8 +3,27 @@
 "use strict";
 
 const FORMAT = "pix2shape-bench/quiz-answers";
+const WORDS = {
+  cubes: {
+    title: "Which shape is the same, rotated? A quiz",
+    thing: "a shape made of cubes",
+    task: "One option is the same shape, seen from another side. The other options are different" +
+      " shapes, and some may be mirror images. Which option is the same shape?",
+    rule: "All cubes of a shape are visible in every image.",
+    ask: "Which option is the same shape as the reference, rotated?",
+  },
+  rooms: {
+    title: "Which room is the same? A quiz",
+    thing: "a furnished room",
+    task: "One option is the same room, seen from another place. In the other options, furniture" +
+      " stands elsewhere or faces another way, or the room is mirrored. Which option is the same room?",
+    rule: "All options are seen from one place.",
+    ask: "Which option is the same room as the reference?",
+  },
+};
 const LETTERS = "ABC";
 const quiz = JSON.parse(document.getElementById("quiz").textContent);
+const words = WORDS[quiz.about];
 const main = document.getElementById("main");
 const place = `${FORMAT}/${quiz.quiz}`;
 let storage = true; // whether the browser keeps anything
@@ -102,7 +121,7 @@ function consent() {
     ? "At the end, your responses are sent to the organisers of the study. You can keep a copy."
     : "At the end, you save your responses as a file and send it to the organisers of the study.";
   const rules = [
-    "All cubes of a shape are visible in every image.",
+    words.rule,
     `Click an option, or press a key from 1 to ${quiz.answers}.`,
     "Work as fast as you can without mistakes. Guess if you do not know. You cannot return to an" +
       " earlier question.",
@@ -114,12 +133,10 @@ function consent() {
     rules.unshift(`First ${first} for practice. The correct option is shown after each.`);
   }
   show(
-    "Which shape is the same, rotated? A quiz",
-    make("h1", {}, "Which shape is the same, rotated?"),
-    make("p", {}, "Every question shows a shape made of cubes, the ", make("strong", {}, "reference"),
-      `, and ${quiz.answers} options. One option is the same shape, seen from another side. The` +
-      " other options are different shapes, and some may be mirror images. Which option is the same" +
-      " shape?"),
+    words.title,
+    make("h1", {}, words.title.split("?")[0] + "?"),
+    make("p", {}, `Every question shows ${words.thing}, the `, make("strong", {}, "reference"),
+      `, and ${quiz.answers} options. ${words.task}`),
     make("ul", {}, ...rules.map((rule) => make("li", {}, rule))),
     make("h2", {}, "What is recorded"),
     make("p", {}, "Your responses and the time of each are recorded under a random number. No name, no" +
@@ -146,7 +163,7 @@ function progress(title, done) {
 async function picturesOf(question) {
   const images = question.pictures.map((text, k) => make("img", {
     src: `data:image/webp;base64,${text}`,
-    alt: k ? "" : "The reference: a shape made of cubes",
+    alt: k ? "" : `The reference: ${words.thing}`,
     width: 256, height: 256,
   }));
   await Promise.all(images.map((image) => image.decode().catch(() => {})));
@@ -176,8 +193,7 @@ async function ask(question, title, done, answered) {
     { type: "button", "aria-keyshortcuts": `${k + 1} ${LETTERS[k]}`, onclick: () => answer(k) },
     image, make("span", {}, `Option ${k + 1}`)));
   show(title, progress(title, done),
-    make("h1", { class: "ask", id: "ask" },
-      "Which option is the same shape as the reference, rotated?"),
+    make("h1", { class: "ask", id: "ask" }, words.ask),
     make("div", { class: `shapes shapes-${quiz.answers}`, role: "group", "aria-labelledby": "ask" },
       reference(first), ...buttons),
     make("p", { class: "hint" }, `Click an option, or press a key from 1 to ${quiz.answers}.`));
@@ -193,7 +209,7 @@ async function feedback(question, title, done) {
   const figures = images.map((image, k) => {
     const [kind, text] = k === right ? ["right", ": correct"]
       : k === answer ? ["wrong", ": your choice, wrong"] : ["", ""];
-    image.alt = "A shape made of cubes";
+    image.alt = words.thing;
     return make("figure", { class: kind }, image,
       make("figcaption", {}, `Option ${k + 1}${text}`));
   });

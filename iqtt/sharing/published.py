@@ -12,7 +12,8 @@ import h5py
 from iqtt.files.layout import FORMAT, ROOT_TEXTS, named
 from iqtt.files.reader import QuestionsFile, table_names
 from iqtt.files.split import ANSWERS, FILES
-from iqtt.questions.specs import SPLITS, SplitSpec
+from iqtt.perspective.specs import split_spec
+from iqtt.questions.specs import SPLITS
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.attributes import read_root
 from scenegen.files.content import SHA256
@@ -84,7 +85,7 @@ def check_withheld(opened: OpenFile, is_test: bool) -> None:
     path, file = opened.path, opened.file
     with checking(file):
         with describing(f"{path}: attribute 'spec'"):
-            spec = SplitSpec.from_json(read_root(file, path, FORMAT)["spec"])
+            spec = split_spec(read_root(file, path, FORMAT)["spec"])
         leaks = ["the seed"] if spec.seed is not None else []
         leaks += ["the command that made it"] if COMMAND in file.attrs else []
         leaks += _beside_images(file) if is_test else []

@@ -7,6 +7,7 @@ from typing import Any
 
 from iqtt.files.layout import answer_column, question_columns, truth_columns
 from iqtt.files.reader import QuestionsFile
+from iqtt.questions.specs import SplitSpec
 from iqtt.sharing.published import handed_out
 from scenegen.common.text_table import piped
 from scenegen.files.schema import Column
@@ -61,12 +62,13 @@ def write_questions_card(
 
 def exported_columns(questions: QuestionsFile) -> list[Column]:
     """Return the columns: each image, the right answer and the truth, as far as told."""
+    stored = question_columns(questions.spec or SplitSpec())[0]
     image = Column(
         "reference",
         (questions.height, questions.width, 3),
         questions.image_dtype,
-        "linear radiance, times `scale`",
-        "pixels: row 0 on top",
+        stored.unit,
+        stored.frame,
         "RGB",
         own_chunk=True,
         more={"scale": 1 / 255 if questions.image_dtype == "uint8" else 1.0},

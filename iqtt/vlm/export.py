@@ -29,7 +29,7 @@ COLUMNS = {
     "answer": "letter of the correct option; not in held-out tests, nor are kind to floor",
     "kind": "distractor type, such as matched",
     "angle": "smallest rotation from the reference to the correct option, degrees",
-    "cubes": "number of cubes of each shape",
+    "cubes": "number of cubes of each shape; null for rooms",
     "shape": "cluster for confidence intervals: shared by questions about one shape or its mirror"
     " image",
     "floor": "accuracy of the best 2D-only baseline on this distractor type; null if unknown",
@@ -184,6 +184,14 @@ def _card(name: str, row: Row) -> str:
         for column, text in COLUMNS.items()
         if not (row.answer is None and column in FACTS)
     )
+    shows = "One option shows the same shape,\nrotated. All images are rendered from cubes."
+    report = (
+        "on `matched` and on `mirror-pair` with two options, next to their 2D-only\nbaselines, with"
+        " confidence intervals clustered by `shape`"
+    )
+    if row.of_rooms:
+        shows = "One option shows the same room,\nseen from elsewhere."
+        report = "on each type, from 60 degrees on"
     return f"""---
 license: cc-by-4.0
 task_categories: [visual-question-answering]
@@ -197,9 +205,8 @@ configs:
 
 # {name}: mental-rotation questions for models
 
-Each question shows a reference and {len(row.letters)} options. One option shows the same shape,
-rotated. All images are rendered from cubes. `iqtt audit` of pix2shape-bench checks that each
-question has exactly one correct option.
+Each question shows a reference and {len(row.letters)} options. {shows} `iqtt audit` of
+pix2shape-bench checks that each question has exactly one correct option.
 
 `{CONTROL}` is the blind control: the same questions without the reference. A model that scores
 above chance on the control uses a shortcut.
@@ -208,9 +215,8 @@ above chance on the control uses a shortcut.
 | --- | --- |
 {columns}
 
-Report the accuracy on `matched` and on `mirror-pair` with two options, next to their 2D-only
-baselines, with confidence intervals clustered by `shape`. CircularEval accuracy counts a question
-as correct if the response is correct in every rotation of the options.
+Report the accuracy {report}. CircularEval accuracy counts a question as correct if the response
+is correct in every rotation of the options.
 
 {CANARY}
 """

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from iqtt.files.reader import QuestionRecord
 from iqtt.files.truth import QuestionTruth
 from iqtt.questions.distractors import Shapes
 from iqtt.questions.packing import Question, pack_questions
@@ -54,6 +55,19 @@ def draw_pictures(
         upper, lower = rays[:, :, 0], rays[:, :, 1]
         means = (upper[:, :, :, 0] + upper[:, :, :, 1] + lower[:, :, :, 0] + lower[:, :, :, 1]) / 4
         yield from encoded(means).reshape(-1, images, height, width, 3)
+
+
+def stored_pictures(record: QuestionRecord, size: int) -> Array:
+    """Return the images of a file as pictures, (1 + K, H, W, 3) sRGB uint8.
+
+    Larger images are made smaller until their shorter side has `size` pixels; others stay.
+    """
+    pictures = srgb_bytes(np.nan_to_num(record.radiance))
+    shorter = min(pictures.shape[1:3])
+    if shorter <= size:
+        return pictures
+    height, width = (round(side * size / shorter) for side in pictures.shape[1:3])
+    return np.stack([np.asarray(Image.fromarray(x).resize((width, height))) for x in pictures])
 
 
 def encoded(radiance: Array) -> NDArray[np.uint8]:

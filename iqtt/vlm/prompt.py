@@ -1,5 +1,6 @@
 """What a model is asked: words, and the sizes of pictures."""
 
+from iqtt.perspective import columns as rooms
 from iqtt.vlm.reading import LETTERS
 
 SMALLEST, SIZE, LARGEST = 64, 512, 1024  # pixels of a picture's shorter side
@@ -8,6 +9,7 @@ RULE = (
     " picture of it. One of the answers shows the same shape as the reference, turned in space. The"
     " other answers show other shapes, and these may be the mirror image of the reference."
 )
+ASK = "Which answer shows the same shape as the reference?"
 # Not a sentence to be learned: whoever trains on text with this mark has trained on test data.
 CANARY = "pix2shape-bench:canary:5b0c1e0a-6f0e-4c39-9a7d-2f4f0d9c7e61"
 
@@ -17,14 +19,18 @@ def letters(answers: int) -> str:
     return f"{', '.join(LETTERS[: answers - 1])} or {LETTERS[answers - 1]}"
 
 
-def question_text(answers: int, layout: str = "composed", with_reference: bool = True) -> str:
+def question_text(
+    answers: int, layout: str = "composed", with_reference: bool = True, of_rooms: bool = False
+) -> str:
     """Return the question.
 
     Args:
         answers: how many there are, 2 or 3.
         layout: "composed" for one picture of all, or "separate" for one picture each.
         with_reference: False asks without the reference, for a control.
+        of_rooms: whether it is about furnished rooms, not shapes.
     """
+    rule, ask = (rooms.RULE, rooms.ASK) if of_rooms else (RULE, ASK)
     names = ", ".join(LETTERS[:answers])
     if layout == "separate":
         shown = f"The first picture is the reference. The next {answers} pictures are {names}."
@@ -33,5 +39,4 @@ def question_text(answers: int, layout: str = "composed", with_reference: bool =
         shown = f"The picture shows the reference above, and the answers {names} below."
         shown = shown if with_reference else f"The picture shows the answers {names}."
     hidden = "" if with_reference else " The reference is not shown to you: guess."
-    ask = "Which answer shows the same shape as the reference?"
-    return f"{shown}{hidden} {RULE}\n\n{ask} Answer with one letter: {letters(answers)}."
+    return f"{shown}{hidden} {rule}\n\n{ask} Answer with one letter: {letters(answers)}."

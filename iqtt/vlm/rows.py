@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from iqtt.files.reader import QuestionsFile, answers_beside
 from iqtt.files.truth import QuestionTruth
 from iqtt.floors import floors_of
+from iqtt.perspective.columns import RoomTruth
 from iqtt.questions.kinds import DISTRACTOR_KINDS, question_kind
-from iqtt.questions.specs import SplitSpec
-from iqtt.vlm.pictures import composed, draw_pictures, png, stored_question
-from iqtt.vlm.prompt import SIZE, question_text
+from iqtt.questions.specs import QuestionSpec, SplitSpec
+from iqtt.vlm.pictures import composed, draw_pictures, png, stored_pictures, stored_question
+from iqtt.vlm.prompt import LARGEST, SIZE, SMALLEST, question_text
 from iqtt.vlm.reading import LETTERS
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
@@ -70,6 +71,7 @@ class Row:
         answer: the right letter; None where it is withheld.
         facts: kind, angle, cubes, shape and floor, as `truth` has them; None where withheld.
         digest: fingerprint of the table that the question is from.
+        of_rooms: whether it is about furnished rooms, not shapes.
     """
 
     id: str
@@ -82,6 +84,7 @@ class Row:
     answer: str | None
     facts: dict[str, Any]
     digest: str
+    of_rooms: bool = False
 
     @cached_property
     def image(self) -> bytes:
@@ -101,7 +104,7 @@ class Row:
     @property
     def question(self) -> str:
         """The text, as the layout wants it."""
-        return question_text(len(self.letters), self.layout, self.with_reference)
+        return question_text(len(self.letters), self.layout, self.with_reference, self.of_rooms)
 
     def control(self) -> "Row":
         """Return the same row without its reference."""
@@ -133,12 +136,26 @@ def vlm_rows(asked: Asked) -> Iterator[Row]:
         for start in range(0, len(items), AT_ONCE):
             chosen = items[start : start + AT_ONCE]
             truths = [truth for row in chosen if (truth := questions.truth(row)) is not None]
-            shown = [stored_question(questions.spec, truth) for truth in truths]
-            drawn = draw_pictures(questions.spec, shown, asked.size, asked.device)
+            drawn = _drawn(asked, questions, chosen, truths)
             for row, truth, pictures in zip(chosen, truths, drawn, strict=True):
                 answer = int(questions.read("answers", row)) if tell else None
                 for rotation in range(rotations):
                     yield _row(asked, questions, row, rotation, pictures, truth, answer)
+
+
+def _drawn(
+    asked: Asked,
+    questions: QuestionsFile,
+    rows: Sequence[int],
+    truths: Sequence[QuestionTruth | RoomTruth],
+) -> Iterator[Array]:
+    """Yield the pictures of questions: of shapes drawn anew, of rooms those of the file."""
+    if not isinstance(questions.spec, SplitSpec):
+        check(SMALLEST <= asked.size <= LARGEST, "size", asked.size,
+              f"from {SMALLEST} to {LARGEST} pixels")  # fmt: skip
+        return (stored_pictures(questions[row], asked.size) for row in rows)
+    shown = [stored_question(questions.spec, t) for t in truths if isinstance(t, QuestionTruth)]
+    return draw_pictures(questions.spec, shown, asked.size, asked.device)
 
 
 def _opened(asked: Asked) -> QuestionsFile:
@@ -174,15 +191,19 @@ def _rotations(asked: Asked, questions: QuestionsFile) -> int:
     return asked.rotations
 
 
-def _facts(truth: QuestionTruth, spec: SplitSpec) -> dict[str, Any]:
+def _facts(truth: QuestionTruth | RoomTruth, spec: QuestionSpec) -> dict[str, Any]:
     codes = [-1 if k is None else DISTRACTOR_KINDS.index(k) for k in truth.distractor_kind]
     kind = question_kind(codes)
     floor = floors_of(spec).get(kind)
+    if isinstance(truth, RoomTruth):  # no two questions are about one room
+        cubes, cluster = None, truth.scenes[0].to_json().encode()
+    else:
+        cubes, cluster = int(truth.cubes.shape[1]), truth.class_id[0]
     return {
         "kind": kind,
         "angle": round(truth.angle_degrees, 3),
-        "cubes": int(truth.cubes.shape[1]),
-        "shape": hashlib.sha256(truth.class_id[0]).hexdigest()[:16],
+        "cubes": cubes,
+        "shape": hashlib.sha256(cluster).hexdigest()[:16],
         "floor": None if floor is None else floor.accuracy,
     }
 
@@ -193,7 +214,7 @@ def _row(
     index: int,
     rotation: int,
     pictures: Array,
-    truth: QuestionTruth,
+    truth: QuestionTruth | RoomTruth,
     answer: int | None,
 ) -> Row:
     count = questions.answers
@@ -211,4 +232,5 @@ def _row(
         answer=None if answer is None else LETTERS[(answer - rotation) % count],
         facts=dict.fromkeys(facts) if answer is None else facts,
         digest=questions.fingerprint or "",
+        of_rooms=isinstance(truth, RoomTruth),
     )

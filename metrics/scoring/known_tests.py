@@ -61,6 +61,16 @@ _ROOMS = {  # purpose, rows, command
         1500,
         f"{_RENDER} --seed 1000 --size 64 --preset shapenet --object-split test",
     ),
+    "solids-1": (
+        "basic shapes with all surfaces along each ray",
+        300,
+        "scenegen render --n 300 --seed 1000 --with layers",
+    ),
+    "solids-objects-1": (
+        "built-in objects of the test split, with all surfaces along each ray",
+        300,
+        "scenegen render --n 300 --seed 1000 --preset shapenet --object-split test --with layers",
+    ),
     "interiors-512-1": (
         "furnished rooms, for networks trained on photographs",
         400,
@@ -90,6 +100,14 @@ _DIGESTS = {
     "objects-1": (
         "d8a28d7e6ef90885a4f649b51adcbb30096547b5ab00df71931ba87834788101",
         "1382577a054c986325744e6dc76009e5a68743c9279e064b66b2bc85a32f7101",
+    ),
+    "solids-1": (
+        "e57a597a9d00da0b2570b6805e92b15f854fd4c788540650c648bb99add4ece5",
+        "1361175ee119e39feeffd380f052f2c00e78e629c14f6464bdbd437414d25a0f",
+    ),
+    "solids-objects-1": (
+        "c756eba3c930d3571fffce9bc0314100a981940cd70de1ee0958292a3c3374eb",
+        "3fcd7d386d972db1c715da962a028499a028dc1b60ac761abffc97946824d3a3",
     ),
     "interiors-512-1": (
         "1faa5b6fe7dc1ac382718288dc67b3b2ee788a278b718d3030be4ba38b383e22",

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
 
 Array = NDArray[Any]
-LABELS = ("distractor_kind", "angle_degrees")  # by which accuracy is told, where a file has them
 ANGLE_BINS = (0, 30, 60, 90, 120, 150, 180)  # degrees, of IQTT's rotations
 
 
@@ -41,7 +40,7 @@ def score_questions(
     from iqtt.questions.kinds import question_kind
 
     files, truth = runs.files, runs.truth
-    names = ("answers", *(LABELS if truth.has_truth else ()))
+    names = [name for name in truth.SCORED if name in truth.fields]
     columns = {name: np.asarray(truth.read(name, slice(None))) for name in names}
     if truth.has_truth:
         _check_kinds(truth, columns["distractor_kind"], columns["answers"])
@@ -132,9 +131,9 @@ def _shapes(truth: "AnswersFile") -> Array | None:
     """Return a number for the shape of each reference, (Q,), in order of first appearance.
 
     Shapes that are mirror images of each other have one number. None where the file, as those that
-    were released, does not tell the shapes.
+    were released, does not tell the shapes, or is about rooms, none of which comes twice.
     """
-    if not truth.has_truth:
+    if "class_id" not in truth.fields:
         return None
     references = np.asarray(truth.read("class_id", slice(None)))[:, 0]
     _, first, index = np.unique(references, axis=0, return_index=True, return_inverse=True)

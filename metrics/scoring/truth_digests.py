@@ -136,5 +136,6 @@ def file_digests(path: Path, task: str) -> tuple[str, str, int]:
     with QuestionsFile(path.with_name(path.name.replace("-answers", ""))) as questions:
         pictures = questions.stored_digests()["questions"]
     with AnswersFile(path) as answers:
-        columns = {name: answers.read(name, slice(None)) for name in OF_ANSWERS}
+        names = [name for name in OF_ANSWERS if name in answers.fields]
+        columns = {name: answers.read(name, slice(None)) for name in names}
         return answers_digest(answers, columns), pictures, len(answers)

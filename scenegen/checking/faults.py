@@ -27,10 +27,12 @@ Array = NDArray[Any]
 Error = Callable[[Sequence[View]], float]
 Undo = Callable[[View], View]
 BETTER = 0.5  # share of a disagreement that may remain
-# The same of a principal point: half a pixel of a large image is little beside the steps of depths.
+# The same of a principal point, between posed views: beside the steps in which depths are stored,
+# half a pixel of a large image is little.
 BETTER_SHIFT = 0.75
 BETTER_COLORS = 0.6  # the same of colours, which differ where surfaces shine
 ALIKE = 1.05  # factor within which two explanations count as the same: the first is taken
+MOST_STEPS = 60  # of the search for a principal point
 MOST = 3  # mistakes that are undone one after another
 LEAST_FACTOR = 0.002  # logarithm of a focal length or unit that is worth a word
 LEAST_SHIFT = 0.2  # pixels of a principal point that are worth a word
@@ -48,6 +50,9 @@ NAMED = {
     "x -y -z": "y and z have the other sign (OpenGL's y up for OpenCV's y down, or the reverse)",
     "-x -y z": "x and y have the other sign (turned by 180 degrees)",
 }
+FLIPS = {  # by the axes of a map
+    (1,): "mirrored, left for right", (0,): "upside down", (0, 1): "turned by 180 degrees",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -78,17 +83,23 @@ class _Guess:
     undo: Undo
 
 
-def geometry_faults(views: Sequence[View], error: Error) -> tuple[list[Fault], Sequence[View]]:
-    """Return the mistakes of depth and cameras that explain an error, and the views without."""
+def geometry_faults(
+    views: Sequence[View], error: Error, least: float
+) -> tuple[list[Fault], Sequence[View]]:
+    """Return the mistakes of depth and cameras that explain an error, and the views without.
+
+    An error of `least` or less is that of the steps in which values are stored.
+    """
     found: list[Fault] = []
-    while len(found) < MOST and (before := error(views)) > 0:
+    while len(found) < MOST and (before := error(views)) > least:
         tried = [
             (guess, float(np.nan_to_num(error([guess.undo(v) for v in views]), nan=np.inf)))
             for guess in _guesses(views, error)
         ]
         least = min(after for _, after in tried)
         guess, after = next(one for one in tried if one[1] <= ALIKE * least)
-        most = BETTER_SHIFT if guess.name == "principal-point" else BETTER
+        is_shift = guess.name == "principal-point" and views[0].world_from_camera is not None
+        most = BETTER_SHIFT if is_shift else BETTER
         if not after <= most * before or guess.name in {fault.name for fault in found}:
             break
         views = [guess.undo(view) for view in views]
@@ -105,13 +116,16 @@ def _guesses(views: Sequence[View], error: Error) -> Iterator[_Guess]:
                      lambda v: replace(v, depth=v.depth / v.stretch()))  # fmt: skip
         yield _Guess("planar", (1 - 1 / far,), "depth is planar where distance along the ray is"
                      " expected", lambda v: replace(v, depth=v.depth * v.stretch()))  # fmt: skip
-    yield _Guess("mirrored", (), "depth is mirrored, left for right", _mirrored)
-    yield _Guess("upside-down", (), "depth is upside down", _upside_down)
+    for name, axis in (("mirrored", 1), ("upside-down", 0)):
+        yield _Guess(name, (), f"depth is {FLIPS[axis,]}", partial(_flipped, axis=axis))
     if first.world_from_camera is not None:
         for inverse in (False, True):
             for turn in PROPER[not inverse :]:
-                undo = _turned(turn, inverse)
-                yield _Guess("poses", (), _pose_text(turn, inverse), undo)
+                text = f"poses are of cameras whose {_axes(turn)}"
+                if inverse:
+                    text = "poses are inverse (camera from world for world from camera, or reverse)"
+                undo = partial(_posed, turn=turn, inverse=inverse)
+                yield _Guess("poses", (), text, undo)
         if factor := _factor(views, error, _in_unit, (1e-4, 1e4), 120):
             unit = next((f", {text}" for f, text in UNITS.items()
                          if abs(np.log(factor / f)) < 0.02), "")  # fmt: skip
@@ -122,65 +136,39 @@ def _guesses(views: Sequence[View], error: Error) -> Iterator[_Guess]:
         yield _Guess("focal", (factor,), text, partial(_focal, factor=1 / factor))
     x, y = _shift(views, error)
     if np.hypot(x, y) >= LEAST_SHIFT:
-        text = f"the principal point is off by ({x:+.2f}, {y:+.2f}) pixels (x right, y down)"
+        text = f"the principal point is off by {x:+.2f}, {y:+.2f} pixels (right, down)"
         yield _Guess("principal-point", (x, y), text, partial(_shifted, x=-x, y=-y))
 
 
-def _mirrored(view: View) -> View:
-    depth = None if view.depth is None else view.depth[:, ::-1]
-    pixels = view.pixels
+def _flipped(view: View, axis: int) -> View:
+    depth, pixels, across = view.depth, view.pixels, 1 - axis
     if pixels is not None:
-        pixels = np.column_stack([2 * view.matrix[0, 2] - pixels[:, 0], pixels[:, 1]])
-    return replace(view, depth=depth, pixels=pixels)
+        pixels = pixels.copy()
+        pixels[:, across] = 2 * view.matrix[across, 2] - pixels[:, across]
+    return replace(view, depth=None if depth is None else np.flip(depth, axis), pixels=pixels)
 
 
-def _upside_down(view: View) -> View:
-    depth = None if view.depth is None else view.depth[::-1]
-    pixels = view.pixels
-    if pixels is not None:
-        pixels = np.column_stack([pixels[:, 0], 2 * view.matrix[1, 2] - pixels[:, 1]])
-    return replace(view, depth=depth, pixels=pixels)
+def _posed(view: View, turn: Array, inverse: bool) -> View:
+    pose = view.world_from_camera
+    assert pose is not None
+    pose = np.linalg.inv(pose) if inverse else pose.copy()
+    pose[:3, :3] = pose[:3, :3] @ turn
+    return replace(view, world_from_camera=pose)
 
 
-def _turned(turn: Array, inverse: bool) -> Undo:
-    whole = np.eye(4)
-    whole[:3, :3] = turn
-
-    def undo(view: View) -> View:
-        pose = view.world_from_camera
-        assert pose is not None
-        return replace(view, world_from_camera=(np.linalg.inv(pose) if inverse else pose) @ whole)
-
-    return undo
-
-
-def _pose_text(turn: Array, inverse: bool) -> str:
-    letters = _letters(turn)
-    axes = NAMED.get(letters, f"their axes are {letters.replace(' ', ', ')}")
-    if not inverse:
-        return f"poses are of cameras whose {axes}" if letters in NAMED else f"of poses {axes}"
-    text = "poses are inverse: camera from world where world from camera is expected, or reverse"
-    return text if letters in ("x y z", "x -y -z") else f"{text}; {axes}"
-
-
-def _letters(turn: Array) -> str:
-    signs = ("-" if row.min() < 0 else "" for row in turn)
-    return " ".join(
-        s + "xyz"[int(np.abs(row).argmax())] for s, row in zip(signs, turn, strict=True)
-    )
+def _axes(turn: Array) -> str:
+    """Return in words which axes of the right frame hold x, y and z."""
+    letters = " ".join("-" * int(row.min() < 0) + "xyz"[int(np.abs(row).argmax())] for row in turn)
+    return NAMED.get(letters, f"axes are {letters.replace(' ', ', ')}")
 
 
 def _in_unit(view: View, factor: float) -> View:
-    """Return a view whose depth is so many times as large, of a world in the depth's unit."""
+    """Return a view whose depth, or points, are so many times as large beside its pose."""
     pose = view.world_from_camera
     assert pose is not None
-    moved = pose.copy()
-    moved[:3, 3] /= factor
-    return replace(view, world_from_camera=moved, points=_scaled(view.points, 1 / factor))
-
-
-def _scaled(points: Array | None, factor: float) -> Array | None:
-    return None if points is None else points * factor
+    pose = pose.copy()
+    pose[:3, 3] /= factor
+    return replace(view, world_from_camera=pose)
 
 
 def _focal(view: View, factor: float) -> View:
@@ -215,75 +203,69 @@ def _shift(views: Sequence[View], error: Error) -> tuple[float, float]:
     def tried(at: tuple[float, float]) -> float:
         return error([_shifted(view, *at) for view in views])
 
-    x, y = 0.0, 0.0
-    step = 0.5
-    while step > 0.05:
+    x, y, step = 0.0, 0.0, 4.0
+    for _ in range(MOST_STEPS):
         around = [(x + i * step, y + j * step) for i in (0, -1, 1) for j in (0, -1, 1)]
         best = min(around, key=tried)
         if best == (x, y):
             step /= 2
+        if step < 0.05:
+            break
         x, y = best
     return -x, -y
 
 
-FLIPPED = (
-    ("mirrored, left for right", np.s_[:, ::-1], np.diag([-1.0, 1.0, 1.0])),
-    ("upside down", np.s_[::-1], np.diag([1.0, -1.0, 1.0])),
-)  # maps in these orders, and what becomes of vectors
-
-
 def normal_faults(views: Sequence[View]) -> tuple[list[Fault], float]:
     """Return what is wrong with normals, and the error that remains; NaN without normals."""
-    before = normal_error(views)
+    before, tried = normal_error(views), dict[str, float]()
     if not np.isfinite(before):
         return [], before
-    best, text = before, ""
-    for words, order, turn in FLIPPED:
-        for signs in (turn, np.eye(3)):
-            mirrored = [
-                v if v.normal is None else replace(v, normal=v.normal[order] @ signs) for v in views
-            ]
-            after = normal_error(mirrored)
-            if after < best / ALIKE:
-                best, text = after, f"normals are {words}, and depth is not"
+    for axis in (1, 0):
+        signs = np.where(np.arange(3) == 1 - axis, -1, 1)
+        flipped = _changed(views, "normal", partial(np.flip, axis=axis))
+        pairs = [normals_of_depth(view) for view in flipped]
+        errors = [apart([(n * s, expected) for n, expected in pairs]) for s in (signs, 1)]
+        tried[f"normals are {FLIPS[axis,]}, and depth is not"] = min(errors)
     pairs = [normals_of_depth(view) for view in views]
     poses = [view.world_from_camera for view in views]
-    for of_world in (False, True):
-        if of_world and any(pose is None for pose in poses):
-            break
-        for turn in TURNS:
-            whole = [pose[:3, :3].T @ turn if of_world and pose is not None else turn
-                     for pose in poses]  # fmt: skip
-            turned = [(n @ w.T, expected) for (n, expected), w in zip(pairs, whole, strict=True)]
-            after = apart(turned)
-            if after < best / ALIKE:
-                best, text = after, _normal_text(turn, of_world)
-    if not best <= BETTER * before:
+    for turn in TURNS:
+        turned = [(n @ turn.T, expected) for n, expected in pairs]
+        tried.setdefault(f"normals are in another frame: {_axes(turn)}", apart(turned))
+        turned = [
+            (n @ (pose[:3, :3].T @ turn).T, expected)
+            for (n, expected), pose in zip(pairs, poses, strict=True)
+            if pose is not None
+        ]
+        text = "normals are in the world frame, not in the camera's"
+        tried[text] = min(tried.get(text, np.inf), float(np.nan_to_num(apart(turned), nan=np.inf)))
+    return _best("normals", tried, before, BETTER)
+
+
+def _changed(views: Sequence[View], name: str, change: Callable[[Array], Array]) -> list[View]:
+    """Return views with another map of this name, where they have one."""
+    maps = [getattr(view, name) for view in views]
+    return [
+        view if values is None else replace(view, **{name: change(values)})
+        for view, values in zip(views, maps, strict=True)
+    ]
+
+
+def _best(
+    name: str, tried: dict[str, float], before: float, most: float
+) -> tuple[list[Fault], float]:
+    """Return the text whose error is the least, if that explains an error; and what remains."""
+    text, after = min(tried.items(), key=lambda one: one[1])
+    if not after <= most * before:
         return [], before
-    return [Fault("normals", (), text, before, best)], best
-
-
-def _normal_text(turn: Array, of_world: bool) -> str:
-    letters = _letters(turn)
-    if of_world:
-        return "normals are in the world frame, not in the camera's"
-    axes = NAMED.get(letters, f"their axes are {letters.replace(' ', ', ')}")
-    return f"normals are in another frame: {axes}"
+    return [Fault(name, (), text, before, after)], after
 
 
 def image_faults(views: Sequence[View], pairs: Sequence[Pair]) -> tuple[list[Fault], float]:
     """Return what is wrong with images, and the error that remains; NaN for none."""
-    flips: dict[str, Callable[[Array], Array]] = {
-        "images are mirrored, left for right, and depth is not": lambda image: image[:, ::-1],
-        "images are upside down, and depth is not": lambda image: image[::-1],
-        "images are turned by 180 degrees, and depth is not": lambda image: image[::-1, ::-1],
+    tried = {
+        f"images are {words}, and depth is not": color_error(
+            _changed(views, "image", partial(np.flip, axis=axes)), pairs
+        )
+        for axes, words in FLIPS.items()
     }
-    before = color_error(views, pairs)
-    tried = {}
-    for text, flip in flips.items():
-        flipped = [v if v.image is None else replace(v, image=flip(v.image)) for v in views]
-        tried[text] = color_error(flipped, pairs)
-    text, after = min(tried.items(), key=lambda one: one[1])
-    if not after <= BETTER_COLORS * before:
-        return [], before
-    return [Fault("images", (), text, before, after)], after
+    return _best("images", tried, color_error(views, pairs), BETTER_COLORS)

@@ -6,9 +6,10 @@ A reader returns the views of each scene in order, each as a function that reads
 import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import h5py
 import numpy as np
@@ -29,22 +30,15 @@ WRONG = (KeyError, TypeError, ValueError, IndexError)  # what readers of broken 
 Scenes = list[list[Load]]
 
 
-class Layout(NamedTuple):
-    """A layout: the file by which it is told, as a pattern below a folder, and its reader."""
-
-    file: str
-    read: Callable[[list[Path]], Scenes]
-
-
 def scenes_of(folder: Path) -> tuple[str, Scenes]:
     """Return the name of a folder's layout, and the views of its scenes.
 
     Raises FileFormatError where it has none of LAYOUTS, or a file is damaged; OSError.
     """
-    for name, layout in LAYOUTS.items():
-        if paths := sorted(folder.rglob(layout.file)):
-            return name, layout.read(paths)
-    files = ", ".join(layout.file for layout in LAYOUTS.values())
+    for name, (file, read) in LAYOUTS.items():
+        if paths := sorted(folder.rglob(file)):
+            return name, read(paths)
+    files = ", ".join(file for file, _ in LAYOUTS.values())
     raise FileFormatError(folder, "no layout that is known", f"one of the files {files}")
 
 
@@ -83,28 +77,16 @@ def _codes(path: Path) -> tuple[Array, dict[Any, Any]]:
         return np.asarray(picture), {**picture.info}
 
 
-def _normal(path: Path | None, largest: float = 255.0) -> Array | None:
+def _normal(path: Path | None) -> Array | None:
     """Return normals, x right, y up, z to the viewer in files, with y down and z forward."""
     if path is None or not path.is_file():
         return None
-    values = read_picture(path, MOST_PIXELS) if largest == 255 else _png(path)
-    return _known_normals(values / largest * 2 - 1) * [1, -1, -1]
+    return _known_normals(read_picture(path, MOST_PIXELS) / 255 * 2 - 1) * [1, -1, -1]
 
 
 def _known_normals(values: Array) -> Array:
     length = np.linalg.norm(values, axis=-1, keepdims=True)
     return np.where(np.abs(length - 1) < 0.1, values / np.maximum(length, 1e-9), np.nan)
-
-
-def _png(path: Path) -> Array:
-    """Return a PNG file of three channels of 16 bits, which Pillow would cut to 8."""
-    import png
-
-    try:
-        width, height, rows, _ = png.Reader(bytes=path.read_bytes()).read()
-        return np.vstack([np.asarray(row) for row in rows]).reshape(height, width, -1)[..., :3]
-    except (png.Error, ValueError) as error:
-        raise FileFormatError(path, f"{error!s:.60}", "a PNG file") from error
 
 
 def _image(path: Path) -> Array | None:
@@ -173,12 +155,8 @@ def _of_colmap(folder: Path) -> list[Load]:
             places = np.array([points[point] for point in seen[:, 2]], float)
             view = View(cameras[about[8]], world_from_camera=np.linalg.inv(pose), points=places,
                         pixels=seen[:, :2].astype(float))  # fmt: skip
-            found.append(partial(_same, view))
+            found.append(partial(replace, view))
     return found
-
-
-def _same(view: View) -> View:
-    return view
 
 
 def bop(paths: list[Path]) -> Scenes:
@@ -220,7 +198,7 @@ def _of_moge(folder: Path) -> View:
     return View(
         np.array(_json(folder / "meta.json")["intrinsics"]) * [[width], [height], [1]],
         depth=np.where(known, depth, np.nan),
-        normal=_normal(folder / "normal.png", 65535.0),
+        normal=_normal(folder / "normal.png"),
         image=_image(folder / "image.jpg"),
     )
 
@@ -265,10 +243,10 @@ def _hdf5(path: Path) -> Array:
         raise FileFormatError(path, f"{error!s:.60}", "a file of Hypersim") from error
 
 
-LAYOUTS = {
-    "nerfstudio": Layout("transforms.json", nerfstudio),
-    "COLMAP": Layout("cameras.txt", colmap),
-    "BOP": Layout("scene_camera.json", bop),
-    "MoGe": Layout("meta.json", moge),
-    "Hypersim": Layout("frame.*.depth_meters.hdf5", hypersim),
+LAYOUTS: dict[str, tuple[str, Callable[[list[Path]], Scenes]]] = {  # told by a file, and read
+    "nerfstudio": ("transforms.json", nerfstudio),
+    "COLMAP": ("cameras.txt", colmap),
+    "BOP": ("scene_camera.json", bop),
+    "MoGe": ("meta.json", moge),
+    "Hypersim": ("frame.*.depth_meters.hdf5", hypersim),
 }

@@ -131,7 +131,7 @@ def render(
     assets = {name: chosen.pop(name, None) for name in ("materials", "environment")}
     source = object_source(preset, **objects)
     spec = _with_assets(preset_spec(preset, **chosen, **source.settings), **assets)
-    spec, notes = _with_denoiser(spec, chosen)
+    spec, notes = with_denoiser(spec, chosen)
     notes += _crowded(spec)
     images = count * len(spec.view_angles)
     started = time.perf_counter()
@@ -187,16 +187,15 @@ def _with_assets(spec: "Request", materials: str | None, environment: str | None
     return replace(spec, **settings)
 
 
-def _with_denoiser(spec: "Request", chosen: Mapping[str, Any]) -> "tuple[Request, list[str]]":
+def with_denoiser(spec: Any, chosen: Mapping[str, Any]) -> tuple[Any, list[str]]:
     """Return a spec with a denoiser, or else with more samples, unless the options decide.
 
-    The lines say that the denoiser is missing. Raises BackendError where no
-    denoiser is installed, and one is asked for.
+    `spec` has the settings `denoise` and `spp`, or neither. The lines say that the denoiser is
+    missing. Raises BackendError where no denoiser is installed, and one is asked for.
     """
-    from scenegen.description.specs import InteriorSpec
     from scenegen.rendering.pictures.denoiser import check_denoiser, has_denoiser
 
-    if not isinstance(spec, InteriorSpec):
+    if not hasattr(spec, "denoise"):
         return spec, []
     if spec.denoise:
         check_denoiser()

@@ -1,7 +1,7 @@
 """The basic shapes: one record each, from which defaults, builders, tests and docs derive.
 
 To add one: a record at the end of BASIC_SHAPES, not `drawn`, as files of today name what they were
-drawn from; a function in `objects.basic_shapes`; a row in docs/objects.md.
+drawn from; a function in `objects.basic_shapes`; a row in docs/data/basic-shapes.csv.
 """
 
 import math

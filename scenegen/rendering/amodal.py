@@ -36,6 +36,24 @@ def amodal_masks(batch: SceneBatch, device: str = "auto") -> NDArray[np.bool_]:
     return masks
 
 
+def whole_pixels(batch: SceneBatch, image: Array, slot: Array, device: str = "auto") -> Array:
+    """Return how many pixels objects would fill if nothing hid them, (n,).
+
+    Parts beyond the border of an image count, too, up to half an image away from it.
+
+    Args:
+        image, slot: an image of the batch and a slot of objects, (n,) each.
+
+    Raises BackendError as `renderer.render`.
+    """
+    spec = replace(batch.spec, height=2 * batch.spec.height, width=2 * batch.spec.width)
+    halves = np.tan(np.radians(batch.fov_y_degrees) / 2)
+    fov = np.degrees(2 * np.arctan(2 * halves))  # pixels keep their size
+    alone = _alone(replace(batch, spec=spec, fov_y_degrees=fov), image, slot)
+    ids = launch_fields(alone, ("object_id",), device)()["object_id"]
+    return np.asarray(np.count_nonzero(ids > 0, axis=(1, 2)))
+
+
 def wide_masks(batch: SceneBatch, device: str = "auto") -> NDArray[np.bool_]:
     """Return `amodal_masks` on a canvas of three by three images, (B, K, 3H, 3W).
 

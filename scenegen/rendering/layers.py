@@ -50,11 +50,13 @@ class Layers:
         depth: planar, float32, ascending; NaN behind the last surface.
         object_id: int8, as in `GroundTruth`; -1 behind the last surface.
         entering: int8, ENTERS, LEAVES or OPEN.
+        closed: which object slots consist of closed parts alone, 1 or 0, (K,) uint8.
     """
 
     depth: Array
     object_id: Array
     entering: Array
+    closed: Array
 
 
 def layers_of(batch: SceneBatch, image: int, depth: Array, object_id: Array) -> Layers:
@@ -63,43 +65,31 @@ def layers_of(batch: SceneBatch, image: int, depth: Array, object_id: Array) -> 
     fov, count = float(batch.fov_y_degrees[image]), int(batch.object_count[image])
     rotation = np.swapaxes(batch.world_from_camera[image, :3, :3], 0, 1)
     view = np.concatenate([rotation, -product(rotation, batch.world_from_camera[image, :3, 3:])], 1)
-    parts = []
+    parts, closed = [], np.zeros(batch.spec.object_slots, np.uint8)
     for k in range(count):
         name = batch.names[batch.shape[image, k]]
         placed = product(view, batch.world_from_object[image, k])
-        surface = _surface_of(batch, name)
+        surface = batch.shape_of(name).surface if batch.spec.source == "shapes" else None
         if surface is not None:
+            closed[k] = 1
             parts.append(_surface_crossings(surface, placed, height, width, fov))
         else:
-            vertices, faces, closed = _model(batch.shape_of, name)
+            vertices, faces, whole = _model(batch.shape_of, name)
+            closed[k] = whole.all()
             vertices = product(vertices, placed[:, :3].T) + placed[:, 3]
-            parts.append(solid_crossings(vertices[faces], closed, height, width, fov))
+            parts.append(solid_crossings(vertices[faces], whole, height, width, fov))
     # Of other rays, the first layer is the only one.
     layered = (object_id > 0).ravel()
     for part in parts:
         layered[part.pixel] = True
     parts.append(_room_crossings(batch, image, view, layered, depth.shape))
     ids = np.repeat([*range(1, count + 1), 0], [len(part.pixel) for part in parts])
-    layers = stacked(parts, ids, height, width)
+    depths, numbers, entering = stacked(parts, ids, height, width)
+    layers = Layers(depths, numbers, entering, closed)
     single = ~layered.reshape(depth.shape)
     layers.depth[single, 0], layers.object_id[single, 0] = depth[single], object_id[single]
     _begin_with(layers, depth, object_id)
     return layers
-
-
-def _surface_of(batch: SceneBatch, name: str) -> Surface | None:
-    """Return the exact surface of a basic shape, None of others."""
-    return batch.shape_of(name).surface if batch.spec.source == "shapes" else None
-
-
-def closed_objects(batch: SceneBatch, image: int) -> NDArray[np.uint8]:
-    """Return which objects of an image consist of closed parts alone, 1 or 0, (K,)."""
-    found = np.zeros(batch.spec.object_slots, np.uint8)
-    for k, number in enumerate(batch.shape[image, : batch.object_count[image]].tolist()):
-        name = batch.names[number]
-        exact = _surface_of(batch, name) is not None
-        found[k] = exact or _model(batch.shape_of, name)[2].all()
-    return found
 
 
 @recent(200_000_000)
@@ -306,8 +296,11 @@ def _room_crossings(
     return Crossings(pixel[meets], depth[meets], np.full(meets.sum(), OPEN))
 
 
-def stacked(parts: list[Crossings], ids: Array, height: int, width: int) -> Layers:
-    """Return crossings of several objects, ids (n,) of all, as the first MOST_LAYERS layers."""
+def stacked(parts: list[Crossings], ids: Array, height: int, width: int) -> list[Array]:
+    """Return crossings of several objects, ids (n,) of all, as the first MOST_LAYERS layers.
+
+    They are `depth`, `object_id` and `entering` of `Layers`.
+    """
     pixel, depth, kind = (
         np.concatenate([getattr(part, name) for part in parts])
         for name in ("pixel", "depth", "kind")
@@ -327,9 +320,7 @@ def stacked(parts: list[Crossings], ids: Array, height: int, width: int) -> Laye
         layers[pixel[kept], rank[kept]] = values[order][kept]
         return layers.reshape(height, width, MOST_LAYERS)
 
-    return Layers(
-        image(depth, np.nan, np.float32), image(ids, -1, np.int8), image(kind, 0, np.int8)
-    )
+    return [image(depth, np.nan, np.float32), image(ids, -1, np.int8), image(kind, 0, np.int8)]
 
 
 def _begin_with(layers: Layers, depth: Array, object_id: Array) -> None:
@@ -345,9 +336,9 @@ def _begin_with(layers: Layers, depth: Array, object_id: Array) -> None:
     for row, column in np.argwhere(other).tolist():
         at = row, column
         along = [*zip(layers.depth[at], layers.object_id[at], layers.entering[at], strict=True)]
-        along = _from(
-            [x for x in along if x[1] >= 0], depth[row, column], int(object_id[row, column])
-        )[:MOST_LAYERS]
+        number = int(object_id[row, column])
+        closed = number > 0 and bool(layers.closed[number - 1])
+        along = _from([x for x in along if x[1] >= 0], depth[at], number, closed)[:MOST_LAYERS]
         along += [(np.float32(np.nan), -1, OPEN)] * (MOST_LAYERS - len(along))
         layers.depth[at], layers.object_id[at], layers.entering[at] = zip(*along, strict=True)
     late = first > layers.depth[..., 1]
@@ -355,7 +346,7 @@ def _begin_with(layers: Layers, depth: Array, object_id: Array) -> None:
 
 
 def _from(
-    along: list[tuple[Any, int, int]], depth: Any, object_id: int
+    along: list[tuple[Any, int, int]], depth: Any, object_id: int, closed: bool
 ) -> list[tuple[Any, int, int]]:
     """Return the layers of one ray as they are if it first meets this object at this depth."""
     if object_id < 0:
@@ -369,7 +360,6 @@ def _from(
         None,
     )
     if at is None:
-        closed = any(number == object_id and kind != OPEN for _, number, kind in along)
         added = [(depth, object_id, k) for k in ((ENTERS, LEAVES) if closed else (OPEN,))]
         before = [x for x in along if x[0] < depth]
         along = [*before, *added, *along[len(before) :]]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scenegen.camera import back_project, pixel_directions, transform_points, transform_vectors
 from scenegen.derived import albedo, object_coordinates, optical_flow, seen_from
 from scenegen.description.specs import Request
-from scenegen.rendering.layers import closed_objects, layers_of
+from scenegen.rendering.layers import layers_of
 from scenegen.rendering.packing import SceneBatch
 
 Array = NDArray[Any]
@@ -88,10 +88,9 @@ def further_truth(
 def stored_layers(
     batch: SceneBatch, image: int, depth: Array, object_id: Array
 ) -> dict[str, Array]:
-    """Return `layers.layers_of` and the objects that are closed, by name of the column."""
-    layers = layers_of(batch, image, depth, object_id)
-    columns = {f"layers/{name}": values for name, values in vars(layers).items()}
-    return {**columns, "object/closed": closed_objects(batch, image)}
+    """Return `layers.layers_of` by name of the column."""
+    columns = vars(layers_of(batch, image, depth, object_id))
+    return {"object/closed": columns.pop("closed"), **{f"layers/{x}": columns[x] for x in columns}}
 
 
 def visible_fraction(object_id: Array, masks: Array) -> NDArray[np.float32]:

@@ -5,6 +5,7 @@ import shutil
 import h5py
 import pytest
 from hypothesis import settings
+from perspective_splits import SETTINGS
 
 settings.register_profile("unhurried", deadline=None)  # a busy machine is no failure
 settings.load_profile("unhurried")
@@ -21,6 +22,18 @@ def split_folder(tmp_path_factory):
         width=32, min_cube_pixels=2, with_depth=True,
     )  # fmt: skip
     folder = tmp_path_factory.mktemp("iqtt") / "split"
+    make_split(folder, spec, command="tests")
+    return folder
+
+
+@pytest.fixture(scope="session")
+def rooms_folder(tmp_path_factory):
+    """Return the files of a split about rooms that no test changes: 2, 2 and 3 questions."""
+    from iqtt.files.make import make_split
+    from iqtt.perspective.specs import perspective_spec
+
+    spec = perspective_spec("perspective", train=2, val=2, test=3, **SETTINGS, with_depth=True)
+    folder = tmp_path_factory.mktemp("rooms") / "split"
     make_split(folder, spec, command="tests")
     return folder
 

@@ -46,6 +46,8 @@ FAULTS = (WITHOUT, LIGHT, MIRRORED, FRAMES)
 ERROR_RATE = 0.01  # probability that some probe of a fair set of questions seems to beat chance
 LEAST_QUESTIONS = 50  # a classifier learns nothing from fewer
 COMPONENTS = 24  # principal components of thumbnails that classifiers see
+PATCH = 8  # pixels of a thumbnail's patch
+FAR = 60.0  # degrees, from which on questions about rooms are probed apart, too
 PATTERN_QUESTIONS = 2_000  # whose pictures are searched for small patterns
 
 _LIGHT = {
@@ -114,6 +116,9 @@ class Evidence:
         frames: numbers that describe how the answers' shapes are stored next to the reference's,
             (N, K, D), as `frames.stored_frames` gives them; NaN where the file does not tell them.
         places: positions of the right answers of whole tables, in their order, (Q,) each.
+        of_rooms: whether questions are about rooms, whose light belongs to them: comparisons with
+            the reference may then beat chance.
+        angles: between the views of reference and right answer, degrees, (N,).
     """
 
     statistics: Array
@@ -122,6 +127,8 @@ class Evidence:
     cubes: dict[str, Array]
     frames: Array
     places: Sequence[Array]
+    of_rooms: bool = False
+    angles: Array | None = None
 
     @property
     def answers(self) -> int:
@@ -136,7 +143,14 @@ _Guess: TypeAlias = tuple[str, str, str, Array]
 def run_probes(evidence: Evidence) -> tuple[Probe, ...]:
     """Run all probes that the evidence allows; none without questions."""
     statistics, right = evidence.statistics, evidence.right
-    guesses = [*_by_picture(statistics, right), *_by_shape(evidence), *_by_mirror(evidence)]
+    guesses = [*_by_picture(statistics, right, evidence.of_rooms)]
+    guesses += [*_by_shape(evidence), *_by_mirror(evidence)]
+    if evidence.of_rooms and evidence.angles is not None:
+        far = evidence.angles >= FAR
+        turned = [*_by_picture(statistics[far], right[far], True)]
+        turned += _by_patches(statistics[far], right[far])
+        named = [(f"{g[0]}, from {FAR:.0f} degrees", *g[1:]) for g in turned]
+        guesses += [*_by_patches(statistics, right), *(g for g in named if g[2] == OUTLINE)]
     if len(right) >= LEAST_QUESTIONS:
         guesses += [*_learned(evidence), *_learned_outlines(statistics, right)]
     return _probes(guesses + _by_place(evidence.places, evidence.answers), evidence.answers)
@@ -182,15 +196,34 @@ def _judged(probes: Sequence[Probe]) -> list[Probe]:
     return [replace(p, beats_chance=b) for p, b in zip(probes, beats.tolist(), strict=True)]
 
 
-def _by_picture(statistics: Array, right: Array) -> Iterator[_Guess]:
+def _by_picture(statistics: Array, right: Array, of_rooms: bool = False) -> Iterator[_Guess]:
     for name, title in {**_LIGHT, **_OUTLINE}.items():
-        values, sees = statistics[name], LIGHT if name in _LIGHT else OUTLINE
+        values, sees = statistics[name], OUTLINE if of_rooms or name not in _LIGHT else LIGHT
         if values.ndim == 2:
             yield from _by_cost(title, WITHOUT, _SIZE, -values[:, 1:], right)
         yield from _by_distance(title, sees, _distances(values), right)
     yield from _by_distance("pixel distance", OUTLINE, statistics["pixel_distance"], right)
     apart = nearest_outline(statistics["outline_distance"])
     yield from _by_distance("silhouette, rotated or flipped", OUTLINE, apart, right)
+
+
+def _by_patches(statistics: Array, right: Array) -> Iterator[_Guess]:
+    """Guess by how well patches of the reference are found anywhere in each answer.
+
+    Patches have PATCH pixels a side of the thumbnails; their correlation is compared.
+    """
+    from numpy.lib.stride_tricks import sliding_window_view
+
+    shots = statistics["thumbnails"]
+    shots = shots.reshape(*shots.shape[:2], THUMBNAIL, THUMBNAIL)
+    costs = np.zeros((len(right), shots.shape[1] - 1))
+    for row, images in enumerate(shots):
+        flat = sliding_window_view(images, (PATCH, PATCH), axis=(1, 2))[:, ::2, ::2]
+        flat = flat.reshape(len(images), -1, PATCH * PATCH).astype(np.float64)
+        flat = flat - flat.mean(axis=2, keepdims=True)
+        flat /= np.maximum(np.linalg.norm(flat, axis=2, keepdims=True), 1e-6)
+        costs[row] = [-(flat[0] @ found.T).max(axis=1).mean() for found in flat[1:]]
+    yield from _by_cost("matched patches", OUTLINE, _NEARNESS, costs, right)
 
 
 def _by_shape(evidence: Evidence) -> Iterator[_Guess]:

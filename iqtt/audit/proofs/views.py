@@ -159,7 +159,7 @@ def cast_again(
 
 def _difference(questions: QuestionsFile, row: int, count: int) -> str:
     """Return how a question's images differ from its shapes and lights; "" if they do not."""
-    spec = questions.spec
+    spec: Any = questions.spec
     if spec is None:
         return ""
     names = ("questions", "cubes", "world_from_shape", "visible_pixels", "camera_distance")

@@ -40,6 +40,7 @@ class Purpose(IntEnum):
     ARRANGEMENT = 20
     VIEWPOINT = 21
     CORRUPTION = 22
+    PERSPECTIVE = 23
 
 
 def item_rng(

@@ -94,7 +94,7 @@ def read_environment(place: Path) -> Array:
         raise FileFormatError(place, f"{columns} x {rows} pixels", f"{expected}, twice as wide")
     if not np.isfinite(values).all() or (values < 0).any():
         raise FileFormatError(place, "radiance that is no finite, positive number", expected)
-    values = _reduced(values, -(-columns // MOST_COLUMNS))
+    values = block_means(values, -(-columns // MOST_COLUMNS))
     mean = float(values[: len(values) // 2].mean())
     if mean == 0.0:
         raise FileFormatError(place, "a black upper half", f"{expected}, with the sky above")
@@ -128,8 +128,8 @@ def _radiance(place: Path) -> Array:
     raise FileFormatError(place, "a low dynamic range", ENVIRONMENT)
 
 
-def _reduced(values: Array, step: int) -> Array:
-    """Return means of blocks of so many pixels a side: a small sun keeps its light."""
+def block_means(values: Array, step: int) -> Array:
+    """Return means of blocks of so many pixels a side, (H, W, C): a small sun keeps its light."""
     for axis in (0, 1):
         starts = np.arange(0, values.shape[axis], step)
         counts = np.diff(starts, append=values.shape[axis]).astype(np.float32)

@@ -56,6 +56,12 @@ def develop(radiance: Array, albedo: Array, inside: Array, dtype: str, noise: Ar
     return encode_image(tone(exposed, white, noise), dtype), found
 
 
+def redeveloped(radiance: Array, found: Array) -> Array:
+    """Return radiance, (H, W, 3), as a picture, 0 to 1, with the EXPOSURE of another one."""
+    exposed = evened(radiance.astype(np.float64) * (found[0] * found[1:4]))
+    return tone(exposed, max(float(found[4]), LEAST_WHITE))
+
+
 def evened(exposed: Array) -> Array:
     """Return exposed radiance whose bright and dark parts are nearer to KEY; edges stay sharp."""
     from scipy.ndimage import uniform_filter  # takes a while, and is seldom needed

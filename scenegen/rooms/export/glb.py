@@ -22,7 +22,7 @@ from scenegen.objects.catalogue import Objects, changed_meshes, objects_of
 from scenegen.objects.furniture.room_shell import PARTS, shell
 from scenegen.objects.scene_mesh import ScenePart, scene_parts, world_from_object
 from scenegen.rendering.materials.material import SLOPE_STEPS, Material
-from scenegen.rendering.pictures.assets import materials_of
+from scenegen.rendering.pictures.assets import block_means, materials_of
 from scenegen.rendering.pictures.matter import (
     CEILING_FLUX,
     GLOW,
@@ -175,16 +175,18 @@ class _Scene:
             if part == GLOW and self.scene.interior.lit:
                 one = self._lamp("ceiling_light", corners, CEILING_FLUX)
             faces = Faces(corners, normals[of], found.uv[of] / one.metres)
-            mesh = {"primitives": [self._primitive(faces, one, two_sided=False)]}
-            name = f"wall_{part}" if part in WALLS else part
-            yield self.gltf.add("nodes", {"name": name, "mesh": self.gltf.add("meshes", mesh)})
+            yield self._part(f"wall_{part}" if part in WALLS else part, faces, one)
 
     def _planes(self, parts: list[ScenePart]) -> Iterator[int]:
         one = _painted(self.scene.room_reflectance)
         for part in parts:
             faces = Faces(part.mesh.vertices[part.mesh.faces], part.normals)
-            mesh = {"primitives": [self._primitive(faces, one, two_sided=False)]}
-            yield self.gltf.add("nodes", {"name": part.name, "mesh": self.gltf.add("meshes", mesh)})
+            yield self._part(part.name, faces, one)
+
+    def _part(self, name: str, faces: Faces, one: Material) -> int:
+        """Add a node for a part of the room, which is seen from inside alone."""
+        mesh = {"primitives": [self._primitive(faces, one, two_sided=False)]}
+        return self.gltf.add("nodes", {"name": name, "mesh": self.gltf.add("meshes", mesh)})
 
     def _object(self, k: int, placed: Array) -> int:
         """Return the number of an object's mesh; objects of one shape and material share it."""
@@ -332,14 +334,7 @@ def _unpacked(texels: Array) -> Array:
 
 def _reduced(values: Array) -> Array:
     """Return a map, (H, W, C), of at most SIDE pixels a side, as means of blocks."""
-    for axis in (0, 1):
-        step = -(-values.shape[axis] // SIDE)
-        if step > 1:
-            starts = np.arange(0, values.shape[axis], step)
-            counts = np.diff(starts, append=values.shape[axis]).astype(np.float32)
-            shape = (-1, 1, 1) if axis == 0 else (1, -1, 1)
-            values = np.add.reduceat(values, starts, axis=axis) / counts.reshape(shape)
-    return values
+    return block_means(values, -(-max(values.shape[:2]) // SIDE))
 
 
 def _normal_map(one: Material) -> Array:

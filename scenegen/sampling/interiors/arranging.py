@@ -190,17 +190,22 @@ class Arranger:
 
         It is 0 where there is no room.
         """
+        found = self.standing(piece, box, keep)
+        return self.space.put(piece, *found) if found else 0
+
+    def standing(self, piece: Piece, box: Box, keep: bool = True) -> tuple[Box, int] | None:
+        """Return where something stands on the floor or a rug, and the number of that; or None."""
         base, number = 0.0, 0
         for i, other in enumerate(self.space.placed, start=1):
             if other.piece.family != "rug" or _beside(box, other.box):
                 continue
             if not _above(box, other.box):
-                return 0
+                return None
             base, number = other.box.top + ON, i
         box = box_at(piece, box.x, box.z, base, box.turns)
         if not self.space.within(box) or not self.space.free(box, number, floor=keep):
-            return 0
-        return self.space.put(piece, box, number)
+            return None
+        return box, number
 
     def on_floor(self, family: str, corner: bool = False, kinds: int = 2) -> int:
         """Put something on the floor near a wall, or into a corner; return its number or 0."""

@@ -25,6 +25,7 @@ class Room:
     facing_degrees: float
     lit: bool
     kind: str
+    mirrored: bool = False
 
 
 def stepped(length: float) -> float:

@@ -33,7 +33,7 @@ from scenegen.sampling.interiors.viewpoints import draw_cameras
 Array = NDArray[Any]
 STREET = 32  # rooms beside each other that are furnished from the same stock
 STOCK = 10  # models of each family in it: models take longer to make than rooms to furnish
-_Drawn = tuple[Room, list[Placed], Array, Array]
+Drawn = tuple[Room, list[Placed], Any, Any]  # camera positions and targets, (V, 3)
 
 
 def item_room(spec: InteriorSpec, index: int) -> tuple[Room, int, float]:
@@ -44,9 +44,19 @@ def item_room(spec: InteriorSpec, index: int) -> tuple[Room, int, float]:
     return room, count, spec.fov_degrees + spec.fov_spread_degrees * draws.unit()
 
 
-def draw_interior(spec: InteriorSpec, index: int, attempt: int, objects: Objects) -> _Drawn | None:
+def draw_interior(spec: InteriorSpec, index: int, attempt: int, objects: Objects) -> Drawn | None:
     """Return room, objects, camera positions and targets; None if the proposal found no room."""
-    room, count, fov = item_room(spec, index)
+    arranger = furnished(spec, index, attempt, objects)
+    if arranger is None:
+        return None
+    room, space, fov = arranger.room, arranger.space, item_room(spec, index)[2]
+    found = draw_cameras(spec, space, Draws(spec.seed, index, Purpose.VIEWPOINT, attempt), fov)
+    return None if found is None else (room, space.placed, *found)
+
+
+def furnished(spec: InteriorSpec, index: int, attempt: int, objects: Objects) -> Arranger | None:
+    """Return an item's room with its furniture; None if this attempt found no place for all."""
+    room, count, _ = item_room(spec, index)
     draws = Draws(spec.seed, index, Purpose.ARRANGEMENT, attempt)
     by_family = furniture_models(objects)
 
@@ -60,12 +70,10 @@ def draw_interior(spec: InteriorSpec, index: int, attempt: int, objects: Objects
         return None
 
     space = Space(room.size, count)
+    arranger = Arranger(room, space, draws, member, OBJECT if OBJECT in by_family else "")
     if count:
-        furnish(Arranger(room, space, draws, member, OBJECT if OBJECT in by_family else ""))
-    if len(space.placed) < count:
-        return None
-    found = draw_cameras(spec, space, Draws(spec.seed, index, Purpose.VIEWPOINT, attempt), fov)
-    return None if found is None else (room, space.placed, *found)
+        furnish(arranger)
+    return None if len(space.placed) < count else arranger
 
 
 @lru_cache(maxsize=256)
@@ -83,7 +91,7 @@ def sample_interiors(
     drawn = [draw_interior(spec, i, tried, objects) for i, tried in pairs]
     placed = np.array([found is not None for found in drawn], bool)
     found = [scene for scene in drawn if scene is not None]
-    return placed, _arrays(spec, index[placed], found, objects)
+    return placed, scene_arrays(spec, index[placed], found, objects)
 
 
 @lru_cache(maxsize=16)
@@ -93,9 +101,10 @@ def _numbers(objects: Objects, classes: tuple[str, ...]) -> dict[str, int]:
     return {name: i for i, name in enumerate(names)}
 
 
-def _arrays(
-    spec: InteriorSpec, index: Array, drawn: Sequence[_Drawn], objects: Objects
+def scene_arrays(
+    spec: InteriorSpec, index: Array, drawn: Sequence[Drawn], objects: Objects
 ) -> SceneArrays:
+    """Return drawn rooms, with as many cameras as the spec has views, as arrays."""
     count, slots, views = len(drawn), spec.object_slots, len(spec.view_angles)
     number = _numbers(objects, spec.shapes)
     shape, mesh = np.full((count, slots), -1, np.int32), np.full((count, slots), "", object)
@@ -117,7 +126,7 @@ def _arrays(
         fov[row] = Camera.fov_y_from_square(degrees, spec.height, spec.width)
         told = Interior(
             room.size, room.openings, tuple(thing.stands_on for thing in things),
-            room.hour, room.facing_degrees, room.lit,
+            room.hour, room.facing_degrees, room.lit, room.mirrored,
         )  # fmt: skip
         interior[row] = to_json(told)
     used = shape >= 0

@@ -1,6 +1,7 @@
 """Cameras in a furnished room: free, nearly level, and with a free view of what stands there."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -33,17 +34,27 @@ Place = tuple[float, float, float]
 
 
 def draw_cameras(
-    spec: InteriorSpec, space: Space, draws: Draws, fov_degrees: float
+    spec: InteriorSpec,
+    space: Space,
+    draws: Draws,
+    fov_degrees: float,
+    views: Sequence[float] | None = None,
+    focuses: Sequence[Box] = (),
 ) -> tuple[Array, Array] | None:
     """Draw positions and targets of the cameras of all views, (V, 3); None for none.
 
     The input view is turned about the vertical axis through that point for the other views.
+
+    Args:
+        views: degrees of all views in place of those of the spec.
+        focuses: boxes near one of which cameras look; by default those of large furniture.
     """
     width, _, depth = space.size
     boxes = _table([thing.box for thing in space.placed])
-    floor = [t.box for t in space.placed if t.piece.surfaces] or [t.box for t in space.placed]
+    floor = focuses or [t.box for t in space.placed if t.piece.surfaces]
+    floor = floor or [thing.box for thing in space.placed]
     fov_y = Camera.fov_y_from_square(fov_degrees, spec.height, spec.width)
-    cosine, sine = cos_sin(np.array(spec.views) / 360)
+    cosine, sine = cos_sin(np.array(spec.views if views is None else views) / 360)
     found: list[tuple[float, Array, Array]] = []
     for _ in range(TRIES):
         if len(found) == CHOICES:

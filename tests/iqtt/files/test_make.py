@@ -206,7 +206,7 @@ def test_other_files_of_a_folder_are_left_alone(tmp_path, monkeypatch):
     ],
 )
 def test_places_that_cannot_be_a_folder_are_refused_first(tmp_path, monkeypatch, suite, path, kind):
-    monkeypatch.setattr(module, "make_pools", None)
+    monkeypatch.setattr(module, "make_source", None)
     (tmp_path / "file").write_text("mine")
     (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
     (tmp_path / "locked").mkdir()

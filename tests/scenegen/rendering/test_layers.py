@@ -14,7 +14,6 @@ from scenegen.rendering.layers import (
     Layers,
     _begin_with,
     _surface_crossings,
-    closed_objects,
     layers_of,
     solid_crossings,
     welded,
@@ -51,7 +50,7 @@ def by_brute_force(spec, scene, objects):
         mesh = mesh_to_cast(batch.shape_of, name)
         matrix = camera_from_world @ batch.world_from_object[0, k]
         corners = mesh.vertices[mesh.faces].astype(float) @ matrix[:3, :3].T + matrix[:3, 3]
-        closed = closed_objects(batch, 0)[k]
+        closed = welded(mesh.vertices, mesh.faces.astype(int))[2].all()
         for pixel, direction in enumerate(directions.reshape(-1, 3)):
             miss = np.cross(direction / np.linalg.norm(direction), matrix[:3, 3])
             if np.linalg.norm(miss) > batch.object_scale[0, k]:
@@ -169,7 +168,7 @@ def layers_by_hand(*along):
     arrays = [np.array(x, kind).reshape(1, 1, -1) for x, kind in zip(
         zip(*along, *[(NAN, -1, 0)] * (16 - len(along)), strict=True),
         (np.float32, np.int8, np.int8), strict=True)]  # fmt: skip
-    return Layers(*arrays)
+    return Layers(*arrays, np.array([1, 1, 0], np.uint8))
 
 
 @pytest.mark.parametrize(
@@ -178,7 +177,8 @@ def layers_by_hand(*along):
         ([(2, 1, 1), (3, 1, -1), (4, 0, 0)], (2.001, 1), [(2.001, 1, 1), (3, 1, -1), (4, 0, 0)]),
         ([(2, 1, 1), (2.1, 1, -1), (4, 0, 0)], (4, 0), [(4, 0, 0)]),
         ([(2, 1, 1), (3, 2, 1), (3.5, 2, -1), (4, 1, -1)], (3, 2), [(3, 2, 1), (3.5, 2, -1)]),
-        ([(4, 0, 0)], (3, 1), [(3, 1, 0), (4, 0, 0)]),
+        ([(4, 0, 0)], (3, 1), [(3, 1, 1), (3, 1, -1), (4, 0, 0)]),
+        ([(4, 0, 0)], (3, 3), [(3, 3, 0), (4, 0, 0)]),  # an open object
         ([(2, 1, 1), (2.1, 1, -1)], (NAN, -1), []),
     ],
 )
