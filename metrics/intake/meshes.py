@@ -12,6 +12,7 @@ from metrics.intake.folders import files_of, match_files
 from metrics.intake.importing import keys_of, names_of
 from metrics.intake.outputs import FRAMES
 from metrics.intake.reading import Reading
+from metrics.measured.reader import size_of
 from metrics.measures.solids import entered_spans
 from metrics.submissions.hints.frames import AXES, frame_text
 from metrics.submissions.layout import Shown
@@ -66,19 +67,13 @@ def import_meshes(
         if not isinstance(rooms, RoomsFile):
             raise SpecError(rooms.path, "ground truth of images alone", "rooms")
         paths, how = match_files(files, names_of(rooms), partial(keys_of, rooms), reading.match)
-        lines, opened, unseen, tried = (
-            [f"{len(paths)} files {how}"],
-            0,
-            0,
-            list[tuple[int, Array]](),
-        )
+        lines, opened, unseen = [f"{len(paths)} files {how}"], 0, 0
+        tried: list[tuple[int, Array]] = []
         for row, path in enumerate(paths):
-            vertices, faces = read_mesh(path)
+            vertices, faces, closed = welded(*read_mesh(path))
             vertices = vertices * FRAMES[reading.frame] * reading.scale
-            vertices, faces, closed = welded(vertices, faces)
-            height, width = rooms.spec.height, rooms.spec.width
-            fov = float(rooms.read("camera/fov_y_degrees", row))
-            layers = mesh_layers(vertices[faces], closed, height, width, fov)
+            camera = *size_of(rooms, row), float(rooms.read("camera/fov_y_degrees", row))
+            layers = mesh_layers(vertices[faces], closed, *camera)
             writer.add(row, layers=layers)
             opened += not closed.all()
             unseen += not np.isfinite(layers).any()
@@ -95,7 +90,7 @@ def import_meshes(
 
 
 def read_mesh(path: Path) -> tuple[Array, Array]:
-    """Return vertices (V, 3) and triangles (F, 3) that can be cast, the outside out.
+    """Return vertices (V, 3) and triangles (F, 3) that can be cast.
 
     Raises BadMeshError, naming the file.
     """
@@ -111,13 +106,8 @@ def read_mesh(path: Path) -> tuple[Array, Array]:
             raise BadMeshError("faces", "none with finite corners", "triangles")
     except BadMeshError as error:
         raise error.inside(path) from error
-    vertices, faces = (
-        vertices[np.unique(faces)],
-        np.unique(faces, return_inverse=True)[1].reshape(-1, 3),
-    )
-    a, b, c = (vertices - vertices.mean(axis=0))[faces].swapaxes(0, 1)
-    inverted = np.einsum("fi,fi->", a, np.cross(b, c)) < 0
-    return vertices, faces[:, ::-1] if inverted else faces
+    used, faces = np.unique(faces, return_inverse=True)
+    return vertices[used], faces.reshape(-1, 3)
 
 
 def mesh_layers(

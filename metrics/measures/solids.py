@@ -96,13 +96,10 @@ def layer_recalls(predicted: Array, true: Array, of_objects: Array) -> dict[str,
     Layers with the same number are compared. `of_objects` tells which are surfaces of objects,
     (L, N); the others do not count.
     """
-    rows = max(int(of_objects.any(axis=1).sum()), *HIDDEN)
-    predicted, true, of_objects = predicted[:rows], true[:rows], of_objects[:rows]
-    padded = [
-        np.pad(x, ((0, rows - len(x)), (0, 0)), constant_values=np.nan) for x in (predicted, true)
-    ]
+    both = min(len(predicted), len(true))
+    found = np.zeros(true.shape, bool)
     with np.errstate(invalid="ignore"):
-        found = np.abs(padded[0] - padded[1])[: len(true)] <= NEAR
+        found[:both] = np.abs(predicted[:both] - true[:both]) <= NEAR
     scores = {f"layer_recall_{NEAR:g}": _share(found[1:], of_objects[1:])}
     for number in HIDDEN:
         here = np.s_[number - 1 : number]

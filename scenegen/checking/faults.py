@@ -27,7 +27,8 @@ Array = NDArray[Any]
 Error = Callable[[Sequence[View]], float]
 Undo = Callable[[View], View]
 BETTER = 0.5  # share of a disagreement that may remain
-# The same of a principal point: half a pixel of a large image is little beside the steps of depths.
+# The same of a principal point, between posed views: beside the steps in which depths are stored,
+# half a pixel of a large image is little.
 BETTER_SHIFT = 0.75
 BETTER_COLORS = 0.6  # the same of colours, which differ where surfaces shine
 ALIKE = 1.05  # factor within which two explanations count as the same: the first is taken
@@ -82,17 +83,23 @@ class _Guess:
     undo: Undo
 
 
-def geometry_faults(views: Sequence[View], error: Error) -> tuple[list[Fault], Sequence[View]]:
-    """Return the mistakes of depth and cameras that explain an error, and the views without."""
+def geometry_faults(
+    views: Sequence[View], error: Error, least: float
+) -> tuple[list[Fault], Sequence[View]]:
+    """Return the mistakes of depth and cameras that explain an error, and the views without.
+
+    An error of `least` or less is that of the steps in which values are stored.
+    """
     found: list[Fault] = []
-    while len(found) < MOST and (before := error(views)) > 0:
+    while len(found) < MOST and (before := error(views)) > least:
         tried = [
             (guess, float(np.nan_to_num(error([guess.undo(v) for v in views]), nan=np.inf)))
             for guess in _guesses(views, error)
         ]
         least = min(after for _, after in tried)
         guess, after = next(one for one in tried if one[1] <= ALIKE * least)
-        most = BETTER_SHIFT if guess.name == "principal-point" else BETTER
+        is_shift = guess.name == "principal-point" and views[0].world_from_camera is not None
+        most = BETTER_SHIFT if is_shift else BETTER
         if not after <= most * before or guess.name in {fault.name for fault in found}:
             break
         views = [guess.undo(view) for view in views]

@@ -19,18 +19,25 @@ MOST_VIEWS = 24  # that are read, of scenes spread over the folder
 
 
 class _Kind(NamedTuple):
-    """A kind of evidence: its name, how a disagreement is told, and which needs no explanation."""
+    """A kind of evidence.
+
+    Attributes:
+        name, told: as the report has it, and how it tells a disagreement.
+        least: disagreement that rounding explains.
+        enough: disagreement that fails, whatever explains it.
+    """
 
     name: str
     told: str
+    least: float
     enough: float
 
 
-DEPTH = _Kind("depth of other views", "differs by {:.3%}", 0.01)
-TRACKS = _Kind("observed points", "off by {:.2f} pixels", 1.0)
-NORMALS = _Kind("normals and depth", "{:.1f} degrees apart", 8.0)
+DEPTH = _Kind("depth of other views", "differs by {:.3%}", 0.0, 0.01)
+TRACKS = _Kind("observed points", "off by {:.2f} pixels", 0.05, 1.0)
+NORMALS = _Kind("normals and depth", "{:.1f} degrees apart", 0.5, 8.0)
 # Images may always differ, as surfaces shine.
-IMAGES = _Kind("images of other views", "1 - correlation of brightness is {:.2f}", np.inf)
+IMAGES = _Kind("images of other views", "1 - correlation of brightness is {:.2f}", 0.0, np.inf)
 
 
 @dataclass(frozen=True)
@@ -99,7 +106,7 @@ def check_views(
         found = "neither two posed views of a scene with depth, nor normals, nor observed points"
         raise SpecError(where, found, "something to compare")
     if not faults:
-        faults, views = geometry_faults(views, error)
+        faults, views = geometry_faults(views, error, kind.least)
         rest = error(views)
     checks = [_check(kind, faults, rest)]
     if pairs and has_normals:

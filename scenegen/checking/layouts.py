@@ -77,28 +77,16 @@ def _codes(path: Path) -> tuple[Array, dict[Any, Any]]:
         return np.asarray(picture), {**picture.info}
 
 
-def _normal(path: Path | None, largest: float = 255.0) -> Array | None:
+def _normal(path: Path | None) -> Array | None:
     """Return normals, x right, y up, z to the viewer in files, with y down and z forward."""
     if path is None or not path.is_file():
         return None
-    values = read_picture(path, MOST_PIXELS) if largest == 255 else _png(path)
-    return _known_normals(values / largest * 2 - 1) * [1, -1, -1]
+    return _known_normals(read_picture(path, MOST_PIXELS) / 255 * 2 - 1) * [1, -1, -1]
 
 
 def _known_normals(values: Array) -> Array:
     length = np.linalg.norm(values, axis=-1, keepdims=True)
     return np.where(np.abs(length - 1) < 0.1, values / np.maximum(length, 1e-9), np.nan)
-
-
-def _png(path: Path) -> Array:
-    """Return a PNG file of three channels of 16 bits, which Pillow would cut to 8."""
-    import png
-
-    try:
-        width, height, rows, _ = png.Reader(bytes=path.read_bytes()).read()
-        return np.vstack([np.asarray(row) for row in rows]).reshape(height, width, -1)[..., :3]
-    except (png.Error, ValueError) as error:
-        raise FileFormatError(path, f"{error!s:.60}", "a PNG file") from error
 
 
 def _image(path: Path) -> Array | None:
@@ -210,7 +198,7 @@ def _of_moge(folder: Path) -> View:
     return View(
         np.array(_json(folder / "meta.json")["intrinsics"]) * [[width], [height], [1]],
         depth=np.where(known, depth, np.nan),
-        normal=_normal(folder / "normal.png", 65535.0),
+        normal=_normal(folder / "normal.png"),
         image=_image(folder / "image.jpg"),
     )
 
