@@ -1,6 +1,6 @@
 """Do methods differ on the same images or questions?
 
-`pairing` finds the rows that all score files share and refuses files that do not belong together.
+`methods` reads score files, and scores submissions under the alignment common to all. `pairing` finds the rows that all score files share and refuses files that do not belong together.
 `compare` computes the differences, with the `paired_tests`. `report` shows them as text, Markdown,
 JSON and a page.
 
