@@ -7,6 +7,7 @@ from typing import Any
 
 from iqtt.files.layout import answer_column, question_columns, truth_columns
 from iqtt.files.reader import QuestionsFile
+from iqtt.perspective.specs import PerspectiveSpec
 from iqtt.questions.specs import SplitSpec
 from iqtt.sharing.published import handed_out
 from scenegen.common.text_table import piped
@@ -18,7 +19,7 @@ KEYWORDS = (
     "synthetic", "3d", "mental-rotation", "visual-reasoning", "multiple-choice",
     "single-image-3d", "3d-iqtt", "pix2shape-bench",
 )  # fmt: skip
-TEMPLATE = Path(__file__).parent / "templates" / "questions.md"
+TEMPLATES = Path(__file__).parent / "templates"
 
 
 def write_questions_card(
@@ -49,8 +50,10 @@ def write_questions_card(
         }
         for table in tables
     ]
+    of_rooms = isinstance(tables[0].spec, PerspectiveSpec)
+    template = TEMPLATES / ("perspective.md" if of_rooms else "questions.md")
     write_card(
-        path, publication, TEMPLATE, tables, handed_out(tables), overwrite,
+        path, publication, template, tables, handed_out(tables), overwrite,
         answers=answers,
         keywords=KEYWORDS,
         facts=facts,

@@ -72,7 +72,7 @@ def test_a_probe_needs_features_of_its_own_data(truths, train_questions, tmp_pat
         np.save(tmp_path / name, np.ones((6 if width == 5 else 3, 4, width)))
     data, out = (truths.iqtt, tmp_path / "b.h5"), (tmp_path / "f.npy",)
     how = {"train": train_questions, "train_features": tmp_path / "g.npy"}
-    with refused(FileFormatError, "g.npy", "6 numbers a picture"):
+    with refused(FileFormatError, "g.npy", "6 numbers per image"):
         write_features(*data, *out, **how)
     with refused(SpecError, "labels", "7"):
         write_features(*data, *out, labels=7)

@@ -60,7 +60,7 @@ MISTAKES = {
     "distance": (distance, {}, "distance along the ray"),
     "mirrored": (lambda depth, rng: depth[:, ::-1], {}, "mirrored"),
     "upside down": (lambda depth, rng: depth[::-1], {}, "upside down"),
-    "no value as 0": (zeros, {}, "mark for no value"),
+    "no value as 0": (zeros, {}, "marker of invalid pixels"),
     "half a pixel right": (moved(0, 0.5), {}, "0.5 pixel right"),
     "half a pixel left": (moved(0, -0.5), {"alignment": "scale"}, "0.5 pixel left"),
     "a pixel up": (moved(-1, 0), {}, "1 pixel up"),

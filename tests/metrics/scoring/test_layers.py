@@ -64,6 +64,16 @@ def test_only_what_is_declared_is_fitted(alignment, change, best, layered, tmp_p
     assert (score([path], layered, SETTINGS).metrics["solid_iou"].value > 0.999) == best
 
 
+def test_the_room_does_not_change_the_fit(layered, tmp_path):
+    """Of which there are rays with one layer."""
+
+    def farther(layers):
+        return layers * np.where(np.isnan(layers[..., 1:2]), 3.0, 2.0)
+
+    path = write(tmp_path / "p.h5", layered, farther, alignment="scale")
+    assert score([path], layered, SETTINGS).metrics["solid_iou"].value > 0.999
+
+
 def test_hidden_layers_do_not_change_the_fit(layered, tmp_path):
     """Twice as deep behind the first layer, which alone is fitted."""
 

@@ -134,6 +134,7 @@ def along_the_axis(corners, faces=None):
         ([(1, -3)], [2.5, 3.5], [1, -1]),
         ([(1, -3), (1, -3.5)], [2.5, 4.0], [1, -1]),  # they overlap
         ([(1, -3), (1, -4)], [2.5, 4.5], [1, -1]),  # they touch
+        ([(1, -3), (1.5, -4.25 - 1e-7)], [2.5, 5.0], [1, -1]),  # but for rounding
         ([(2, -4), (1, -4)], [3.0, 5.0], [1, -1]),  # one is inside the other
         ([(1, -3), (1, -5)], [2.5, 3.5, 4.5, 5.5], [1, -1, 1, -1]),
     ],
@@ -141,13 +142,18 @@ def along_the_axis(corners, faces=None):
 def test_parts_are_one_solid(cubes, depth, kinds):
     corners = np.concatenate([cube(side, [0.07, 0.05, z]) for side, z in cubes])
     found, kind = along_the_axis(corners)
-    np.testing.assert_allclose(found, depth, rtol=1e-12)
+    np.testing.assert_allclose(found, depth, rtol=1e-7)
     assert kind == kinds
 
 
 def test_the_edge_between_two_triangles_is_crossed_once():
-    """The axis passes the diagonals of front and back."""
+    """The axis passes the diagonals of front and back, or edges along x, or corners."""
     assert along_the_axis(cube(1, [0, 0, -3]))[1] == [1, -1]
+    half = np.sqrt(0.5)
+    turn = np.array([[1, 0, 0], [0, half, half], [0, -half, half]])
+    assert along_the_axis(cube(1, 0) @ turn + [0, 0, -3])[1] == [1, -1]
+    corners = unit_shape("octahedron").triangles - np.array([0, 0, 3])
+    assert along_the_axis(corners)[1] == [1, -1]
 
 
 def test_open_parts_have_no_inside():
