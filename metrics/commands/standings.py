@@ -34,8 +34,8 @@ TRUTH = click.option(
 
 
 def _scores_of(paths: tuple[str, ...], truth: str | None, **settings: Any) -> "list[ScoreFile]":
-    from metrics.scoring.compared import read_or_score
     from metrics.scoring.runs import Settings
+    from metrics.views.compare.methods import read_or_score
 
     @contextmanager
     def progress_of(rows: int) -> Iterator[Any]:

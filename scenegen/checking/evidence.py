@@ -28,9 +28,10 @@ def depth_error(views: Sequence[View], pairs: Sequence[Pair]) -> float:
 
 
 def _moved(one: View, other: View) -> tuple[Array, Array, Array]:
-    """Return differences of pixels of one view in another one, their colours' too, and rows.
+    """Return how pixels of one view differ in depth in another one, (N,), and where they are.
 
-    The first is infinite where the other view does not see the place.
+    The difference is infinite where the other view does not see the place. Places are x and y in
+    the other view, (2, N), and row and column in this one, (2, N).
     """
     assert one.depth is not None
     assert other.depth is not None

@@ -35,6 +35,7 @@ def scenes_of(folder: Path) -> tuple[str, Scenes]:
 
     Raises FileFormatError where it has none of LAYOUTS, or a file is damaged; OSError.
     """
+    folder.stat()  # raises where there is none
     for name, (file, read) in LAYOUTS.items():
         if paths := sorted(folder.rglob(file)):
             return name, read(paths)

@@ -37,6 +37,7 @@ from scenegen.rooms.reader import Room
 
 Array = NDArray[Any]
 SIDE = 512  # pixels of a texture's side, at most
+LAMP_AWAY = 1.5  # metres from a lamp at which a white surface may look white
 NEAR = 0.01  # plane of cameras, metres
 LEAST_AREA = 1e-12  # of a triangle: smaller ones have no normal in float32
 WRAPS = (10497, 33071, 33648)  # repeat, clamp and mirror, as glTF numbers them
@@ -69,7 +70,8 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
         "unit": source.unit,
         "camera": "x right, y up, looks along -z; a node for each view of the scene",
         "pixel_centers": "+0.5",
-        "lights": "intensities are relative: radiance is 1 where an exposed image has 1",
+        "lights": "intensities are relative: light_scale of the scene's extras times those of the"
+        " rooms, so that the brightest light makes a white surface white",
         "pictures": {"textures": {"encoding": "srgb", "bits": 8, "most_pixels_a_side": SIDE}},
     }
 
@@ -80,6 +82,7 @@ class _Scene:
     def __init__(self, spec: Any, room: Room, objects: Objects) -> None:
         self.spec, self.scene, self.shape_of = spec, room.scene, objects.shape
         self.gltf, self.roots = Gltf(), list[int]()
+        self.lights: list[tuple[str, str, Array, Array]] = []  # name, type, colour and pose
         self.exposure = float(room.truth["exposure"][0]) if spec.interior else 1.0
         if spec.interior:
             self.matter = Collector(spec.seed, room.scene.index, materials_of(spec))
@@ -107,8 +110,8 @@ class _Scene:
             if children:
                 self.gltf.lists["nodes"][node]["children"] = children
         self._cameras()
-        self._lights()
         about = {"index": scene.index, "unit": "metre" if scene.interior else "scene unit"}
+        about["light_scale"] = self._lights()
         root = {"name": f"scene-{scene.index:06d}", "nodes": [nodes[0], *self.roots]}
         whole = {"asset": {"version": "2.0", "generator": "pix2shape-bench"}, "scene": 0}
         if lights := self.gltf.lists.pop("lights", None):
@@ -132,35 +135,41 @@ class _Scene:
             node = {"name": f"view_{i}", "camera": self.gltf.add("cameras", told)}
             self.roots.append(self._node(node, camera.world_from_camera))
 
-    def _lights(self) -> None:
-        """Add the sun, or the paper's point lights; lamps are there with their objects.
+    def _lights(self) -> float:
+        """Add the sun or the paper's point lights to the lamps, and return by what all are scaled.
 
-        A point light is as bright at the cameras' target as by the shading equation.
+        A point light is as bright at the cameras' target as by the shading equation. Viewers lack
+        the light that walls reflect and, mostly, shadows: the exposure of an image would be too
+        much for its sun.
         """
         if self.scene.interior:
             toward, light = sunlight_of(self.scene.interior)
             if light.any() and not self.spec.environment:
                 pose = look_at(toward, np.zeros(3))
                 pose[:3, 3] = 0.0
-                self._light("sun", "directional", light * self.exposure, pose)
+                self.lights.append(("sun", "directional", light, pose))
         k_l, k_q = self.scene.attenuation
         for j, point in enumerate(self.scene.lights, start=1):
             away = float(np.linalg.norm(np.subtract(point.position, self.spec.camera_target)))
             color = np.pi * np.array(point.color) * away / (k_l + k_q * away)
-            self._light(f"light_{j}", "point", color, _moved(point.position))
-
-    def _light(self, name: str, kind: str, color: Array, pose: Array) -> None:
-        most = max(float(color.max()), 1e-9)
-        told = {"type": kind, "name": name, "color": (color / most).tolist(), "intensity": most}
-        light = {"light": self.gltf.add("lights", told)}
-        node = {"name": name, "extensions": self.gltf.extended("KHR_lights_punctual", light)}
-        self.roots.append(self._node(node, pose))
+            self.lights.append((f"light_{j}", "point", color, _moved(point.position)))
+        scale = self.exposure
+        for _, kind, color, _ in self.lights if self.scene.interior else ():
+            received = float(color.max()) / (LAMP_AWAY**2 if kind == "point" else 1.0)
+            scale = min(scale, np.pi / received)
+        for name, kind, color, pose in self.lights:
+            most = max(float(color.max()), 1e-9)
+            told = {"type": kind, "name": name, "color": (color / most).tolist()}
+            number = {"light": self.gltf.add("lights", {**told, "intensity": scale * most})}
+            node = {"name": name, "extensions": self.gltf.extended("KHR_lights_punctual", number)}
+            self.roots.append(self._node(node, pose))
+        return float(scale)
 
     def _lamp(self, name: str, corners: Array, flux: float) -> Material:
         """Return the material of triangles that shine, and add a point light of their flux."""
         made, middle = glowing(corners, flux), corners.reshape(-1, 3).mean(axis=0)
         color = np.array(made.radiance) * area_of(corners) / 4  # of pi radiance area / (4 pi)
-        self._light(name, "point", color * self.exposure, _moved(middle))
+        self.lights.append((name, "point", color, _moved(middle)))
         return made
 
     def _shell(self) -> Iterator[int]:

@@ -12,6 +12,7 @@ from PIL import Image
 from scenegen import open_rooms
 from scenegen.camera import pixel_directions, transform_vectors
 from scenegen.description.presets import preset_spec
+from scenegen.rendering.pictures.sun import sunlight_of
 from scenegen.rooms.export.folder import export_folder
 from scenegen.rooms.make import make_dataset
 
@@ -143,11 +144,22 @@ def test_nodes_are_views_objects_and_lights(made):
             lights = about["extensions"]["KHR_lights_punctual"]["lights"]
             kinds = {light["type"] for light in lights}
             if room.scene.interior is None:
-                assert len(lights) == len(room.scene.lights)
                 assert kinds == {"point"}
+                for light, told in zip(room.scene.lights, lights, strict=True):
+                    d = np.linalg.norm(np.subtract(light.position, rooms.spec.camera_target))
+                    k_l, k_q = room.scene.attenuation
+                    at_target = np.array(told["color"]) * told["intensity"] / d**2 / np.pi
+                    np.testing.assert_allclose(at_target, light.color / (k_l * d + k_q * d * d))
             else:
                 assert ("sun" in number) == (room.scene.interior.hour < 17.8)
                 glow = any("emissiveFactor" in material for material in about["materials"])
+                scale = about["scenes"][0]["extras"]["light_scale"]
+                for light in lights:
+                    most = np.pi if light["type"] == "directional" else np.pi * 1.5**2
+                    assert light["intensity"] <= most * 1.001
+                    if light["name"] == "sun":
+                        sun = sunlight_of(room.scene.interior)[1]
+                        assert light["intensity"] == pytest.approx(scale * sun.max())
                 assert room.scene.interior.lit == glow == ("ceiling_light" in number)
 
 

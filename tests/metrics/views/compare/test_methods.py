@@ -8,9 +8,9 @@ import pytest
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import write_scores
 from metrics.scoring.aligned import AlignmentError
-from metrics.scoring.compared import read_or_score
 from metrics.scoring.evaluate import score
 from metrics.scoring.runs import Settings
+from metrics.views.compare.methods import read_or_score
 from scenegen.rooms.reader import RoomsFile
 
 
