@@ -73,7 +73,7 @@ def import_meshes(
             vertices, faces, closed = welded(*read_mesh(path))
             vertices = vertices * FRAMES[reading.frame] * reading.scale
             camera = *size_of(rooms, row), float(rooms.read("camera/fov_y_degrees", row))
-            layers = mesh_layers(vertices[faces], closed, *camera)
+            layers = mesh_layers(vertices, faces, closed, *camera)
             writer.add(row, layers=layers)
             opened += not closed.all()
             unseen += not np.isfinite(layers).any()
@@ -111,13 +111,13 @@ def read_mesh(path: Path) -> tuple[Array, Array]:
 
 
 def mesh_layers(
-    corners: Array, closed: Array, height: int, width: int, fov_y_degrees: float
+    vertices: Array, faces: Array, closed: Array, height: int, width: int, fov_y_degrees: float
 ) -> NDArray[np.float32]:
     """Return where rays enter and leave a mesh, (H, W, L), as layers of a submission.
 
     Args: as `layers.solid_crossings`. Crossings of open parts are paired in order.
     """
-    found = solid_crossings(corners, closed, height, width, fov_y_degrees)
+    found = solid_crossings(vertices, faces, closed, height, width, fov_y_degrees)
     order = np.lexsort((found.depth, found.pixel, found.kind == OPEN))
     pixel, depth, kind = found.pixel[order], found.depth[order], found.kind[order].copy()
     sheets = np.flatnonzero(kind == OPEN)

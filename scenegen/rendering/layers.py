@@ -77,7 +77,7 @@ def layers_of(batch: SceneBatch, image: int, depth: Array, object_id: Array) -> 
             vertices, faces, whole = _model(batch.shape_of, name)
             closed[k] = whole.all()
             vertices = product(vertices, placed[:, :3].T) + placed[:, 3]
-            parts.append(solid_crossings(vertices[faces], whole, height, width, fov))
+            parts.append(solid_crossings(vertices, faces, whole, height, width, fov))
     # Of other rays, the first layer is the only one.
     layered = (object_id > 0).ravel()
     for part in parts:
@@ -124,15 +124,16 @@ def welded(vertices: Array, faces: Array) -> tuple[Array, Array, Array]:
 
 
 def solid_crossings(
-    corners: Array, closed: Array, height: int, width: int, fov_y_degrees: float
+    vertices: Array, faces: Array, closed: Array, height: int, width: int, fov_y_degrees: float
 ) -> Crossings:
     """Return where rays enter and leave a solid of closed parts, and meet the others.
 
     Args:
-        corners: of triangles, camera frame, (F, 3, 3), counter-clockwise seen from outside.
+        vertices: camera frame, (V, 3).
+        faces: triangles with consistent windings, (F, 3).
         closed: which of them are of closed parts, (F,).
     """
-    found = mesh_crossings(corners[closed], height, width, fov_y_degrees)
+    found = mesh_crossings(vertices, faces[closed], height, width, fov_y_degrees)
     order = np.lexsort((-found.kind, found.depth, found.pixel))
     pixel, depth, kind = found.pixel[order], found.depth[order], found.kind[order].astype(np.int64)
     starts = np.flatnonzero(np.diff(pixel, prepend=-1))
@@ -145,7 +146,7 @@ def solid_crossings(
     pixel, depth, enters = pixel[turns], depth[turns], (after != 0)[turns]
     touching = ~enters[:-1] & (np.diff(pixel) == 0) & (np.diff(depth) <= GAP * depth[:-1])
     kept = ~(np.append(touching, False) | np.insert(touching, 0, False)[: len(pixel)])
-    sheets = mesh_crossings(corners[~closed], height, width, fov_y_degrees)
+    sheets = mesh_crossings(vertices, faces[~closed], height, width, fov_y_degrees)
     return Crossings(
         np.concatenate([pixel[kept], sheets.pixel]),
         np.concatenate([depth[kept], sheets.depth]),
@@ -153,33 +154,35 @@ def solid_crossings(
     )
 
 
-def mesh_crossings(corners: Array, height: int, width: int, fov_y_degrees: float) -> Crossings:
-    """Return where the rays of pixels cross triangles (F, 3, 3) in the camera frame, in any order.
+def mesh_crossings(
+    vertices: Array, faces: Array, height: int, width: int, fov_y_degrees: float
+) -> Crossings:
+    """Return where the rays of pixels cross triangles (F, 3) in the camera frame, in any order.
 
     A ray through an edge meets one of the two triangles that share it, as if it passed a bit to the
     right and above.
     """
     size = pixel_size(height, fov_y_degrees)
-    points = np.ascontiguousarray(corners.transpose(1, 2, 0))  # corner, axis, triangle
-    near = -points[:, 2]
-    nearest, farthest = _ends(near)
+    points, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(faces.T)
+    near = -points[2]
+    nearest, farthest = _ends(near[corners])
     whole = nearest > NEAR * np.abs(points).max(initial=0.0)
     seen = farthest > 0
 
     def span(values: Array, most: int) -> tuple[Array, Array]:
-        low, high = _ends(values)
+        low, high = _ends(values[corners])
         low = np.where(whole, np.clip(np.ceil(low - 1e-6), 0, most), 0)
         high = np.where(whole, np.clip(np.floor(high + 1e-6), -1, most - 1), most - 1)
         return low.astype(np.int64), np.where(seen, high - low + 1, 0).clip(0).astype(np.int64)
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        left, columns = span(points[:, 0] / (near * size) + (width / 2 - 0.5), width)
-        top, rows = span((height / 2 - 0.5) - points[:, 1] / (near * size), height)
+        left, columns = span(points[0] / (near * size) + (width / 2 - 0.5), width)
+        top, rows = span((height / 2 - 0.5) - points[1] / (near * size), height)
     area = columns * rows
     ends = np.cumsum(area)
     cuts = np.searchsorted(ends, np.arange(CANDIDATES, ends[-1] if len(ends) else 0, CANDIDATES))
     found = []
-    for chunk in np.split(np.arange(len(corners)), np.unique(cuts)):
+    for chunk in np.split(np.arange(len(faces)), np.unique(cuts)):
         some = chunk[area[chunk] > 0]
         face = np.repeat(some, area[some])
         place = np.arange(len(face)) - np.repeat(np.cumsum(area[some]) - area[some], area[some])
@@ -188,7 +191,7 @@ def mesh_crossings(corners: Array, height: int, width: int, fov_y_degrees: float
         pixel = row * width + column
         x = (column + 0.5 - width / 2) * size
         y = ((height / 2 - 0.5) - row) * size
-        a, b, c = points[..., some]
+        a, b, c = points[:, corners[:, some]].swapaxes(0, 1)
         planes = [_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b)]
         place = np.repeat(np.arange(len(some)), area[some])
         sides = [x * n[0][place] + y * n[1][place] - n[2][place] for n in planes]
@@ -279,8 +282,9 @@ def _room_crossings(
         return Crossings(*np.zeros((3, 0), np.int64))
     if batch.interior is not None:
         shell = shell_of(shell_name(str(batch.interior[image]))).corners
-        corners = product(shell.reshape(-1, 3).astype(np.float64), view[:, :3].T) + view[:, 3]
-        found = mesh_crossings(corners.reshape(-1, 3, 3), height, width, fov)
+        vertices = product(shell.reshape(-1, 3).astype(np.float64), view[:, :3].T) + view[:, 3]
+        faces = np.arange(len(vertices)).reshape(-1, 3)
+        found = mesh_crossings(vertices, faces, height, width, fov)
         order = np.lexsort((found.depth, found.pixel))
         first = order[np.diff(found.pixel[order], prepend=-1) > 0]
         first = first[chosen[found.pixel[first]]]

@@ -81,8 +81,13 @@ def further_truth(
             stored_layers(batch, i, v.depth, v.object_id)
             for v, i in zip(views, images, strict=True)
         ]
-        made |= {name: np.stack([one[name] for one in stored]) for name in stored[0]}
+        made |= {name: _all_of([one[name] for one in stored]) for name in stored[0]}
     return made
+
+
+def _all_of(views: list[Array]) -> Array:
+    """Return arrays of views as one, without a copy of a single one."""
+    return views[0][None] if len(views) == 1 else np.stack(views)
 
 
 def stored_layers(

@@ -75,10 +75,10 @@ def test_open_parts_are_paired_in_order():
     lid = trimesh.creation.box((1, 1, 1))
     lid.update_faces(lid.triangles_center[:, 2] < 0.49)  # no front
     lid.apply_translation((0.07, 0.05, -3))
-    layers = mesh_layers(lid.triangles, np.zeros(len(lid.faces), bool), 3, 3, 20.0)
+    layers = mesh_layers(lid.vertices, lid.faces, np.zeros(len(lid.faces), bool), 3, 3, 20.0)
     assert np.isnan(layers[1, 1]).all()
     lid = trimesh.util.concatenate([lid, lid.copy().apply_translation((0, 0, -2))])
-    layers = mesh_layers(lid.triangles, np.zeros(len(lid.faces), bool), 3, 3, 20.0)
+    layers = mesh_layers(lid.vertices, lid.faces, np.zeros(len(lid.faces), bool), 3, 3, 20.0)
     np.testing.assert_allclose(layers[1, 1, :2], [3.5, 5.5], rtol=1e-6)
     assert np.isnan(layers[1, 1, 2:]).all()
 

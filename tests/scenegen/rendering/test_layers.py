@@ -121,8 +121,7 @@ def cube(side, middle):
 def along_the_axis(corners, faces=None):
     """Return depth and kind of what the middle pixel of 3 x 3 meets."""
     faces = np.arange(3 * len(corners)).reshape(-1, 3) if faces is None else faces
-    vertices, faces, closed = welded(corners.reshape(-1, 3), faces)
-    found = solid_crossings(vertices[faces], closed, 3, 3, 20.0)
+    found = solid_crossings(*welded(corners.reshape(-1, 3), faces), 3, 3, 20.0)
     at = found.pixel == 4
     order = np.argsort(found.depth[at])
     return found.depth[at][order], found.kind[at][order].tolist()
