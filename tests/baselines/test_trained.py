@@ -148,7 +148,7 @@ def test_a_run_goes_on_with_its_own_data_alone(case, train, data, tmp_path):
     marks = ["fingerprint"] if kind == "rooms" else ["fingerprint_labeled", "fingerprint_unlabeled"]
     edits = [attribute(name, "0" * 64) for name in marks]
     other = edited(data[kind], tmp_path / "other.h5", *edits)
-    with refused(SpecError, str(other), "fingerprint 000000000000"):
+    with refused(SpecError, str(other), "recipe hash 000000000000"):
         train("run", other, resume=True)
     with pytest.raises(FileNotFoundError):
         train("none", resume=True)

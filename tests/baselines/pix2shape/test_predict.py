@@ -54,7 +54,7 @@ def test_a_model_of_rays_is_another_method_and_says_what_it_is_told(several_path
     with open_predictions(tmp_path / "p.h5") as predictions:
         assert predictions.method == "pix2shape-rays"
     with h5py.File(tmp_path / "p.h5") as file, RoomsFile(several_path) as rooms:
-        assert "floor and walls" in file.attrs["notes"]
+        assert "ground and walls" in file.attrs["notes"]
         poses = torch.from_numpy(rooms.read("camera/world_from_camera", slice(None))).float()
         walls, _, _ = empty_rooms(poses, rooms.spec.fov_y_degrees, 64)
         depth = torch.from_numpy(file["depth"][()])

@@ -142,7 +142,7 @@ def test_a_finished_run_is_neither_trained_on_nor_replaced(rooms_path, folder, u
         train_run(folder, rooms_path, CONFIG, HERE)
     assert same(folder / "checkpoint.safetensors", unbroken / "checkpoint.safetensors")
     path = edited(rooms_path, folder.parent / "other.h5", attribute("fingerprint", "0" * 64))
-    with refused(SceneGenError, str(path), "fingerprint 000000000000"):
+    with refused(SceneGenError, str(path), "recipe hash 000000000000"):
         train_run(folder, path, None, HERE)
 
 
