@@ -172,7 +172,7 @@ def test_questions_of_two_answers(name, writers, tmp_path):
     if name != "cnn":
         assert submitted(writers[1][name], path, out)["scores"].shape == (5, 2)
         return
-    with refused(SceneGenError, found="questions of 2 answers"):
+    with refused(SceneGenError, found="questions with 2 options"):
         writers[1][name](path, out)
 
 
