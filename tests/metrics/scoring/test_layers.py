@@ -173,3 +173,11 @@ def test_pages_and_the_3d_view_show_them(layered, tmp_path):
         assert [len(one.pictures) for one in examples] == [8] * len(examples)
         scenes = list(predicted_scenes(said, rooms, scores))
     assert sorted(view.row for scene in scenes for view in scene.views) == [0, 1, 2, 3]
+
+
+def test_they_are_aligned_by_least_squares_only(layered, tmp_path):
+    path = write(tmp_path / "p.h5", layered, lambda x: 2 * x)
+    found = score([path], layered, Settings(processes=1, align="scale"))
+    assert found.metrics["solid_iou"].value > 0.999
+    with refused(ScoringError):
+        score([path], layered, Settings(processes=1, align="scale_l1"))
