@@ -24,7 +24,9 @@ from scenegen.viewing import MOST_ROWS, SCENE, RecordedScene, Surfaces, View, ro
 Array = NDArray[Any]
 Scenes = Sequence[Sequence[int]]  # of each scene the rows of its images
 SORTED_BY = tuple(
-    dict.fromkeys((*HEADLINE["rooms"], *HEADLINE["interiors"], *HEADLINE["measured"], "rmse"))
+    dict.fromkeys(
+        name for kind in ("rooms", "interiors", "measured", "layers") for name in HEADLINE[kind]
+    )
 )
 
 

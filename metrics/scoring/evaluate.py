@@ -117,7 +117,8 @@ def allowed_alignments(file: RoomPredictions) -> set[Alignment]:
     if file.kind == "disparity":
         return {"disparity_scale_shift"}
     allowed = {file.alignment, *alignments_scored(file.kind, file.alignment)}
-    return allowed & {file.alignment, "scale", "scale_shift"} if file.kind == "points" else allowed
+    by_least_squares = {file.alignment, "scale", "scale_shift"}
+    return allowed & by_least_squares if file.kind in ("points", "layers") else allowed
 
 
 def _align(files: Sequence[Predictions], alignment: Alignment | None) -> None:

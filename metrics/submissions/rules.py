@@ -241,7 +241,7 @@ def array_problem(
     name = column.name
     shape: tuple[int, ...] = array.shape or ()
     kinds = "f" if is_float(column) else "iu"
-    sizes = {**sizes, "layer": LAYERS}
+    sizes = {"layer": LAYERS, **sizes}
     axes = [sizes.get(axis, ()) for axis in column.axes or ()]
     fits = len(shape) == 1 + len(axes) and all(
         size in allowed if allowed else size > 0

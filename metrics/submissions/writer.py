@@ -131,6 +131,9 @@ class RoomPredictionWriter:
         if self._truth.has_truth:
             surface = np.isfinite(self._truth.read("depth", row)[:height, :width])
         sizes = dict(zip(("y", "x"), ((size,) for size in surface.shape), strict=True))
+        for column in self._table.columns if self._table else ():
+            if column.name == "layers":
+                sizes["layer"] = (column.shape[-1],)  # as in the first row
         images = {"depth": depth, "disparity": disparity, "points": points}
         images["layers"] = layers
         images |= {"normal": normal, "confidence": confidence}
@@ -148,7 +151,6 @@ class RoomPredictionWriter:
         if self._table is None:
             self._table = self._new_table(values)
             self._names = list(values)
-        self._check_layers(values, where)
         for name in sorted(set(self._names) ^ set(values)):
             found, expected = ("one", "none") if name in values else ("none", "one")
             raise PredictionError(f"{where}: {name}", found, f"{expected}, as in the first row")
@@ -156,14 +158,6 @@ class RoomPredictionWriter:
         self._table.append({name: self._padded(image) for name, image in values.items()})
         self._rows.append(row)
         self._written[row] = True
-
-    def _check_layers(self, values: Mapping[str, rules.Array], where: str) -> None:
-        """Raise PredictionError unless there are as many layers as in the first row."""
-        assert self._table is not None, "a row was given"
-        shapes = {column.name: column.shape for column in self._table.columns}
-        if "layers" in values and shapes.get("layers", (0,))[-1] != values["layers"].shape[-1]:
-            found, expected = values["layers"].shape[-1], shapes.get("layers", (0,))[-1]
-            raise PredictionError(f"{where}: layers", found, f"{expected}, as in the first row")
 
     def _padded(self, image: rules.Array) -> rules.Array:
         """Return an image (h, w, ...) in the size to which those of the truth are padded."""

@@ -13,6 +13,8 @@ from metrics.scoring.runs import ScoringError, Settings
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
+from metrics.viewing import predicted_scenes
+from metrics.views.examples import examples_of
 from scenegen.rooms.reader import RoomsFile
 
 SETTINGS = Settings(processes=1)
@@ -160,3 +162,22 @@ def test_rooms_without_layers_are_refused(make_rooms, layered, tmp_path):
     assert ("layers", "match") in {(p.dataset, p.rule) for p in validate(tmp_path / "p.h5", plain)}
     with refused(ScoringError):
         score([tmp_path / "p.h5"], plain, SETTINGS)
+
+
+def test_pages_and_the_3d_view_show_them(layered, tmp_path):
+    """A page has four pictures of the first layer, and two cuts of truth and prediction each."""
+    path = write(tmp_path / "p.h5", layered, lambda x: 2 * x, alignment="scale")
+    scores = score([path], layered, SETTINGS)
+    with RoomsFile(layered) as rooms, open_predictions(path) as said:
+        examples = [one for _, some in examples_of(scores, rooms, said) for one in some]
+        assert [len(one.pictures) for one in examples] == [8] * len(examples)
+        scenes = list(predicted_scenes(said, rooms, scores))
+    assert sorted(view.row for scene in scenes for view in scene.views) == [0, 1, 2, 3]
+
+
+def test_they_are_aligned_by_least_squares_only(layered, tmp_path):
+    path = write(tmp_path / "p.h5", layered, lambda x: 2 * x)
+    found = score([path], layered, Settings(processes=1, align="scale"))
+    assert found.metrics["solid_iou"].value > 0.999
+    with refused(ScoringError):
+        score([path], layered, Settings(processes=1, align="scale_l1"))
