@@ -301,8 +301,8 @@ class ScoreFile:
         meta, texts = self.meta, []
         if meta.truth_source == "submission":
             texts.append(
-                "the ground truth is the path stored in the predictions; score with --truth"
-                f" {meta.truth_path} if this file is correct"
+                f"ground truth: {meta.truth_path}, content {meta.truth_digest[:12]}, as the"
+                " predictions name it; scores are ranked only if this file is given with --truth"
             )
         count = meta.counts[COUNTS[self.task][0]]
         if len(self.ids) < count:

@@ -136,7 +136,7 @@ def test_what_is_viewed(truths, folder, check_refusal):
     (folder / "s.json").write_text("{}")
     truth = ("--truth", truths.rooms)
     for arguments, words in (
-        ((good_answers(folder, truths.iqtt),), ("answers to iqtt",)),
+        ((good_answers(folder, truths.iqtt),), ("responses to iqtt",)),
         ((path, "--truth", "none.h5"), ("none.h5", "no file")),
         ((path, "--truth", truths.iqtt), (truths.iqtt.name,)),
         ((path, *truth, "--items", "2,9"), ("--items", "row 9")),

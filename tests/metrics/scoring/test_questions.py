@@ -102,7 +102,7 @@ def test_two_answers_are_scored_against_a_half(tmp_path):
     assert set(found.by_position) <= {"0", "1"}
     assert found.meta.counts["answers"] == 2
     (tmp_path / "a.json").write_text(str([0, 1, 2, 0, 1, -1, 0, 1]))
-    with refused(ScoringError, "a.json: answer", found="such as 2", expected="an answer"):
+    with refused(ScoringError, "a.json: answer", found="such as 2", expected="an option"):
         score([tmp_path / "a.json"], test)
     with refused(PredictionError, "scores", found="(8, 3)", expected="(8, 2)"):
         write_answers(tmp_path / "b.h5", test, method="m", scores=np.zeros((8, 3)))
