@@ -65,9 +65,9 @@ def test_the_truth_is_perfect(folder):
             assert (skill.value, skill.low, skill.high) == (1.0, low, 1.0)
     assert found.metrics["relief_iou"].low == pytest.approx(8 / (8 + 1.959964**2))
     assert found.skills["relief_iou"].low < found.metrics["relief_iou"].low
-    # Of several views, of other tasks, of methods that state how sure they are, and one in which a
-    # constant is perfect.
-    others = {"behind_depth_error", "rmse", "silog", "ause_abs_rel", "delta_1"}
+    # Of several views, of other tasks, of methods that state how sure they are, of layers, and one
+    # in which a constant is perfect.
+    others = {"behind_depth_error", "rmse", "silog", "ause_abs_rel", "delta_1", "solid_iou"}
     assert set(found.skills) == set(SKILLED) - others
     assert {"normal_mean_degrees", "derived_normal_mean_degrees"} <= set(found.metrics)
     for scores in (*found.by_object_shape.values(), *found.by_object_size.values()):
