@@ -264,7 +264,7 @@ WRONG_QUESTIONS = [
     ("meta/resamples", 2000, "", "Wilson"),
     ("meta/counts/answers", 0, "", "2 or 3"),
     ("meta/counts/answers", GONE, "meta.counts", "answers"),
-    ("meta/truth_digest", KNOWN_TESTS[0].digest, "", "a truth of task 'iqtt'"),
+    ("meta/truth_digest", KNOWN_TESTS[0].digest, "", "ground truth of task 'iqtt'"),
     ("items/iqtt_accuracy", GONE, "", "to be there"),
     ("items/iqtt_accuracy", [1, 0, 1, 0.5], "", "0 or 1"),
     ("items/iqtt_accuracy", [1, 0, 1, 0], "answer_groups.by_distractor", "as in items"),
@@ -276,7 +276,7 @@ WRONG_QUESTIONS = [
     ("answer_groups/by_distractor/mirror/n", 5, "answer_groups.by_distractor", "as in items"),
     ("answer_groups/by_distractor/mirror/right", [5], "", "up to n"),
     ("answer_groups/by_distractor/mirror/right", [], "", "runs"),
-    ("answer_groups/by_distractor/mirror/low", 0.1, "answer_groups.by_distractor.mirror", "holds"),
+    ("answer_groups/by_distractor/mirror/low", 0.1, "answer_groups.by_distractor.mirror", "contains"),
 ]
 TABLES = (ROOMS, WRONG_ROOMS), (RUNS, WRONG_RUNS), (OBJECTS, WRONG_OBJECTS), (IQTT, WRONG_QUESTIONS)
 
