@@ -84,7 +84,7 @@ def write_cubes(
     """
     with open_questions(data) as questions:
         height, width = questions.height, questions.width
-        spec = questions.spec or SplitSpec(height=height, width=width, min_cube_pixels=0)
+        spec = questions.cube_spec or SplitSpec(height=height, width=width, min_cube_pixels=0)
         scores = np.zeros((len(questions), questions.answers))
         for row in range(len(questions)):
             images = questions.read("questions", row)

@@ -93,7 +93,7 @@ def symmetric(maps: Tensor, k: int) -> Tensor:
 
 def answers_of(network: UNet, _card: Card, questions: QuestionsFile) -> Answers:
     """Return how a network of depth answers questions."""
-    fov = (questions.spec or SplitSpec()).fov_y_degrees
+    fov = (questions.cube_spec or SplitSpec()).fov_y_degrees
 
     def scores(images: Tensor) -> Tensor:
         depth = [seen_depth(network, pictures) for pictures in images]

@@ -246,8 +246,9 @@ class QuestionImages(Dataset[dict[str, Any]]):
             raise SpecError("networks", "a camera or category as input", "neither, for questions")
         check_reducible(questions.path, questions.height, questions.width, size)
         check_truth(questions)
-        assert questions.spec is not None, "check_truth asks for it"
-        self._opened, self._size, self.spec = opened, size, questions.spec
+        spec = questions.cube_spec
+        assert spec is not None, "check_truth asks for it"
+        self._opened, self._size, self.spec = opened, size, spec
         self.fingerprint = questions.fingerprint
         self.has_answers = questions.has_answers
         self._places, self._colors = question_lights(questions, len(questions))
@@ -281,7 +282,7 @@ class QuestionImages(Dataset[dict[str, Any]]):
 
 def check_background(questions: QuestionsFile, config: ModelConfig) -> None:
     """Raise SpecError where the polar encoder would take a background for part of the shape."""
-    spec = questions.spec
+    spec = questions.cube_spec
     if config.networks.encoder == "polar" and spec is not None and min(spec.background) < BRIGHT:
         expected = "white, because the polar encoder detects the shape by a white background"
         raise SpecError(questions.path, f"a background of {spec.background}", expected)
@@ -306,10 +307,11 @@ def for_questions(config: ModelConfig, questions: QuestionsFile) -> ModelConfig:
     check(spec.z > Z_VIEW, "z scene", spec.z, f"{Z_VIEW + 1} or more, for questions")
     check_truth(questions)
     check_background(questions, config)
-    assert questions.spec is not None, "check_truth asks for it"
-    distance = questions.spec.camera_distance
+    asked = questions.cube_spec
+    assert asked is not None, "check_truth asks for it"
+    distance = asked.camera_distance
     spec = replace(spec, camera=False, classes=0, standardised=True)
     spec = replace(spec, z_scene=spec.z - Z_VIEW, z_view=Z_VIEW)
-    reach = min(0.9, questions.spec.max_radius / distance)
+    reach = min(0.9, asked.max_radius / distance)
     config = replace(config, networks=spec, depth_middle=distance, depth_reach=reach)
     return replace(config, opacity=True)

@@ -55,7 +55,7 @@ class TrainingShapes:
         height, width = questions.height, questions.width
         check_reducible(questions.path, height, width, settings.size)
         self._settings, self._questions = settings, questions
-        spec = questions.spec
+        spec = questions.cube_spec
         assert spec is not None, "check_truth asks for it"
         self._radius = 1 / spec.framing_distance(1.0)  # of the framed ball, at camera distance 1
         pose = spec.camera(1 / self._radius).world_from_camera

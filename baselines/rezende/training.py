@@ -94,7 +94,7 @@ def read_question_pictures(questions: QuestionsFile, size: int) -> Pictures:
     """
     check_truth(questions)
     check_reducible(questions.path, questions.height, questions.width, size)
-    spec, count = questions.spec, min(len(questions), MOST_QUESTIONS)
+    spec, count = questions.cube_spec, min(len(questions), MOST_QUESTIONS)
     assert spec is not None, "check_truth asks for it"
     images = [image for row in range(count) for image in question_images(questions, row, size)]
     position, color = question_lights(questions, count)

@@ -77,9 +77,10 @@ def question_lights(questions: QuestionsFile, count: int) -> tuple[Array, Array]
 
     Raises FileFormatError for a number that is not finite.
     """
-    assert questions.spec is not None, "check_truth asks for it"
+    spec = questions.cube_spec
+    assert spec is not None, "check_truth asks for it"
     rows = slice(0, count)
-    scale = questions.spec.camera_distance / questions.read("camera_distance", rows)
+    scale = spec.camera_distance / questions.read("camera_distance", rows)
     scale = scale[:, None, None, None]
     lights = {"light_position": scale, "light_color": scale**2}
     for name, factor in lights.items():

@@ -178,6 +178,13 @@ class QuestionsFile(RowFile):
                 self.close()
                 raise
 
+    @property
+    def cube_spec(self) -> SplitSpec | None:
+        """`spec` of questions about cubes. Raises SpecError for questions about rooms."""
+        if self.spec is None or isinstance(self.spec, SplitSpec):
+            return self.spec
+        raise SpecError(str(self.path), "questions about rooms", "questions about shapes of cubes")
+
     def _open_columns(self) -> None:
         file = self.opened.file
         if "format" in file.attrs:

@@ -276,7 +276,12 @@ WRONG_QUESTIONS = [
     ("answer_groups/by_distractor/mirror/n", 5, "answer_groups.by_distractor", "as in items"),
     ("answer_groups/by_distractor/mirror/right", [5], "", "up to n"),
     ("answer_groups/by_distractor/mirror/right", [], "", "runs"),
-    ("answer_groups/by_distractor/mirror/low", 0.1, "answer_groups.by_distractor.mirror", "contains"),
+    (
+        "answer_groups/by_distractor/mirror/low",
+        0.1,
+        "answer_groups.by_distractor.mirror",
+        "contains",
+    ),
 ]
 TABLES = (ROOMS, WRONG_ROOMS), (RUNS, WRONG_RUNS), (OBJECTS, WRONG_OBJECTS), (IQTT, WRONG_QUESTIONS)
 

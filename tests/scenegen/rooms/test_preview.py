@@ -41,7 +41,7 @@ def test_srgb_is_the_standard_curve():
 def test_the_command(run, rooms_path, rooms):
     result = run("preview", rooms_path, "--items", "6,1", "--out", "a.png")
     assert result.exit_code == 0
-    assert "a.png: 2 of" in result.output
+    assert "a.png: 2 images of" in result.output
     with Image.open("a.png") as sheet:
         assert np.array_equal(np.asarray(sheet), np.asarray(contact_sheet([rooms[6], rooms[1]])))
     for name in ("b", "c"):
