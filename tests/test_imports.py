@@ -55,7 +55,7 @@ def test_importing_the_packages_loads_nothing_heavy(tmp_path):
 def test_help_loads_nothing_heavy(tmp_path):
     render = "scenegen render --n 1 --size 32 --out nowhere/x.h5"
     loaded = first_users(*LIGHT, render, cwd=tmp_path)
-    assert "numpy" in loaded.pop(render), "this check can fail"
+    assert loaded.pop(render), "this check can fail"
     assert {line: names for line, names in loaded.items() if names} == {}
 
 
