@@ -23,12 +23,6 @@ TASK = (
     "One answer shows the room of the reference, seen from elsewhere. Which one? All answers are"
     " seen from one place."
 )
-RULE = (
-    "Each picture shows a furnished room. One of the answers shows the same room as the reference,"
-    " seen from another place. The other answers differ from it in where some furniture is or in"
-    " what direction it faces, or they are its mirror image. All answers are seen from one place."
-)
-ASK = "Which answer shows the same room as the reference?"
 
 
 @dataclass(frozen=True, eq=False)

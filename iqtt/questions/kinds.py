@@ -19,8 +19,8 @@ class QuestionKind:
     Attributes:
         meaning: what its wrong options show.
         options: numbers of options that it can have.
-        mixed: whether `mixed` draws it. Kinds that come later do not, so that the questions of
-            earlier requests stay.
+        mixed: whether `mixed` draws it. Kinds that come later are not drawn, so that the questions
+            of earlier requests stay.
     """
 
     meaning: str
@@ -36,11 +36,11 @@ QUESTION_KINDS = {  # `mixed` draws from them in this order
     "matched": QuestionKind("different shapes with similar silhouettes"),
     "mirror-pair": QuestionKind("the mirror image only"),
 }
-ROOM_KINDS = {  # of furnished rooms; `mixed` draws from those with three options
+ROOM_KINDS = {  # of furnished rooms; `mixed` draws from those that 2D rules on masks do not solve
     "moved": QuestionKind("one object at other places", options=(3,)),
-    "swapped": QuestionKind("three objects in another order", options=(3,)),
+    "swapped": QuestionKind("three objects in another order", options=(3,), mixed=False),
     "turned": QuestionKind("one object in other directions", options=(3,)),
-    "mirror-pair": QuestionKind("the mirror image of the room", options=(2,)),
+    "mirror-pair": QuestionKind("the mirror image of the room", options=(2,), mixed=False),
 }
 DISTRACTORS = (*QUESTION_KINDS, "mixed")  # what `--distractors` takes
 

@@ -1,6 +1,5 @@
 """What a model is asked: words, and the sizes of pictures."""
 
-from iqtt.perspective import columns as rooms
 from iqtt.vlm.reading import LETTERS
 
 SMALLEST, SIZE, LARGEST = 64, 512, 1024  # pixels of a picture's shorter side
@@ -10,6 +9,12 @@ RULE = (
     " other answers show other shapes, and these may be the mirror image of the reference."
 )
 ASK = "Which answer shows the same shape as the reference?"
+ROOMS_RULE = (
+    "Each picture shows a furnished room. One of the answers shows the same room as the reference,"
+    " seen from another place. The other answers differ from it in where some furniture is or in"
+    " what direction it faces, or they are its mirror image. All answers are seen from one place."
+)
+ROOMS_ASK = "Which answer shows the same room as the reference?"
 # Not a sentence to be learned: whoever trains on text with this mark has trained on test data.
 CANARY = "pix2shape-bench:canary:5b0c1e0a-6f0e-4c39-9a7d-2f4f0d9c7e61"
 
@@ -30,7 +35,7 @@ def question_text(
         with_reference: False asks without the reference, for a control.
         of_rooms: whether it is about furnished rooms, not shapes.
     """
-    rule, ask = (rooms.RULE, rooms.ASK) if of_rooms else (RULE, ASK)
+    rule, ask = (ROOMS_RULE, ROOMS_ASK) if of_rooms else (RULE, ASK)
     names = ", ".join(LETTERS[:answers])
     if layout == "separate":
         shown = f"The first picture is the reference. The next {answers} pictures are {names}."

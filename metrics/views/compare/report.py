@@ -152,7 +152,7 @@ def _notes(comparison: Comparison, files: Sequence[ScoreFile]) -> list[str]:
         "difference: method - first method, paired, with its uncorrected"
         f" {CONFIDENCE:.0%} bootstrap CI over {apart}",
         f"b/w/s: number of {items} that are better, worse, the same; p: {test}, two-sided; Holm:"
-        f" corrected for {len(comparison.differences)} comparisons; verdict: at {ALPHA:.0%}",
+        f" corrected for all comparisons ({len(comparison.differences)}); verdict: at {ALPHA:.0%}",
         "MDE: minimum detectable effect, the smallest difference that this test set detects with"
         f" {POWER:.0%} power"
         " after the correction",
