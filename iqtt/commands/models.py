@@ -9,7 +9,7 @@ from scenegen.command_line.paths import InputPath
 # fmt: off
 model_options = together(  # those of `iqtt.vlm.rows.Asked`
     click.option("--answer-key", "answers", cls=Renamed, former="--answers", type=InputPath(),
-                 help="Answer key of a test file, which also holds the cubes to draw"
+                 help="Answer key of a test file. The key also holds the cubes to draw"
                  " [default: the one next to FILE]."),
     click.option("--with-answer-key", "with_answers", cls=Renamed, former="--with-answers",
                  is_flag=True,
