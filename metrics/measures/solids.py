@@ -14,7 +14,7 @@ Array = NDArray[Any]
 Spans = tuple[Array, Array]
 NEAR = 0.02  # scene units: within which a layer counts as found
 SHARES = np.linspace(0.0, 1.0, 12)[1:]  # quantiles of thickness that shortcuts try
-HIDDEN = (2, 3, 4)  # layers whose recall is told apart
+HIDDEN = (2, 3, 4)  # layers that have a recall of their own
 
 
 def paired_spans(layers: Array) -> Spans:

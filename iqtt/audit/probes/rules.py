@@ -118,7 +118,7 @@ class Evidence:
         places: positions of the right answers of whole tables, in their order, (Q,) each.
         of_rooms: whether questions are about rooms, whose light belongs to them: comparisons with
             the reference may then beat chance.
-        angles: between the views of reference and right answer, degrees, (N,).
+        angles: between the views of reference and correct option, degrees, (N,).
     """
 
     statistics: Array

@@ -48,7 +48,7 @@ class Question:
 
     @cached_property
     def right(self) -> int | None:
-        """The answer, or else what is told to be right."""
+        """The answer, or else what the answer key says."""
         told = self.kinds.index(-1) if self.kinds.count(-1) == 1 else None
         return told if self.answer is None else self.answer
 
@@ -88,10 +88,12 @@ def prove_rooms(tables: Sequence[AuditTable], sample: Sequence[Array]) -> list[P
     proofs = [
         each("rooms", "scenes of one room, light and set of objects, as specified", _same_room),
         each(
-            "one right answer", "the reference's arrangement in one answer, that told", _one_right
+            "one correct option",
+            "the reference's arrangement in one option, that of the answer key",
+            _one_right,
         ),
         each("labels", "answers differ only as their kind says", _labels),
-        each("views", "cameras look at one place, so many degrees apart as is told", _views),
+        each("views", "cameras look at one place, as many degrees apart as stored", _views),
         _apart(tables, questions),
     ]
     looked = [[(table, row, questions[t][row]) for row in sample[t].tolist()]

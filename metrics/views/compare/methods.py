@@ -12,6 +12,7 @@ from metrics.scoring.evaluate import allowed_alignments, open_runs, score_runs
 from metrics.scoring.geometry import scored_alignment
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.runs import Progress, Runs, Settings
+from metrics.scoring.truth_digests import stated_truth
 from metrics.submissions.reader import RoomPredictions
 from scenegen.files.trial import is_hdf5
 
@@ -24,8 +25,8 @@ def read_or_score(
 ) -> list[ScoreFile]:
     """Return the scores of each path: a score file, or a submission, which is scored here.
 
-    Submissions are scored under the alignment that is common to all of them, where they can be, so
-    that no metric is missing after it.
+    A submission is scored under the alignment that is common to all methods on its ground truth, if
+    it can be, so that no metric is missing after it.
 
     Args:
         truth: ground truth of the submissions; without it each submission names its own.
@@ -42,7 +43,6 @@ def read_or_score(
             opened.append(
                 opening.enter_context(open_runs([path], truth)) if submitted else read_scores(path)
             )
-        common = common_alignment([_declared(one) for one in opened], settings.align)
         rows = sum(len(one.files[0]) for one in opened if isinstance(one, Runs))
         progress = opening.enter_context(progress_of(rows)) if rows else None
         scored: list[ScoreFile] = []
@@ -50,8 +50,14 @@ def read_or_score(
             if isinstance(one, ScoreFile):
                 scored.append(one)
             elif progress is not None:
+                rivals = [_declared(other) for other in opened if _truth(other) == _truth(one)]
+                common = common_alignment(rivals, settings.align)
                 scored.append(_scored(one, Path(path), common, settings, progress))
         return scored
+
+
+def _truth(one: Runs | ScoreFile) -> tuple[str, str | None]:
+    return one.truth if isinstance(one, ScoreFile) else stated_truth(one.truth)
 
 
 def _declared(one: Runs | ScoreFile) -> tuple[str, Alignment]:

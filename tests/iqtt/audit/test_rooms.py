@@ -61,7 +61,7 @@ def test_a_wrong_key_is_found(failing):
         kinds = file["truth/distractor_kind"][0]
         file["truth/distractor_kind"][0] = np.roll(kinds, 1)
 
-    assert "one right answer" in failing(wrong)
+    assert "one correct option" in failing(wrong)
 
 
 def test_a_wrong_key_whose_scenes_agree_is_found_in_the_images(failing):

@@ -4,6 +4,7 @@ from contextlib import contextmanager
 
 import numpy as np
 import pytest
+from made_scores import rooms_scores
 
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import write_scores
@@ -59,3 +60,12 @@ def test_submissions_are_scored_under_the_common_alignment(methods, truths, tmp_
 def test_no_alignment_is_tighter_than_a_declared_one(methods, truths):
     with pytest.raises(AlignmentError):
         compared(methods, truths.rooms, align="scale")
+
+
+def test_other_test_sets_have_alignments_of_their_own(methods, truths, tmp_path):
+    """Disparity on another test set is in no table with depth up to scale and shift."""
+    other = rooms_scores("other", {"abs_rel": np.full(8, 0.1)}, np.arange(8),
+                         alignment="disparity_scale_shift")  # fmt: skip
+    write_scores(other, tmp_path / "other.json")
+    affine, kept = compared([methods[1], tmp_path / "other.json"], truths.rooms)
+    assert (affine.alignment, kept.alignment) == ("scale_shift", "disparity_scale_shift")
