@@ -19,18 +19,16 @@ from iqtt.audit.probes.rules import Probe, run_floor_probes
 from iqtt.audit.table import open_paths, read_table
 from iqtt.files.make import make_split
 from iqtt.files.split import FILES
-from iqtt.floors import CHANCE, Floor, Measured, settings_of
+from iqtt.floors import CHANCE, Floor, Measured, Settings, settings_of
 from iqtt.perspective.specs import PerspectiveSpec
-from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.splits import TooFewShapesError
 
 QUESTIONS = 6_000  # of each kind
 SEED = int.from_bytes(b"floors")
-Spec = SplitSpec | PerspectiveSpec
 
 
 def measure_floors(
-    specs: Sequence[Spec],
+    specs: Sequence[Settings],
     count: int = QUESTIONS,
     *,
     workers: int = 1,
@@ -47,8 +45,8 @@ def measure_floors(
 
     Also returns, for each floor, all probes. Raises as `make_split`.
     """
-    floors: dict[Spec, list[Floor]] = {}
-    probes: dict[Spec, list[tuple[Probe, ...]]] = {}
+    floors: dict[Settings, list[Floor]] = {}
+    probes: dict[Settings, list[tuple[Probe, ...]]] = {}
     for (settings, kind), spec in floor_specs(specs, count).items():
         with tempfile.TemporaryDirectory(prefix="iqtt-floors-") as folder:
             try:
@@ -63,7 +61,7 @@ def measure_floors(
     return [(Measured(s, tuple(floors[s])), probes[s]) for s in floors]
 
 
-def floor_specs(specs: Iterable[Spec], count: int) -> dict[tuple[Spec, str], Spec]:
+def floor_specs(specs: Iterable[Settings], count: int) -> dict[tuple[Settings, str], Settings]:
     """Return what each floor is measured on, by `settings_of` and the kind of question."""
     drawn = {}
     for spec in specs:

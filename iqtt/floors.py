@@ -12,7 +12,7 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal, TypeVar
+from typing import Any, Literal, TypeAlias
 
 from iqtt.perspective.specs import PerspectiveSpec
 from iqtt.questions.specs import QuestionSpec, SplitSpec
@@ -20,7 +20,8 @@ from scenegen.common.records import check, from_json
 
 SHIPPED = "floors.json"
 CHANCE = "chance, which no classifier beats"
-Settings = TypeVar("Settings", SplitSpec, PerspectiveSpec)
+SIDE = 96  # pixels of images of rooms that floors are measured on
+Settings: TypeAlias = SplitSpec | PerspectiveSpec
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Floor:
 class Measured:
     """The floors of questions with these settings (`settings_of`), one for each kind."""
 
-    settings: SplitSpec | PerspectiveSpec
+    settings: Settings
     floors: tuple[Floor, ...]
 
 
@@ -77,7 +78,7 @@ def settings_of(spec: Settings) -> Settings:
         image_dtype="uint8", with_depth=False,
     )  # fmt: skip
     if isinstance(spec, PerspectiveSpec):
-        less = spec.SMALLEST / min(spec.height, spec.width)
+        less = SIDE / min(spec.height, spec.width)
         return replace(
             spec, height=round(less * spec.height), width=round(less * spec.width),
             object_split="train", spp=1, denoise=False,
