@@ -97,8 +97,8 @@ option = partial(click.option, show_default=True)
     former="--answers",
     type=int,
     default=3,
-    help="Number of options per question, 3 or 2. One option is correct. A mirror-pair of rooms has"
-    " 2.",
+    help="Number of options per question, 3 or 2. One option is correct. Questions about rooms have"
+    " 3.",
 )
 @click.option(
     "--angle",
