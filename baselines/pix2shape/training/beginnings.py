@@ -98,7 +98,7 @@ def _tables(
         more = NEIGHBOURS if config.matching and not data.hold_questions else {}
         shown = data.shown(config.networks.size, config.seed, **more)
         rows = shown.whole(FIRST)
-        block: Any = next(shown.blocks(0, rows, workers=0, rank=0, world_size=1))
+        block: Any = next(shown.blocks(0, rows, workers=0))
         return (block, block) if data.hold_questions else block, shown
     if not data.hold_questions:
         return only(data.rooms(), "pix2shape"), None
