@@ -53,8 +53,8 @@ NOT_COMPARABLE = (
     " the file was scored without --truth"
 )
 BELOW = (
-    "methods below the baseline are not significantly better than it; they have no rank, and the"
-    " next column orders them"
+    "methods below the baseline have no rank, because none of them is significantly better than the"
+    " baseline; the next column orders them"
 )
 SHARED = (
     "methods share a rank if the 95% CI of their paired difference contains 0; bold: significantly"
