@@ -98,8 +98,8 @@ option = partial(click.option, show_default=True)
     former="--answers",
     type=int,
     default=3,
-    help="Number of options per question, 3 or 2. One option is correct. With --preset perspective,"
-    " mirror-pair questions have 2.",
+    help="Number of options per question, 3 or 2. One option is correct. Questions about rooms have"
+    " 3.",
 )
 @click.option(
     "--angle",

@@ -31,8 +31,7 @@ class RoomTruth:
 
     Attributes:
         scenes: of each image, with one camera.
-        in_play: numbers of the objects in which answers differ; of mirror images, three objects
-            that all images show.
+        in_play: numbers of the objects in which answers differ.
         visible_pixels, whole_pixels: pixels that show each of these, and would if nothing hid it,
             (1 + K, n).
         exposure: how images were developed, (1 + K, 5).
@@ -90,8 +89,7 @@ def room_columns(spec: PerspectiveSpec) -> list[Column]:
                "difficulty: from the reference's line of sight to that of the answers, about the"
                " vertical axis", within=(0, 180)),
         Column("in_play", (IN_PLAY,), "int8", "1", "by object id",
-               "objects in which answers differ; of mirror images, objects that all images show; 0"
-               " where unused", within=(0, 100)),
+               "objects in which answers differ; 0 where unused", within=(0, 100)),
         Column("visible_pixels", (images, IN_PLAY), "int32", "pixel", "-",
                "pixels that show each of these objects"),
         Column("whole_pixels", (images, IN_PLAY), "int32", "pixel", "-",

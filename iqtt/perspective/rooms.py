@@ -34,11 +34,10 @@ from scenegen.sampling.interiors.scenes import scene_arrays
 Array = NDArray[Any]
 ATTEMPTS = 1024  # rooms that are drawn for a question
 ANCHORS = 2  # other objects, at least, that all images show
-IN_PLAY = 3  # most objects in play, and those of a pair of mirror images
+IN_PLAY = 3  # most objects in play
 LEAST_SHOWN = 0.005  # share of an image's pixels that show an object in play
 LEAST_SHARE = 0.5  # of the pixels of an object in play, if nothing hid it, those that show it
 LEAST_CHANGED = 0.005  # share of pixels in which two options show other objects
-MIRROR = DISTRACTOR_KINDS.index("mirror")
 REFERENCE, OPTION = 0, 1  # cameras
 
 
@@ -144,26 +143,19 @@ def _seen(
     least = LEAST_SHOWN * spec.height * spec.width
     flat = ids.reshape(-1, *ids.shape[2:])
     shown = visible_pixels(flat, rooms.interior.object_slots).reshape(2, count, -1)
-    order = np.argsort(-shown.min(axis=(0, 1)), kind="stable")
-    if np.count_nonzero(shown.min(axis=(0, 1)) >= least) < (len(in_play) or 1) + ANCHORS:
-        return None
-    chosen = np.array(in_play, int) - 1 if in_play else order[: 2 * IN_PLAY]
-    chosen = chosen[(shown[:, :, chosen] >= least).all(axis=(0, 1))]
-    if len(chosen) < (len(in_play) or IN_PLAY):
+    chosen, many = np.array(in_play, int) - 1, len(in_play)
+    large = np.all(shown >= least, axis=(0, 1))
+    if not large[chosen].all() or np.count_nonzero(large) < many + ANCHORS:
         return None
     whole = np.stack([_whole(batch, chosen, device) for batch in batches])
-    good = (shown[:, :, chosen] >= LEAST_SHARE * whole).all(axis=(0, 1))
-    if np.count_nonzero(good) < (len(in_play) or IN_PLAY):
+    if (shown[:, :, chosen] < LEAST_SHARE * whole).any():
         return None
-    kept = np.flatnonzero(good)[:IN_PLAY]
     slots = np.zeros(IN_PLAY, np.int8)
-    slots[: len(kept)] = 1 + chosen[kept]
+    slots[:many] = in_play
     visible, wholes = np.zeros((2, 2, count, IN_PLAY), np.int32)
-    visible[:, :, : len(kept)], wholes[:, :, : len(kept)] = (
-        shown[:, :, chosen[kept]], whole[:, :, kept]
-    )  # fmt: skip
-    code = MIRROR if kind == "mirror-pair" else DISTRACTOR_KINDS.index(kind)
+    visible[:, :, :many], wholes[:, :, :many] = shown[:, :, chosen], whole
     depth = np.stack([found["depth"] for found in pixels])
+    code = DISTRACTOR_KINDS.index(kind)
     return Drawn(index, code, angle, scenes, slots, ids, depth, visible, wholes)
 
 

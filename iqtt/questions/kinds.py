@@ -40,7 +40,6 @@ ROOM_KINDS = {  # of furnished rooms; `mixed` draws from those that 2D rules on 
     "moved": QuestionKind("one object at other places", options=(3,)),
     "swapped": QuestionKind("three objects in another order", options=(3,), mixed=False),
     "turned": QuestionKind("one object in other directions", options=(3,)),
-    "mirror-pair": QuestionKind("the mirror image of the room", options=(2,), mixed=False),
 }
 DISTRACTORS = (*QUESTION_KINDS, "mixed")  # what `--distractors` takes
 

@@ -37,7 +37,6 @@ NO_BASELINE = (
     "no skill: no 2D-only baseline is known for these settings; measure it with `iqtt floors {}`,"
     " then score with --baselines floors.json"
 )
-OF_ROOMS = "no skill: docs/perspective.md has the accuracy of 2D rules on questions about rooms"
 BY_KIND = "by distractor type"
 GROUP_TITLES = {
     "by_view_angle": "by angle to the first view of the scene, degrees",
@@ -357,8 +356,6 @@ def skill_notes(scores: ScoreFile, shown: Sequence[str] = ()) -> list[str]:
     if scores.task == "iqtt":
         if not scores.skills:
             known = bool(scores.by_distractor)
-            if {"moved", "swapped", "turned"} & scores.by_distractor.keys():
-                return [OF_ROOMS]
             missing = "no skill: the answer key has no settings, so no baseline is known"
             return [NO_BASELINE.format(plain(scores.meta.truth_path)) if known else missing]
         chance = f"chance is {1.0 / scores.meta.counts['answers']:.2f}"

@@ -1,7 +1,7 @@
 """Proofs about furnished rooms, from the scenes that files tell; no code of the generator.
 
 A scene is compared by where each object is in the frame of the first one, so the motion of a camera
-or of a whole room makes no difference, but a mirror image does.
+or of a whole room makes no difference.
 """
 
 import itertools
@@ -35,7 +35,6 @@ LEAST_TURN = 60.0  # degrees between directions of a turned object
 SHOWN, SHARE, CHANGED = 0.005, 0.5, 0.005  # of an image's pixels; of an object's; of an image's
 TRACED = 16  # questions whose images are traced again
 NEAR, MOST_OFF = 8, 0.01  # difference of a value of 255, and the share that may differ by more
-FLIP = np.diag([-1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +167,7 @@ def _same_room(spec: PerspectiveSpec, q: Question) -> str:
     scenes, allowed = q.truth.scenes, spec.interior()
     names = {tuple((x.shape, x.scale, x.mesh) for x in scene.objects) for scene in scenes}
     inside = [s.interior for s in scenes if s.interior]
-    lights = {(one.size, round(abs(one.hour - 12), 9), one.lit) for one in inside}
+    lights = {(one.size, one.hour, one.lit) for one in inside}
     if len(scenes) != 1 + spec.answers or len(names) != 1 or len(lights) != 1:
         return "scenes of other rooms or objects"
     if any(len(s.cameras) != 1 or s.interior is None or s.index != scenes[0].index for s in scenes):
@@ -199,20 +198,24 @@ def _labels(_spec: PerspectiveSpec, q: Question) -> str:
     if not numbers or max(numbers) >= count or len(set(numbers)) < len(numbers):
         return f"objects in play {q.truth.in_play} of {count}"
     poses = np.stack([_poses(scene) for scene in options])
-    if kind == "mirror-pair-2":
-        return _mirrored(options, poses)
     assert options[0].interior
-    rides = set(numbers)
-    for n in range(count):  # what stands on something has a larger number
-        if options[0].interior.stands_on[n] - 1 in rides:
-            rides.add(n)
-    rest = [n for n in range(count + 1) if n not in rides]
+    rides = with_carried(options[0].interior.stands_on, q.truth.in_play)
+    rest = [n for n in range(count + 1) if n + 1 not in rides]
     if np.ptp(poses[:, rest], axis=0).max() > SAME or len({_shell(s) for s in options}) > 1:
         return "what is not in play differs"
     below = {s.interior.stands_on[numbers[0]] for s in options if s.interior}
     floor = all(on == 0 or options[0].objects[on - 1].name == "rug" for on in below)
     test, least = _IN_PLAY.get(kind), ON_FLOOR if floor else ON_TOP
     return test(poses[:, numbers], least) if test else f"kind {kind}"
+
+
+def with_carried(stands_on: Sequence[int], numbers: Sequence[int]) -> set[int]:
+    """Return objects and what stands on them, which has larger numbers."""
+    found = set(numbers)
+    for number, on in enumerate(stands_on, start=1):
+        if on in found:
+            found.add(number)
+    return found
 
 
 def _moved(poses: Array, least: float) -> str:
@@ -254,38 +257,6 @@ def _turned(poses: Array, _least: float) -> str:
 _IN_PLAY = {"moved": _moved, "swapped": _swapped, "turned": _turned}
 
 
-def _mirrored(options: Sequence[SceneSpec], poses: Array) -> str:
-    """Return what is wrong with the mirror image of a room, in which no object is mirrored."""
-    first, second = (scene.interior for scene in options)
-    assert first
-    assert second
-    places = poses[0, :-1, :, 3] @ FLIP + [first.size[0], 0, 0]
-    turns = FLIP @ poses[0, :-1, :, :3] @ FLIP
-    if (
-        max(np.abs(places - poses[1, :-1, :, 3]).max(), np.abs(turns - poses[1, :-1, :, :3]).max())
-        > SAME
-    ):
-        return "objects are not where the mirror image has them"
-    sides = {"west": "east", "east": "west"}
-    expected = {
-        (h.kind, sides.get(h.wall, h.wall), h.bottom, h.top)
-        + (
-            (h.left, h.right)
-            if h.wall in sides
-            else (first.size[0] - h.right, first.size[0] - h.left)
-        )
-        for h in first.openings
-    }
-    found = {(h.kind, h.wall, h.bottom, h.top, h.left, h.right) for h in second.openings}
-    turned = min((first.facing_degrees + second.facing_degrees) % 360, 1) < SAME
-    turned &= abs(first.hour + second.hour - 24) < SAME and first.mirrored != second.mirrored
-    return (
-        ""
-        if expected == found and turned
-        else "openings or the sun are not where the mirror image has them"
-    )
-
-
 def _views(spec: PerspectiveSpec, q: Question) -> str:
     assert q.truth
     reference, *options = [scene.cameras[0] for scene in q.truth.scenes]
@@ -299,16 +270,12 @@ def _views(spec: PerspectiveSpec, q: Question) -> str:
     angle, told = math.degrees(math.acos(np.clip(cosine, -1, 1))), q.truth.angle_degrees
     if abs(angle - told) > 1e-3 or not spec.angle[0] <= told <= spec.angle[1]:
         return f"{angle:.3f} degrees, told {told:.3f}"
-    width = q.truth.scenes[0].interior.size[0] if q.truth.scenes[0].interior else 0.0
-    for camera in options:
-        flipped = (width - camera.position[0], *camera.position[1:])
-        if min(math.dist(seen.position, camera.position), math.dist(seen.position, flipped)) > SAME:
-            return "answers are seen from two places"
-    return ""
+    apart = max(math.dist(seen.position, camera.position) for camera in options)
+    return "answers are seen from two places" if apart > SAME else ""
 
 
 def _apart(tables: Sequence[AuditTable], questions: Sequence[Sequence[Question]]) -> Proof:
-    """Prove that no room is in two questions, and so in no two splits; mirror images are one."""
+    """Prove that no room is in two questions, and so in no two splits."""
     seen: dict[str, tuple[int, int]] = {}
     wrong, found = [np.zeros(len(table), bool) for table in tables], {}
     for t, rows in enumerate(questions):
@@ -317,7 +284,7 @@ def _apart(tables: Sequence[AuditTable], questions: Sequence[Sequence[Question]]
             if inside is None:
                 continue
             spans = sorted((h.kind, h.right - h.left, h.bottom, h.top) for h in inside.openings)
-            key = json.dumps([inside.size, round(abs(inside.hour - 12), 9), inside.lit, spans])
+            key = json.dumps([inside.size, inside.hour, inside.lit, spans])
             if key in seen:
                 wrong[t][row] = True
                 other = seen[key]

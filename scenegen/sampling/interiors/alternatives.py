@@ -26,12 +26,11 @@ from scenegen.sampling.interiors.spaces import (
     Space,
     apart,
     box_at,
-    clear_of,
     stepped_turn,
 )
 from scenegen.sampling.interiors.viewpoints import Place, draw_cameras
 
-DIFFERENCES = ("moved", "swapped", "turned", "mirror-pair")
+DIFFERENCES = ("moved", "swapped", "turned")
 STANDING = (
     "chair",
     "armchair",
@@ -83,8 +82,8 @@ class Alternatives:
     """Rooms that differ in one thing.
 
     Attributes:
-        rooms: two or three, each with the positions of both cameras.
-        in_play: numbers of the objects in which they differ; empty for mirror images.
+        rooms: three, each with the positions of both cameras.
+        in_play: numbers of the objects in which they differ.
     """
 
     rooms: tuple[Drawn, ...]
@@ -107,14 +106,6 @@ def draw_alternatives(
     draws = Draws(spec.seed, index, Purpose.PERSPECTIVE)
     arranger = replace(arranger, draws=draws)
     fov = item_room(spec, index)[2]
-    if difference == "mirror-pair":
-        found = _cameras(spec, arranger.space, draws, fov, degrees)
-        if found is not None:
-            drawn: Drawn = (arranger.room, arranger.space.placed, *found)
-            other = _mirrored(drawn)
-            if _holds(other[1]):
-                yield Alternatives(tuple(draws.shuffled((drawn, other))), ())
-        return
     for group in itertools.islice(_groups(arranger, difference), GROUPS):
         yield from _varied(spec, arranger, difference, group, degrees, fov)
 
@@ -227,7 +218,7 @@ def _cameras(
     draws: Draws,
     fov: float,
     degrees: float,
-    focuses: Sequence[Box] = (),
+    focuses: Sequence[Box],
 ) -> tuple[list[Place], Place] | None:
     """Draw the positions of both cameras, and the point that both look at; None for none."""
     found = draw_cameras(spec, space, draws, fov, (0.0, degrees), focuses)
@@ -376,51 +367,3 @@ def _spots(
         if len(spots) == count:
             return draws.shuffled(spots)
     return []
-
-
-def _mirrored(drawn: Drawn) -> Drawn:
-    """Return the mirror image of a room and its cameras; the objects in it are not mirrored."""
-    room, things, places, target = drawn
-    width = room.size[0]
-    walls = {"west": "east", "east": "west"}
-    openings = tuple(
-        replace(hole, wall=walls[hole.wall])
-        if hole.wall in walls
-        else replace(hole, left=width - hole.right, right=width - hole.left)
-        for hole in room.openings
-    )
-    # The sun is as high so many hours before noon as after.
-    other = replace(
-        room,
-        openings=openings,
-        hour=24 - room.hour,
-        facing_degrees=-room.facing_degrees % 360,
-        mirrored=True,
-    )
-    boxes = [replace(t.box, x=width - t.box.x, turns=-t.box.turns) for t in things]
-    moved = [replace(t, box=box) for t, box in zip(things, boxes, strict=True)]
-    seen_from = [(width - x, y, z) for x, y, z in places]
-    return other, moved, seen_from, (width - target[0], *target[1:])
-
-
-def _holds(things: Sequence[Placed]) -> bool:
-    """Return whether all objects are apart, and stand on surfaces of what carries them.
-
-    The mirror image of a room need not, as objects may have one hand, such as a desk's drawers.
-    """
-    for number, thing in enumerate(things, start=1):
-        for other in things[: number - 1]:
-            below = thing.stands_on and other is things[thing.stands_on - 1]
-            if apart(thing.box, other.box):
-                continue
-            if not below or not clear_of(other.piece, other.box, thing.box):
-                return False
-        parent = things[thing.stands_on - 1] if thing.stands_on else None
-        if parent is not None and parent.piece.family != "rug":
-            height = thing.box.bottom - parent.box.bottom - ON
-            if not any(
-                abs(y - height) < 1e-6 and Arranger.stands(thing.box, parent.box, sides)
-                for y, *sides in parent.piece.surfaces
-            ):
-                return False
-    return True

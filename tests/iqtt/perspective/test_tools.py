@@ -30,7 +30,7 @@ def test_the_oracle_is_scored_by_type_and_angle(rooms_folder, tmp_path, name):
     ran("bench", "score", tmp_path / "o.h5", "--truth", truth, "--json", scores)
     groups = json.loads(scores.read_text())["answer_groups"]
     assert set(groups["by_distractor"]) <= {"moved", "swapped", "turned"}
-    assert set(groups["by_rotation_angle"]) <= {"0-30", "30-60"}
+    assert set(groups["by_rotation_angle"]) <= {"20-40", "40-60"}
 
 
 def test_baselines_of_shapes_are_refused(rooms_folder, tmp_path):
