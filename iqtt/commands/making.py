@@ -136,9 +136,9 @@ option = partial(click.option, show_default=True)
     "--min-sight-angle",
     "min_sight_angle_degrees",
     type=float,
-    help="Minimum angle, in degrees, between the viewing directions of these views. Close or"
-    " opposite"
-    " viewing directions give similar silhouettes [default: 40; 0 with v2 and paper].",
+    help="Minimum angle, in degrees, between the viewing directions of the reference and of each"
+    " option. Close or opposite directions give similar silhouettes [default: 40; 0 with v2 and"
+    " paper].",
 )
 @option(
     "--min-cube-pixels",

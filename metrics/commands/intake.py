@@ -91,8 +91,8 @@ def reading_options(*kinds: str) -> Callable[[Command], Command]:
         click.option("--array", help="Name of the array in NPZ files, or of the channel in EXR"
                                      " files."),
         click.option("--match", type=click.Choice(["number", "name"]), default="number",
-                     show_default=True, help="Assignment of files to images. number: by the name"
-                     " of the image, or by the number in the file name; name: in alphabetical"
+                     show_default=True, help="Assignment of files to images. number: a file belongs"
+                     " to the image with the same name or number; name: files are in alphabetical"
                      " order."),
     )  # fmt: skip
 

@@ -173,7 +173,8 @@ def _check_images(path: Path, spec: "Request") -> None:
 @click.option(
     "--out",
     type=OutputFolder(),
-    help="Output folder [. for exr, png, ply and obj; else a new one, such as rooms-parquet].",
+    help="Output folder [the current folder for exr, png, ply and obj; else a new folder, such as"
+    " rooms-parquet].",
 )
 @click.option(
     "--rows-per-file",
