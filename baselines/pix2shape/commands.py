@@ -100,7 +100,8 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
     "--config",
     type=click.Choice(["rays", "views", "paper"]),
     help="Configuration. rays: rooms with several views; takes 40 minutes on a CPU. views:"
-    " questions. paper: the paper's size and losses; needs a GPU [rays for rooms, views for questions].",
+    " questions. paper: the paper's size and losses; needs a GPU [rays for rooms, views for"
+    " questions].",
 )
 @click.option(
     "--set",
