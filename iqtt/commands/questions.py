@@ -114,8 +114,8 @@ def audit(
 ) -> None:
     """Check that questions are correct, and search them for shortcuts.
 
-    SPLIT is a question file, a folder of question files (the released ones included), or a folder
-    of such folders, which are audited one by one.
+    SPLIT is a question file, a folder of question files (also of the released 3D-IQTT files), or a
+    folder of such folders.
 
     Proofs recompute each property of the questions with code that is independent of the generator.
     Shortcut classifiers try to select the correct option without comparing shapes. The exit code is
@@ -198,9 +198,9 @@ def floors(
     """Measure the accuracy of 2D-only baselines for the settings of SPLIT.h5.
 
     The command makes new questions about shapes of the training split, which takes minutes, and
-    answers them with all shortcut classifiers of `iqtt audit` that use the images alone. In
-    questions about rooms, these are given the true masks of objects, too. The best
-    accuracy is the zero of the skill score in `bench score --baselines`. The baselines of the
+    answers them with all shortcut classifiers of `iqtt audit` that use the images alone. For
+    questions about rooms, these classifiers also get the true masks of objects. The best
+    accuracy becomes the baseline of `bench score --baselines`. The baselines of the
     presets are part of the package.
     """
     from iqtt.files.reader import open_tables
@@ -251,7 +251,7 @@ def verify(
 ) -> None:
     """Check all files of a split in FOLDER, and make some questions again from the seed.
 
-    Exits with 1 if a check fails. `iqtt audit` proves that the answer key is correct.
+    The exit code is 1 if a check fails. `iqtt audit` proves that the answer key is correct.
     """
     from iqtt.files.verify import verify_split
     from iqtt.questions.specs import secret_seed as read_seed

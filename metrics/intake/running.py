@@ -278,7 +278,8 @@ def _write_answers(
     form = "scores" if values and values[0].ndim else "answer"
     predicted: dict[str, Any] = {form: np.array(values)}
     write_answers(out, questions, **texts, **predicted)
-    return f"{form} to {len(values)} questions"
+    what = "scores" if form == "scores" else "responses"
+    return f"{what} for {len(values)} questions"
 
 
 def _answer(value: Any, offered: int, where: str) -> Array:

@@ -219,7 +219,7 @@ class RoomPredictionWriter:
             expected = f"a row of {self._truth.path}, from 0 to {count - 1}"
             raise PredictionError(f"{self._path}: row", f"{row!r:.40}", expected)
         if self._written[row]:
-            raise PredictionError(f"{self._path}: row {row}", "it twice", "each row once")
+            raise PredictionError(f"{self._path}: row {row}", "the row twice", "each row once")
         return int(row)
 
     def _finish(self, file: h5py.File) -> None:
@@ -229,7 +229,7 @@ class RoomPredictionWriter:
             raise PredictionError(
                 f"{self._path}: row",
                 f"{len(missing)} of {len(self._written)} missing, such as {shown}",
-                "every one" if self._rows else "at least one",
+                "all rows" if self._rows else "at least one row",
                 "nothing was written",
             )
         assert self._table is not None, "a row was written"

@@ -406,7 +406,7 @@ def partner_sentences(scores: ScoreFile) -> list[str]:
     has_score, has_floor = (
         int(np.isfinite(scores.items[column]).sum()) for column in (name, OTHER_SCENE + name)
     )
-    why = "no other scene has the same view as the rest"
+    why = "no other scene has the view of the other images"
     text = f"skill of relief_iou covers {has_floor} of {has_score} images: {why}"
     return [text] * (has_floor < has_score)
 
@@ -420,7 +420,7 @@ def few_clusters(scores: ScoreFile) -> list[str]:
 
 def too_few_warning(count: int, units: str) -> list[str]:
     """Return a warning where a number of scenes or shapes is too small for intervals."""
-    text = f"{count} {units}: {CONFIDENCE:.0%} CIs under-cover below {FEW_CLUSTERS}"
+    text = f"{count} {units}: {CONFIDENCE:.0%} CIs are too narrow below {FEW_CLUSTERS}"
     return [text] * (1 < count < FEW_CLUSTERS)
 
 

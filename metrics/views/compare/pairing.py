@@ -79,7 +79,7 @@ def common_rows(files: Sequence[ScoreFile]) -> list[NDArray[np.int64]]:
             )
         common = np.intersect1d(common, file.ids)
     if not len(common):
-        raise ComparisonError("comparison", f"no {what} that all of the files score", "some")
+        raise ComparisonError("comparison", f"no {what} that all files score", "at least one")
     orders = []
     for file in files:
         rising = np.argsort(file.ids)
