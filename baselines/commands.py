@@ -17,7 +17,6 @@ from baselines.pix2shape.commands import (
     ALLOW_TEST_SET,
     DEVICE,
     MINUTES,
-    STREAM,
     SUBMISSION,
     WEIGHTS_PATH,
     Setting,
@@ -269,7 +268,6 @@ def _check_task(name: str, data: str) -> None:
     metavar="FILE...",
     help="Training files of rooms or questions. Depth networks take several files.",
 )
-@STREAM
 @click.option("--out", type=OutputFolder(), required=True, help="Output folder of the run.")
 @click.option(
     "--labels",
@@ -298,7 +296,6 @@ def train_baseline(
     name: str,
     more: tuple[str, ...],
     data: tuple[str, ...],
-    stream: str | None,
     out: str,
     labels: int | None,
     seed: int | None,
@@ -318,8 +315,6 @@ def train_baseline(
     if minutes is not None and iterations is not None:
         raise click.UsageError("--minutes sets --iterations: leave one of them out")
     home = _baseline(name)
-    if stream is not None and home.streamed is None:
-        raise click.UsageError(f"--stream: {name} trains on files only: give --data")
     from baselines.training.baseline import train
     from baselines.training.machine import Machine
     from scenegen.common.records import check, from_json
@@ -338,7 +333,7 @@ def train_baseline(
     how = {key: chosen.pop(key) for key in arguments & chosen.keys()}
     made = from_json(home.settings, json.dumps(chosen), "settings")
     text = ""
-    opened = training_data((*data, *more), stream, allow_test_set)
+    opened = training_data((*data, *more), allow_test_set)
     with opened as files, shown_training(out, machine.every) as show:
 
         def remember(done: int, total: int, numbers: Mapping[str, float]) -> None:

@@ -67,7 +67,6 @@ class Card:
         labels: how many answers of questions training was given.
         data, fingerprint: request and fingerprint of the training file.
         iteration, seconds: how many iterations are done, and how long they took.
-        rows: of streams that were shown; 0 where files were read.
     """
 
     method: str
@@ -77,7 +76,6 @@ class Card:
     fingerprint: str = ""
     iteration: int = 0
     seconds: float = 0.0
-    rows: int = 0
 
     def __post_init__(self) -> None:
         last = self.settings.iterations
