@@ -17,7 +17,8 @@ from baselines.training.checkpoint import (
     alone_in,
     begun,
     bundled,
-    earlier_state,
+    check_new,
+    load_checkpoint,
     load_weights,
     save_weights,
 )
@@ -175,14 +176,17 @@ def train(
         check(machine.device != "cuda", "device", "cuda", f"cpu, where {method.name} computes")
     device = chosen_device("cpu" if baseline.cpu_only else machine.device)
     with alone_in(folder):
-        earlier = earlier_state(folder, method, resume)
+        if not resume:
+            check_new(folder)
+        earlier = load_checkpoint(folder, method) if resume else None
         before = None if earlier is None else earlier.card
         chosen = before.settings if before else settings or baseline.settings()
         run = Run(method.name, data, folder, chosen, machine, before, progress)
         lesson = baseline.lesson(run, **options)
         network, card = lesson.network, lesson.card
         if network is None:
-            state = begun(method, lesson.card, earlier, data.where, device)
+            state = begun(method, lesson.card, earlier, data.where)
+            state.to(device)
             lesson.prepare(state.network)
             batches = read_ahead(lesson.batches(state.card.iteration), device)
 

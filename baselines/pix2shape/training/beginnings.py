@@ -1,7 +1,6 @@
 """What a run begins from: settings that suit its data, first weights, or a checkpoint."""
 
 import functools
-import json
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,7 @@ from baselines.training.data import TrainingFiles, only, shared_questions, share
 from baselines.training.questions import LABELED, UNLABELED, check_labels
 from iqtt import QuestionsFile
 from scenegen.common.errors import SpecError
-from scenegen.common.records import check, to_json
+from scenegen.common.records import check
 from scenegen.description.specs import Request
 from scenegen.rooms.reader import RoomsFile
 
@@ -143,13 +142,9 @@ def _begin_from(start: str | Path, state: ModelState) -> None:
     Raises SpecError, and as `open_weights`.
     """
     model, card = open_weights(start)
-    records = [json.loads(to_json(record)) for record in (card.settings, state.card.settings)]
     for name in OF_NETWORKS:
-        group = records[1][name] if isinstance(records[1][name], dict) else {}
-        for part in [f"{name}.{key}" for key in group] or [name]:
-            there, here = (functools.reduce(dict.get, part.split("."), r) for r in records)
-            expected = f"weights of the {part} of this run, {here}"
-            check(there == here, "start", f"{start} with {there}", expected)
+        there, here = (getattr(c.settings, name) for c in (card, state.card))
+        check(there == here, "start", f"{start} with {name} {there}", f"{here}, as in this run")
     if state.card.submission == PAPER:
         expected = f"weights of {PAPER}, as other losses than the paper's would have trained them"
         check(card.submission == PAPER, "start", start, expected)

@@ -15,7 +15,7 @@ from refusals import refused
 
 from iqtt.audit.audit import to_json
 from iqtt.audit.proofs.images import content
-from iqtt.audit.report import markdown, table
+from iqtt.audit.report import text
 from iqtt.audit.strangers import RULES, audit_strangers
 from iqtt.audit.table import content_problems, open_paths, read_table
 from iqtt.files.reader import AnswersFile, QuestionsFile
@@ -157,9 +157,7 @@ def test_a_fair_split_passes_and_all_is_told(split_folder, monkeypatch):
     assert {proof["name"] for proof in record["proofs"]} == PROOFS
     assert all(0 <= p["low"] <= p["accuracy"] <= p["high"] <= 1 for p in record["probes"])
     assert all(len(t["fingerprint"]) == 64 for t in record["tables"])
-    assert all(
-        proof.detail in text for text in (table(found), markdown(found)) for proof in found.proofs
-    )
+    assert all(p.detail in text(found, form) for form in (False, True) for p in found.proofs)
 
 
 def test_files_that_cannot_be_audited(tmp_path):
