@@ -1,6 +1,5 @@
 """The settings of a split: the range of each, JSON both ways, and the one camera."""
 
-import json
 import math
 from dataclasses import replace
 
@@ -79,28 +78,6 @@ def test_the_ends_of_each_range_are_accepted_and_survive_json(changed):
     assert spec.render_spec().light_slots == spec.lights[1]
     assert (spec.render_spec().height, spec.render_spec().width) == (spec.height, spec.width)
     assert spec.render_spec().image_dtype == spec.image_dtype
-
-
-def test_json_is_one_sorted_line_of_pythons_own_types():
-    spec = SplitSpec(
-        seed=np.int64(4), cubes=[5, 6], ambient=[0, 0.5, 1], max_radius=3, val=np.int8(3)
-    )
-    raw = json.loads(spec.to_json())
-    assert "\n" not in spec.to_json()
-    assert list(raw) == sorted(vars(spec))
-    assert (spec.cubes, spec.ambient, spec.max_radius) == ((5, 6), (0.0, 0.5, 1.0), 3.0)
-    assert (raw["seed"], raw["val"], raw["cubes"]) == (4, 3, [5, 6])
-    assert hash(SplitSpec.from_json(spec.to_json())) == hash(spec)
-
-
-@pytest.mark.parametrize(
-    "text",
-    ["{", "[]", '{"size":3}', '{"train":1.5}', '{"seed":"1"}', '{"light_level":NaN}',
-     '{"train":-1}', '{"cubes":[5]}'],
-)  # fmt: skip
-def test_text_that_is_no_spec_is_refused(text):
-    with pytest.raises(SpecError):
-        SplitSpec.from_json(text)
 
 
 def test_the_public_request_is_the_same_but_for_its_seed():
