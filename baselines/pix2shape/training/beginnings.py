@@ -21,7 +21,7 @@ from scenegen.common.records import check
 from scenegen.description.specs import Request
 from scenegen.rooms.reader import RoomsFile
 
-OF_NETWORKS = ("networks", "opacity", "material", "lights", "depth_middle", "depth_reach")
+OF_NETWORKS = ("opacity", "material", "lights", "depth_middle", "depth_reach")
 OF_QUESTIONS = (
     "question_batch", "labelled_batch", "turned", "temperature", "hard_negatives", "easy_negatives",
 )  # fmt: skip
@@ -142,9 +142,10 @@ def _begin_from(start: str | Path, state: ModelState) -> None:
     Raises SpecError, and as `open_weights`.
     """
     model, card = open_weights(start)
-    for name in OF_NETWORKS:
-        there, here = (getattr(c.settings, name) for c in (card, state.card))
-        check(there == here, "start", f"{start} with {name} {there}", f"{here}, as in this run")
+    there, here = ({**vars(c.settings), **vars(c.settings.networks)} for c in (card, state.card))
+    for name in (*vars(card.settings.networks), *OF_NETWORKS):
+        message = f"{start} with {name} {there[name]}"
+        check(there[name] == here[name], "start", message, f"{here[name]}, as in this run")
     if state.card.submission == PAPER:
         expected = f"weights of {PAPER}, as other losses than the paper's would have trained them"
         check(card.submission == PAPER, "start", start, expected)
