@@ -250,7 +250,8 @@ def _check_task(name: str, data: str) -> None:
         of_rooms = stored == "questions" and MARK in str(opened.file.attrs.get("spec", ""))
     if of_rooms and name in OF_SHAPES:
         expected = "try oracle-warp, outline, features, cnn or siamese"
-        raise click.UsageError(f"{name} knows shapes alone, and {data} shows rooms; {expected}")
+        why = f"{name} does not answer questions about rooms, such as those of {data}"
+        raise click.UsageError(f"{why}; {expected}")
     if task in ("rooms", "questions") and task != stored:
         others = ", ".join(other for other in ALL if ALL[other].startswith(f"{stored}:"))
         raise click.UsageError(f"{name} predicts {task}, and {data} holds {stored}; try {others}")
