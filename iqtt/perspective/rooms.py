@@ -24,7 +24,7 @@ from scenegen.description.specs import InteriorSpec
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.rendering.amodal import whole_pixels
 from scenegen.rendering.ground_truth import encode_image, visible_pixels
-from scenegen.rendering.packing import SceneBatch, pack_arrays
+from scenegen.rendering.packing import pack_arrays
 from scenegen.rendering.pictures.development import redeveloped
 from scenegen.rendering.renderer import launch_fields, trace
 from scenegen.sampling.interiors.alternatives import draw_alternatives
@@ -34,7 +34,6 @@ from scenegen.sampling.interiors.scenes import scene_arrays
 Array = NDArray[Any]
 ATTEMPTS = 1024  # rooms that are drawn for a question
 ANCHORS = 2  # other objects, at least, that all images show
-IN_PLAY = 3  # most objects in play
 LEAST_SHOWN = 0.005  # share of an image's pixels that show an object in play
 LEAST_SHARE = 0.5  # of the pixels of an object in play, if nothing hid it, those that show it
 LEAST_CHANGED = 0.005  # share of pixels in which two options show other objects
@@ -59,17 +58,16 @@ class Drawn:
         kind: of the wrong options, index into DISTRACTOR_KINDS.
         angle_degrees: between the lines of sight of reference and options.
         scenes: of each camera, K rooms with one view each.
-        in_play: numbers of the objects in which options differ, (IN_PLAY,) int8; 0 in unused slots.
+        in_play: number of the object in which options differ.
         ids, depth: of each camera and room, (2, K, H, W).
-        visible, whole: pixels that show each object in play, and would if nothing hid it,
-            (2, K, IN_PLAY).
+        visible, whole: pixels that show this object, and would if nothing hid it, (2, K).
     """
 
     index: int
     kind: int
     angle_degrees: float
     scenes: tuple[SceneArrays, SceneArrays]
-    in_play: Array
+    in_play: int
     ids: Array
     depth: Array
     visible: Array
@@ -128,7 +126,7 @@ def _seen(
     kind: str,
     angle: float,
     scenes: tuple[SceneArrays, SceneArrays],
-    in_play: Sequence[int],
+    in_play: int,
     device: str,
 ) -> Drawn | None:
     """Return a question if both cameras see all its rooms well, else None."""
@@ -143,26 +141,17 @@ def _seen(
     least = LEAST_SHOWN * spec.height * spec.width
     flat = ids.reshape(-1, *ids.shape[2:])
     shown = visible_pixels(flat, rooms.interior.object_slots).reshape(2, count, -1)
-    chosen, many = np.array(in_play, int) - 1, len(in_play)
-    large = np.all(shown >= least, axis=(0, 1))
-    if not large[chosen].all() or np.count_nonzero(large) < many + ANCHORS:
+    large, visible = np.all(shown >= least, axis=(0, 1)), shown[..., in_play - 1]
+    if not large[in_play - 1] or np.count_nonzero(large) < 1 + ANCHORS:
         return None
-    whole = np.stack([_whole(batch, chosen, device) for batch in batches])
-    if (shown[:, :, chosen] < LEAST_SHARE * whole).any():
+    every = np.arange(count)
+    slot = np.full(count, in_play - 1)
+    whole = np.stack([whole_pixels(batch, every, slot, device) for batch in batches])
+    if (visible < LEAST_SHARE * whole).any():
         return None
-    slots = np.zeros(IN_PLAY, np.int8)
-    slots[:many] = in_play
-    visible, wholes = np.zeros((2, 2, count, IN_PLAY), np.int32)
-    visible[:, :, :many], wholes[:, :, :many] = shown[:, :, chosen], whole
     depth = np.stack([found["depth"] for found in pixels])
     code = DISTRACTOR_KINDS.index(kind)
-    return Drawn(index, code, angle, scenes, slots, ids, depth, visible, wholes)
-
-
-def _whole(batch: SceneBatch, slots: Array, device: str) -> Array:
-    """Return `amodal.whole_pixels` of some objects in all images, (B, S)."""
-    image, slot = (x.ravel() for x in np.meshgrid(np.arange(len(batch)), slots, indexing="ij"))
-    return whole_pixels(batch, image, slot, device).reshape(len(batch), len(slots))
+    return Drawn(index, code, angle, scenes, in_play, ids, depth, visible, whole)
 
 
 @dataclass(frozen=True, eq=False)
@@ -249,7 +238,7 @@ def room_rows(rendered: Sequence[RenderedRooms]) -> dict[str, Any]:
         "scene": np.array([one.scenes for one in rendered], object),
         "distractor_kind": kinds,
         "angle_degrees": np.array([one.drawn.angle_degrees for one in rendered]),
-        "in_play": np.array([one.drawn.in_play for one in rendered]),
+        "in_play": np.array([one.drawn.in_play for one in rendered], np.int8),
         "visible_pixels": np.array([one.of_images(one.drawn.visible) for one in rendered]),
         "whole_pixels": np.array([one.of_images(one.drawn.whole) for one in rendered]),
         "exposure": np.array([one.exposure for one in rendered]),

@@ -1,11 +1,12 @@
 """2D rules for questions about rooms that are given the true mask of each object.
 
-Each rule compares masks of the reference with those of an option, and knows which objects differ.
+Each rule compares masks of the reference with those of an option, and knows which object differs.
 None knows depth or how cameras moved. So they are stronger than rules on pixels, and bound what can
 be reached without 3D.
 """
 
-import itertools
+import math
+from collections.abc import Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -43,20 +44,20 @@ def costs_of_masks(table: AuditTable, rows: Array) -> Array:
             batch = pack(table.spec.interior(), truth.scenes)
             ids = launch_fields(batch, ["object_id"])()["object_id"]
             moving = with_carried(truth.scenes[0].interior.stands_on, truth.in_play)
-            costs[i] = mask_costs(ids, np.array(truth.in_play), np.array(sorted(moving)))
+            costs[i] = mask_costs(ids, truth.in_play, sorted(moving))
     return costs
 
 
-def mask_costs(ids: Array, in_play: Array, moving: Array) -> Array:
+def mask_costs(ids: Array, in_play: int, moving: Sequence[int]) -> Array:
     """Return how much each option differs from the reference by RULES, (K, len(RULES)).
 
     Args:
         ids: objects that the reference and K options show, (1 + K, H, W), from 1.
-        in_play: numbers of the objects that differ.
-        moving: numbers of these, and of what they carry, which no map is fitted to.
+        in_play: number of the object that differs.
+        moving: numbers of this object and of what it carries, which no map is fitted to.
     """
     ids = np.maximum(ids, 0)  # the room, and what is outside
-    most = max(int(ids.max()), *in_play) + 1
+    most = max(int(ids.max()), in_play) + 1
     measured = [_measured(image, most) for image in ids]
     (area, centres, feet), *options = measured
     costs = np.zeros((len(options), len(RULES)))
@@ -65,20 +66,20 @@ def mask_costs(ids: Array, in_play: Array, moving: Array) -> Array:
         seen[[0, *moving]] = False
         fixed = np.flatnonzero(seen)
         here, there, foot, end = (x[in_play] for x in (centres, middles, feet, ends))
-        shown = [(ids[0] == n, ids[1 + k] == n) for n in in_play]
+        masks = ids[0] == in_play, ids[1 + k] == in_play
         costs[k] = (
-            np.linalg.norm(here - there, axis=1).sum(),
-            np.abs(np.log(area[in_play] / size[in_play])).sum(),
-            -sum(_iou(a, b) for a, b in shown),
-            -sum(_iou(_centred(a), _centred(b)) for a, b in shown),
+            math.dist(here, there),
+            abs(math.log(max(area[in_play], 1) / max(size[in_play], 1))),
+            -_iou(*masks),
+            -_iou(*map(_centred, masks)),
             -np.mean(ids[0] == ids[1 + k]),
-            _inversions(centres[:, 0], middles[:, 0], in_play, fixed),
-            _inversions(feet[:, 1], ends[:, 1], in_play, fixed),
-            -_agreement(centres, middles, in_play, fixed),
-            _off(_local_map(centres, middles, in_play, fixed), there),
-            _off(_affine(centres[fixed], middles[fixed], here), there),
-            _off(_affine(feet[fixed], ends[fixed], foot), end),
-            _off(_homography(feet[fixed], ends[fixed], foot), end),
+            _inversions(centres[fixed, 0] - here[0], middles[fixed, 0] - there[0]),
+            _inversions(feet[fixed, 1] - foot[1], ends[fixed, 1] - end[1]),
+            -_agreement(centres[fixed] - here, middles[fixed] - there),
+            math.dist(_local_map(centres[fixed], middles[fixed], here), there),
+            math.dist(_affine(centres[fixed], middles[fixed], here), there),
+            math.dist(_affine(feet[fixed], ends[fixed], foot), end),
+            math.dist(_homography(feet[fixed], ends[fixed], foot), end),
         )
     return costs
 
@@ -105,52 +106,38 @@ def _centred(mask: Array) -> Array:
     return np.roll(mask, (mask.shape[0] // 2 - y, mask.shape[1] // 2 - x), (0, 1))
 
 
-def _inversions(before: Array, after: Array, in_play: Array, fixed: Array) -> float:
-    """Return the share of pairs with an object in play whose order along an axis differs."""
-    pairs = [(a, b) for a in in_play for b in fixed]
-    pairs += [*itertools.combinations(in_play, 2)]
-    changed = [(before[a] - before[b]) * (after[a] - after[b]) < 0 for a, b in pairs]
-    return float(np.mean(changed)) if pairs else 0.0
+def _inversions(before: Array, after: Array) -> float:
+    """Return the share of other objects that are on the other side of the object in play."""
+    return float(np.mean(before * after < 0)) if len(before) else 0.0
 
 
-def _agreement(before: Array, after: Array, in_play: Array, fixed: Array) -> float:
-    """Return the rank correlation of the distances from objects in play to the others."""
-    total = 0.0
-    for n in in_play if len(fixed) > 2 else ():
-        first, second = (
-            np.argsort(np.argsort(np.linalg.norm(centres[fixed] - centres[n], axis=1)))
-            for centres in (before, after)
-        )
-        total += np.corrcoef(first, second)[0, 1]
-    return total
+def _agreement(before: Array, after: Array) -> float:
+    """Return the rank correlation of the distances to other objects."""
+    if len(before) < 3:
+        return 0.0
+    first, second = (np.argsort(np.argsort(np.linalg.norm(x, axis=1))) for x in (before, after))
+    return float(np.corrcoef(first, second)[0, 1])
 
 
-def _off(mapped: Array, there: Array) -> float:
-    return float(np.linalg.norm(mapped - there, axis=1).sum())
+def _local_map(source: Array, target: Array, point: Array) -> Array:
+    """Return where a point is if it moves as the two objects next to it do."""
+    near = np.argsort(np.linalg.norm(source - point, axis=1))[:2]
+    return point + (target[near] - source[near]).mean(axis=0) if len(near) else point
 
 
-def _local_map(before: Array, after: Array, in_play: Array, fixed: Array) -> Array:
-    """Return where objects in play are if they move as the two objects next to each do."""
-    found = before[in_play].copy()
-    for i, n in enumerate(in_play if len(fixed) else ()):
-        near = np.argsort(np.linalg.norm(before[fixed] - before[n], axis=1))[:2]
-        found[i] += (after[fixed][near] - before[fixed][near]).mean(axis=0)
-    return found
-
-
-def _affine(source: Array, target: Array, points: Array) -> Array:
-    """Return points moved by the affine map of least squares; a translation for fewer than 3."""
+def _affine(source: Array, target: Array, point: Array) -> Array:
+    """Return a point moved by the affine map of least squares; a translation for fewer than 3."""
     if len(source) < 3:
-        return points + (target - source).mean(axis=0) if len(source) else points
+        return point + (target - source).mean(axis=0) if len(source) else point
     ones = np.ones((len(source), 1))
     fit = np.linalg.lstsq(np.hstack([source, ones]), target, rcond=1e-6)[0]
-    return np.asarray(np.hstack([points, np.ones((len(points), 1))]) @ fit)
+    return np.asarray(np.append(point, 1) @ fit)
 
 
-def _homography(source: Array, target: Array, points: Array) -> Array:
-    """Return points moved by the homography of least algebraic error; affine for fewer than 5."""
+def _homography(source: Array, target: Array, point: Array) -> Array:
+    """Return a point moved by the homography of least algebraic error; affine for fewer than 5."""
     if len(source) < 5:
-        return _affine(source, target, points)
+        return _affine(source, target, point)
     middle, scale = source.mean(axis=0), max(float(np.ptp(source)), 1.0)
     (x, y), (u, v) = ((s - middle).T / scale for s in (source, target))
     one, none = np.ones_like(x), np.zeros_like(x)
@@ -158,7 +145,6 @@ def _homography(source: Array, target: Array, points: Array) -> Array:
         np.stack([x, y, one, none, none, none, -u * x, -u * y, -u], axis=1),
         np.stack([none, none, none, x, y, one, -v * x, -v * y, -v], axis=1),
     ])  # fmt: skip
-    turned = np.linalg.svd(rows)[2][-1].reshape(3, 3)
-    moved = np.hstack([(points - middle) / scale, np.ones((len(points), 1))]) @ turned.T
-    depth = np.where(np.abs(moved[:, 2:]) < 1e-9, 1e-9, moved[:, 2:])
-    return np.asarray(moved[:, :2] / depth * scale + middle)
+    fit = np.linalg.svd(rows)[2][-1].reshape(3, 3)
+    moved = fit @ np.append((point - middle) / scale, 1)
+    return np.asarray(moved[:2] / (moved[2] or 1e-9) * scale + middle)

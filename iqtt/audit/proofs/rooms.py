@@ -193,68 +193,48 @@ def _one_right(_spec: PerspectiveSpec, q: Question) -> str:
 def _labels(_spec: PerspectiveSpec, q: Question) -> str:
     assert q.truth
     options, kind = q.truth.scenes[1:], question_kind(q.kinds)
-    numbers = [n - 1 for n in q.truth.in_play]
-    count = len(options[0].objects)
-    if not numbers or max(numbers) >= count or len(set(numbers)) < len(numbers):
-        return f"objects in play {q.truth.in_play} of {count}"
+    number, count = q.truth.in_play - 1, len(options[0].objects)
+    if not 0 <= number < count:
+        return f"object in play {q.truth.in_play} of {count}"
     poses = np.stack([_poses(scene) for scene in options])
     assert options[0].interior
     rides = with_carried(options[0].interior.stands_on, q.truth.in_play)
     rest = [n for n in range(count + 1) if n + 1 not in rides]
     if np.ptp(poses[:, rest], axis=0).max() > SAME or len({_shell(s) for s in options}) > 1:
         return "what is not in play differs"
-    below = {s.interior.stands_on[numbers[0]] for s in options if s.interior}
+    below = {s.interior.stands_on[number] for s in options if s.interior}
     floor = all(on == 0 or options[0].objects[on - 1].name == "rug" for on in below)
     test, least = _IN_PLAY.get(kind), ON_FLOOR if floor else ON_TOP
-    return test(poses[:, numbers], least) if test else f"kind {kind}"
+    return test(poses[:, number], least) if test else f"kind {kind}"
 
 
-def with_carried(stands_on: Sequence[int], numbers: Sequence[int]) -> set[int]:
-    """Return objects and what stands on them, which has larger numbers."""
-    found = set(numbers)
-    for number, on in enumerate(stands_on, start=1):
+def with_carried(stands_on: Sequence[int], number: int) -> set[int]:
+    """Return an object and what stands on it, which has larger numbers."""
+    found = {number}
+    for n, on in enumerate(stands_on, start=1):
         if on in found:
-            found.add(number)
+            found.add(n)
     return found
 
 
 def _moved(poses: Array, least: float) -> str:
-    places = poses[:, 0, :, 3]
-    near = min(math.dist(a, b) for a, b in itertools.combinations(places[:, [0, 2]], 2))
-    if len(poses[0]) != 1 or np.ptp(poses[:, 0, :, :3], axis=0).max() > SAME:
-        return "more than one object moved, or turned, too"
+    places = poses[:, [0, 2], 3]
+    near = min(math.dist(a, b) for a, b in itertools.combinations(places, 2))
+    if np.ptp(poses[..., :3], axis=0).max() > SAME:
+        return "the object turned, too"
     return f"places {near:.3f} m apart" if near < least - SAME else ""
 
 
-def _swapped(poses: Array, least: float) -> str:
-    if poses.shape[:2] != (3, 3):
-        return "not three objects at three places"
-    ground = poses[..., [0, 2], 3]
-    turned = any(
-        np.abs(ground[i] - np.roll(ground[0], -shift, axis=0)).max() > SAME
-        for i, shift in _cyclic(ground)
-    )
-    still = np.ptp(poses[..., :3], axis=0).max() <= SAME
-    near = min(math.dist(a, b) for a, b in itertools.combinations(ground[0], 2))
-    return "" if still and not turned and near >= least - SAME else "not three cyclic orders"
-
-
-def _cyclic(ground: Array) -> list[tuple[int, int]]:
-    """Return for each answer by how many places its objects are shifted; 1 and 2, in any order."""
-    first = 1 if np.abs(ground[1] - np.roll(ground[0], -1, axis=0)).max() <= SAME else 2
-    return [(1, first), (2, 3 - first)]
-
-
 def _turned(poses: Array, _least: float) -> str:
-    if len(poses[0]) != 1 or np.ptp(poses[:, 0, [0, 2], 3], axis=0).max() > SAME:
+    if np.ptp(poses[:, [0, 2], 3], axis=0).max() > SAME:
         return "an object that is moved, too"
-    fronts = poses[:, 0, :, 2]
+    fronts = poses[..., 2]
     cosines = [a @ b for a, b in itertools.combinations(fronts, 2)]
     angle = math.degrees(math.acos(min(1.0, max(cosines))))
     return "" if angle >= LEAST_TURN - 1e-3 else f"directions {angle:.1f} degrees apart"
 
 
-_IN_PLAY = {"moved": _moved, "swapped": _swapped, "turned": _turned}
+_IN_PLAY = {"moved": _moved, "turned": _turned}
 
 
 def _views(spec: PerspectiveSpec, q: Question) -> str:
@@ -305,12 +285,11 @@ def _cast_again(table: AuditTable, q: Question) -> str:
     for a, b in itertools.combinations(ids[1:], 2):
         if (a != b).mean() < CHANGED:
             return f"answers differ in {(a != b).mean():.3%} of the pixels"
-    numbers = np.array(q.truth.in_play)
-    if not len(numbers) or numbers.max() > spec.objects[1]:
-        return "no objects in play"
-    shown = np.stack([np.count_nonzero(ids == n, axis=(1, 2)) for n in numbers], axis=1)
-    image, slot = (x.ravel() for x in np.meshgrid(np.arange(len(ids)), numbers - 1, indexing="ij"))
-    whole = whole_pixels(batch, image, slot).reshape(shown.shape)
+    number = q.truth.in_play
+    if not 0 < number <= spec.objects[1]:
+        return "no object in play"
+    shown = np.count_nonzero(ids == number, axis=(1, 2))
+    whole = whole_pixels(batch, np.arange(len(ids)), np.full(len(ids), number - 1))
     for name, mine, stored in (
         ("visible", shown, q.truth.visible_pixels), ("whole", whole, q.truth.whole_pixels)
     ):  # fmt: skip

@@ -22,7 +22,7 @@ def best(change, options, size=4):
     reference = image({1: (40, 30), **FIXED})
     seen = [image({1: place, **{n: change(*p) for n, p in FIXED.items()}}, size=size)
             for place in options]  # fmt: skip
-    costs = mask_costs(np.stack([reference, *seen]), np.array([1]), np.array([1]))
+    costs = mask_costs(np.stack([reference, *seen]), 1, [1])
     return dict(zip(RULES, costs.argmin(axis=0), strict=True)), costs
 
 
@@ -59,6 +59,6 @@ def test_order_and_neighbours_are_those_of_the_reference():
 
 def test_images_without_other_objects_have_finite_costs():
     alone = np.stack([image({1: place}) for place in ((20, 20), (40, 20), (20, 21), (50, 50))])
-    costs = mask_costs(alone, np.array([1]), np.array([1]))
+    costs = mask_costs(alone, 1, [1])
     assert np.isfinite(costs).all()
     assert costs[:, RULES.index("same place")].argmin() == 1
