@@ -309,7 +309,7 @@ except scenegen.SceneGenError as error:
 
 
 @pytest.mark.parametrize("made", ["views"], indirect=True)
-@pytest.mark.parametrize("shards", [2, 1])
+@pytest.mark.parametrize("shards", [pytest.param(2, marks=pytest.mark.slow), 1])
 def test_what_is_held_to_the_end_does_not_crash_hdf5(copied, shards):
     """Python's own end does not free what a traceback or a cache holds; nor with a lost shard."""
     task, folder = copied
