@@ -62,9 +62,9 @@ ALL = {
     "empty-room": Named(ROOMS, "ground-truth walls and ground, no objects"),
     "cut-out": Named(ROOMS, "ground-truth masks, flat, at the true distance of each object"),
     "picture-outline": Named(ROOMS, "a foreground mask from the image, at a constant height"),
-    "balls": Named(ROOMS, "a sphere proxy for each component of that mask in the first view"),
-    "outline-regression": Named(ROOMS, "that mask, heights by a regression", needs=TRAIN),
-    "outline-relief": Named(ROOMS, "that mask, heights by trees", needs=TRAIN),
+    "balls": Named(ROOMS, "a sphere for each component of the outline mask in the first view"),
+    "outline-regression": Named(ROOMS, "the outline mask, heights by a regression", needs=TRAIN),
+    "outline-relief": Named(ROOMS, "the outline mask, heights by trees", needs=TRAIN),
     "nearest": Named(ROOMS, "the heights of the most similar image of --train", needs=TRAIN),
     "oracle": Named(ROOMS, "the ground truth, which scores perfectly"),
     "chance": Named(QUESTIONS, "random options"),
@@ -76,7 +76,8 @@ ALL = {
     "outline-trees": Named(QUESTIONS, "trees on silhouette features", needs=TRAIN, takes=LABELS),
     "pix2shape": Named(BOTH, "Pix2Shape, trained with the losses of the paper", "pix2shape"),
     "pix2shape-compact": Named(BOTH, "Pix2Shape, trained with other losses", "pix2shape"),
-    "pix2shape-rays": Named(ROOMS, "Pix2Shape, given walls, trained on several views", "pix2shape"),
+    "pix2shape-rays": Named(ROOMS, "Pix2Shape, given the walls, trained on several views",
+                            "pix2shape"),
     "pix2shape-views": Named(CUBES, "Pix2Shape with a separate encoder", "pix2shape"),
     "cnn": Named(QUESTIONS, "ResNets and a softmax over the options", "resnets.cnn"),
     "depth-completed": Named(ROOMS, "a network that completes the depth of the first view",
@@ -243,7 +244,9 @@ def _check_task(name: str, data: str) -> None:
     ]
     if name not in able:
         about = "questions about rooms" if of_rooms else stored
-        raise click.UsageError(f"{name} is not for {about}, as {data}; try {', '.join(able)}")
+        raise click.UsageError(
+            f"{name} does not predict {about}, as {data} holds; try {', '.join(able)}"
+        )
 
 
 @click.command(

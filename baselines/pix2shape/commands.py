@@ -94,10 +94,9 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
 @click.option(
     "--config",
     type=click.Choice(["rays", "views", "paper"]),
-    help="Configuration. rays: for rooms with several views, given ground and walls as input, at 64"
-    " pixels and an eighth of the paper's width, 40 minutes on a CPU. views: for questions, with a"
-    " separate encoder whose codes are compared. paper: the paper's size and losses, needs a GPU"
-    " [rays for rooms, views for questions].",
+    help="Configuration. rays: rooms with several views; takes 40 minutes on a CPU. views:"
+    " questions. paper: the paper's size and losses; needs a GPU [rays for rooms, views for"
+    " questions].",
 )
 @click.option(
     "--set",

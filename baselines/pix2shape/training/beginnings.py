@@ -49,8 +49,10 @@ def new_run(
     for name in chosen:
         value, needed = (functools.reduce(getattr, name.split("."), c) for c in (config, suited))
         if value != needed:
-            hint = f"leave it out: {data.where}, with {labels} labels, decides it or has no use"
-            raise SpecError(name, value, "nothing", hint)
+            hint = (
+                f"leave it out: {data.where}, with {labels} labels, decides it or does not use it"
+            )
+            raise SpecError(name, f"{value} has no effect here", hint=hint)
     sources = _sources(files, suited, labels)
     card = Card(
         "pix2shape",
