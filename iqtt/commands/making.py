@@ -210,7 +210,7 @@ def make_split(
     known = {field.name for field in fields(kind)}
     _refuse_others(given & settings.keys(), known, preset, of_rooms)
     if secret_seed is not None and "seed" in given:
-        raise SpecError("--secret-seed", "--seed as well", "only one of the two")
+        raise SpecError("--secret-seed", "--seed is given as well", hint="pass only one of them")
     chosen = {x: v for x, v in settings.items() if x in known and v is not None}
     if of_rooms:  # other defaults than those of the options
         chosen = {name: value for name, value in chosen.items() if name in given}
@@ -272,10 +272,10 @@ def _refuse_others(given: set[str], known: set[str], preset: str, of_rooms: bool
     for name in sorted(given):
         flag = {"answers": "options"}.get(name, name.removesuffix("_degrees").replace("_", "-"))
         if name not in known:
-            which = "--preset perspective" if of_rooms else "a preset other than perspective"
-            raise SpecError(f"--{flag}", f"{which} as well", "only one of the two")
+            why = "has no effect with" if of_rooms else "is only for"
+            raise SpecError(f"--{flag}", f"this option {why} --preset perspective; leave it out")
         if preset.endswith("suite") and name in ("distractors", "answers"):
-            raise SpecError(f"--{flag}", f"--preset {preset} as well", "only one of the two")
+            raise SpecError(f"--{flag}", f"--preset {preset} decides this; leave it out")
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt merge iqtt-split/iqtt-train.h5 --out iqtt-train.h5")

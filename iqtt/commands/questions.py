@@ -62,7 +62,7 @@ def show(
     beside, first = answers_beside(file) if answers else None, open_tables(file)[0]
     with first, QuestionsFile(first.opened, part or first.part, beside) as questions:
         if answers and not (questions.has_answers or questions.has_truth):
-            raise SpecError(file, "no answer key, and no file with one next to it", "an answer key")
+            raise SpecError(file, "this file has no answer key, nor has its folder")
         rows = pick_rows(len(questions), items, default=SHOWN)
         task = questions.attributes.get("task", "")
         sheet = question_sheet([questions[row] for row in rows], answers, task)
@@ -149,7 +149,7 @@ def audit(
     for group, one in zip(groups, found, strict=True):
         if len(groups) > 1:
             click.echo(f"{'## ' if markdown else ''}{', '.join(map(str, group))}\n")
-        click.echo(report.markdown(one) if markdown else report.table(one))
+        click.echo(report.text(one, markdown))
     ctx.exit(0 if all(one.passed for one in found) else 1)
 
 

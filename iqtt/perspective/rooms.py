@@ -106,7 +106,7 @@ def draw_question(
         tally.refused += 1
     raise PlacementError(
         f"{split} question {index}",
-        f"none of {ATTEMPTS} rooms to have places for a question of the kind {kind!r}",
+        f"none of {ATTEMPTS} rooms has places for a question of type {kind!r}",
         hint="try more --objects, a smaller --angle, or other --distractors",
     )
 

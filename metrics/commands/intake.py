@@ -167,8 +167,8 @@ def import_(
 
     texts: dict[str, Any] = {"run": run_name, "notes": notes, "overwrite": overwrite}
     if expanded:
-        found = f"{expanded[0]} after the options: the shell has expanded a pattern"
-        raise click.UsageError(f"found {found}; quote patterns, such as 'out/*.png'")
+        why = "the shell has expanded a pattern"
+        raise click.UsageError(f"{expanded[0]}: {why}; quote patterns, such as 'out/*.png'")
     if sum(source is not None for source in (pattern, layers, meshes, answers, people)) != 1:
         ways = "--depth, --layers or --meshes for rooms"
         raise click.UsageError(f"give {ways}, or --responses or --quiz for questions")

@@ -53,12 +53,12 @@ NOT_COMPARABLE = (
     " the file was scored without --truth"
 )
 BELOW = (
-    "methods below the baseline have no rank, because none of them is significantly better than the"
-    " baseline; the next column orders them"
+    "Methods below the baseline row are not significantly better than the baseline, so they have no"
+    " rank; the next column orders them."
 )
 SHARED = (
-    "methods share a rank if the 95% CI of their paired difference contains 0; bold: significantly"
-    " better than the next best method"
+    "Methods share a rank if the 95% CI of their paired difference contains 0. Bold scores are"
+    " significantly better than the next best."
 )
 VIEWS_SEEN = {
     "scored_view": "the scored view",
@@ -498,7 +498,7 @@ def _notes(files: Sequence[ScoreFile], key: str, below: Sequence[str]) -> Iterat
     skilled = next((file for file in files if file.skills), None)
     yield from () if skilled is None else skill_notes(skilled)
     yield f"[low, high]: {INTERVAL} over {first.unit}; ±: standard deviation over training runs"
-    yield "; ".join([SHARED, *below])
+    yield " ".join([SHARED, *below])
 
 
 def _same_request_notes(members: Sequence[ScoreFile], files: Sequence[ScoreFile]) -> Iterator[str]:

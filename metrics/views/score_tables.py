@@ -420,7 +420,7 @@ def few_clusters(scores: ScoreFile) -> list[str]:
 
 def too_few_warning(count: int, units: str) -> list[str]:
     """Return a warning where a number of scenes or shapes is too small for intervals."""
-    text = f"{count} {units}: {CONFIDENCE:.0%} CIs are too narrow below {FEW_CLUSTERS}"
+    text = f"{count} {units}: with fewer than {FEW_CLUSTERS}, {CONFIDENCE:.0%} CIs are too narrow"
     return [text] * (1 < count < FEW_CLUSTERS)
 
 

@@ -65,7 +65,7 @@ class PackageCommands(click.Group):
         """Refuse arguments that no file could hold, before anything is done with them."""
         for text in args:
             if re.search("[\0\ud800-\udfff]", text):
-                raise UserError(f"argument {text}: found bytes that are not UTF-8, expected text")
+                raise UserError(f"argument {text}: it holds bytes that are not UTF-8 text")
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:

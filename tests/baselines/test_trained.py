@@ -50,7 +50,7 @@ Train = Callable[..., Path]
 
 
 def baseline_of(name: str) -> Baseline:
-    baseline: Baseline = import_module(f"baselines.{HOMES[name][0]}").BASELINE
+    baseline: Baseline = import_module(f"baselines.{HOMES[name]}").BASELINE
     return baseline
 
 

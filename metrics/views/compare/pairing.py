@@ -37,9 +37,11 @@ def require_same_test(
     for file in files:
         require_truth(file, first.truth, first.place, first.protocol)
         if not file.comparable and not allow_incomparable:
-            why = "; ".join(file.warnings) or "not comparable"
+            why = "; ".join(file.warnings) or "see its warnings"
             raise ComparisonError(
-                file.place, f"scores that are {why}", hint="or use --allow-incomparable"
+                file.place,
+                f"its scores are not comparable: {why}",
+                hint="or use --allow-incomparable",
             )
 
     def shown() -> list[str]:  # a test set of single views, say, has nothing behind
