@@ -91,6 +91,10 @@ HOMES = {
         "questions: meshes, trained through a non-differentiable renderer",
     ),
     "siamese": ("resnets.siamese", "questions: the option with the most similar features"),
+    "solid-supervised": (
+        "relief.solid_supervised",
+        "rooms: hidden surfaces from the true visible ones, trained with layers",
+    ),
     "view-pairs": (
         "relief.view_pairs",
         "rooms: a network trained with pairs of images, without depth",

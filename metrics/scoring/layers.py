@@ -10,11 +10,13 @@ from metrics.measures import solids
 from metrics.measures.alignment import scale_and_shift
 from metrics.measures.surfaces.chamfer_hausdorff import chamfer, nearest_distances
 from metrics.scoring.metric_names import CONSTANT, INFLATED, MIRRORED, SIZED, metric
+from metrics.scoring.truth_digests import LAYERS
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import refuse_pixels
 from metrics.submissions.truths import TrueView
 from scenegen.camera import pixel_directions, pixel_size
+from scenegen.files.content import row_digest
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[np.float64]
@@ -33,6 +35,7 @@ class TrueLayers:
         pixel: side of a pixel at depth 1.
         round: as `solids.round_bodies`, (N,).
         depth, object_id, entering: (L, N), as stored.
+        digests: of the three as they were read.
     """
 
     scored: NDArray[np.bool_]
@@ -42,6 +45,7 @@ class TrueLayers:
     depth: Array
     object_id: NDArray[np.int8]
     entering: NDArray[np.int8]
+    digests: tuple[bytes, ...]
 
     @cached_property
     def spans(self) -> solids.Spans:
@@ -89,15 +93,14 @@ class TrueLayers:
 
 def read_true_layers(truth: RoomsFile, row: int, view: TrueView) -> TrueLayers:
     """Return the true layers of a row. Raises FileFormatError."""
-    depth, ids, entering = (
-        truth.read(f"layers/{x}", row) for x in ("depth", "object_id", "entering")
-    )
+    stored = depth, ids, entering = [truth.read(name, row) for name in LAYERS]
+    digests = tuple(map(row_digest, stored))
     scored = view.mask & ~((ids > 0) & (entering == 0)).any(axis=-1)
     layers = depth[scored].T.astype(np.float64), ids[scored].T, entering[scored].T
     height, width = scored.shape
     rays = pixel_directions(height, width, view.fov_y_degrees)[scored]
     pixel, bodies = pixel_size(len(scored), view.fov_y_degrees), solids.round_bodies(view.object_id)
-    return TrueLayers(scored, rays, pixel, bodies[scored], *layers)
+    return TrueLayers(scored, rays, pixel, bodies[scored], *layers, digests)
 
 
 def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float]:

@@ -296,8 +296,8 @@ class LayerScorer:
         images, floors = [], []
         for row in triples[:, 0].tolist():
             view = read_true_view(self._truth, row)
-            digests[row], runs = view_digests(view), []
-            layers = read_true_layers(self._truth, row, view)
+            layers, runs = read_true_layers(self._truth, row, view), []
+            digests[row] = (*view_digests(view), *layers.digests)
             for file, entries in zip(self._files, self._entries, strict=True):
                 predicted = file.view(entries[row])
                 try:

@@ -1,8 +1,11 @@
 """Submissions of layers: written, read, validated and scored against ground truth with layers."""
 
+import shutil
+
 import h5py
 import numpy as np
 import pytest
+from h5_edits import put
 from refusals import refused
 
 from metrics.measures.solids import length, paired_spans
@@ -15,6 +18,7 @@ from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from metrics.viewing import predicted_scenes
 from metrics.views.examples import examples_of
+from scenegen.layout import SCORED
 from scenegen.rooms.reader import RoomsFile
 
 SETTINGS = Settings(processes=1)
@@ -112,12 +116,31 @@ def test_thickness_is_what_is_scored(layered, tmp_path):
                 assert value == pytest.approx(lengths[0] / lengths[1], abs=0.01)
 
 
-def test_depth_has_no_scores_of_solids(layered, tmp_path):
-    out = RoomPredictionWriter(tmp_path / "d.h5", layered, method="m")
-    with RoomsFile(layered) as rooms, out:
+def write_depth(path, truth):
+    with RoomsFile(truth) as rooms, RoomPredictionWriter(path, truth, method="m") as out:
         for row in range(len(rooms)):
             out.add(row, rooms.read("depth", row))
-    assert not set(score([tmp_path / "d.h5"], layered, SETTINGS).metrics) & set(SOLID)
+    return path
+
+
+def test_depth_has_no_scores_of_solids(layered, tmp_path):
+    path = write_depth(tmp_path / "d.h5", layered)
+    assert not set(score([path], layered, SETTINGS).metrics) & set(SOLID)
+
+
+@pytest.mark.parametrize("name", SCORED[-3:])
+def test_changed_layers_are_refused(name, layered, tmp_path):
+    """Of all rows, in submissions of layers and of depth."""
+    paths = write(tmp_path / "p.h5", layered), write_depth(tmp_path / "d.h5", layered)
+    shutil.copyfile(layered, changed := tmp_path / "changed.h5")
+    with h5py.File(changed, "r+") as file:
+        assert [score([path], layered, SETTINGS).meta.truth_digest for path in paths] == [
+            file.attrs["truth_digest"]
+        ] * 2
+        put(name, (3, 9, 9, 15), 1)(file)
+    for path in paths:
+        with refused(ScoringError, hint=name):
+            score([path], changed, SETTINGS)
 
 
 @pytest.mark.parametrize(
