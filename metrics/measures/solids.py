@@ -15,6 +15,8 @@ Spans = tuple[Array, Array]
 NEAR = 0.02  # scene units: within which a layer counts as found
 SHARES = np.linspace(0.0, 1.0, 12)[1:]  # quantiles of thickness that shortcuts try
 HIDDEN = (2, 3, 4)  # layers that have a recall of their own
+SEEN_SHARE = 0.01  # of the rays that meet an object; objects that fewer meet first are hidden
+LEAST_RAYS = 16  # that meet an object
 
 
 def paired_spans(layers: Array) -> Spans:
@@ -105,6 +107,32 @@ def layer_recalls(predicted: Array, true: Array, of_objects: Array) -> dict[str,
         here = np.s_[number - 1 : number]
         scores[f"layer_{number}_recall_{NEAR:g}"] = _share(found[here], of_objects[here])
     return scores
+
+
+def hidden_object_recall(
+    predicted: Spans, depth: Array, object_id: Array, entering: Array
+) -> float:
+    """Return the fraction of hidden objects that are predicted; NaN where none is hidden.
+
+    At least LEAST_RAYS rays meet such an object, less than SEEN_SHARE of them first. It counts as
+    predicted if half of them have a span whose IoU with the first span of the object is above 0.5.
+
+    Args:
+        predicted: spans of N rays.
+        depth, object_id, entering: of all layers, (L, N).
+    """
+    recalled = []
+    for number in np.unique(object_id[object_id > 0]).tolist():
+        meets = (object_id == number).any(axis=0)
+        if meets.sum() < LEAST_RAYS or (object_id[0, meets] == number).mean() >= SEEN_SHARE:
+            continue
+        entered = np.where(object_id[:, meets] == number, entering[:, meets], 0)
+        (start, *_), (end, *_) = entered_spans(depth[:, meets], entered)
+        a, b = predicted[0][:, meets], predicted[1][:, meets]
+        with np.errstate(invalid="ignore"):
+            both, either = np.minimum(b, end) - np.maximum(a, start), np.maximum(b, end)
+            recalled.append((both > 0.5 * (either - np.minimum(a, start))).any(axis=0).mean())
+    return float(np.mean(np.array(recalled) >= 0.5)) if recalled else np.nan
 
 
 def _share(found: Array, counted: Array) -> float:

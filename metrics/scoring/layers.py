@@ -118,6 +118,9 @@ def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float
         "solid_iou": truth.iou(spans),
         "back_depth_error": solids.back_depth_error(spans, truth.visible),
         **solids.layer_recalls(layers, truth.depth, of_objects),
+        "hidden_object_recall": solids.hidden_object_recall(
+            spans, truth.depth, truth.object_id, truth.entering
+        ),
     }
     fronts_and_backs = np.stack(spans, axis=1).reshape(-1, layers.shape[1])
     for name, which in (("seen_chamfer", np.s_[:1]), ("unseen_chamfer", np.s_[1:])):
