@@ -109,30 +109,32 @@ def layer_recalls(predicted: Array, true: Array, of_objects: Array) -> dict[str,
     return scores
 
 
-def hidden_object_recall(
-    predicted: Spans, depth: Array, object_id: Array, entering: Array
-) -> float:
+def hidden_object_recall(predicted: Spans, true: Spans, depth: Array, object_id: Array) -> float:
     """Return the fraction of hidden objects that are predicted; NaN where none is hidden.
 
-    At least LEAST_RAYS rays meet such an object, less than SEEN_SHARE of them first. It counts as
-    predicted if half of them have a span whose IoU with the first span of the object is above 0.5.
+    Such an object begins a true span on at least LEAST_RAYS rays, and is the first layer of less
+    than SEEN_SHARE of the rays that meet it. It counts as predicted if half of those rays have a
+    predicted span whose IoU with the first true span that the object begins is above 0.5.
 
     Args:
-        predicted: spans of N rays.
-        depth, object_id, entering: of all layers, (L, N).
+        predicted, true: spans of N rays.
+        depth, object_id: of all layers, (L, N).
     """
     recalled = []
     for number in np.unique(object_id[object_id > 0]).tolist():
-        meets = (object_id == number).any(axis=0)
-        if meets.sum() < LEAST_RAYS or (object_id[0, meets] == number).mean() >= SEEN_SHARE:
+        of_object = object_id == number
+        first = np.where(of_object, depth, np.inf).min(axis=0)
+        begins = np.isfinite(first) & (true[0] == first)
+        rays = begins.any(axis=0)
+        if rays.sum() < LEAST_RAYS or of_object[0].sum() >= SEEN_SHARE * np.isfinite(first).sum():
             continue
-        entered = np.where(object_id[:, meets] == number, entering[:, meets], 0)
-        (start, *_), (end, *_) = entered_spans(depth[:, meets], entered)
-        a, b = predicted[0][:, meets], predicted[1][:, meets]
+        start, end = first[rays], true[1].T[begins.T]
+        a, b = predicted[0][:, rays], predicted[1][:, rays]
         with np.errstate(invalid="ignore"):
-            both, either = np.minimum(b, end) - np.maximum(a, start), np.maximum(b, end)
-            recalled.append((both > 0.5 * (either - np.minimum(a, start))).any(axis=0).mean())
-    return float(np.mean(np.array(recalled) >= 0.5)) if recalled else np.nan
+            both = np.minimum(b, end) - np.maximum(a, start)
+            either = np.maximum(b, end) - np.minimum(a, start)
+        recalled.append((both > 0.5 * either).any(axis=0).mean() >= 0.5)
+    return float(np.mean(recalled)) if recalled else np.nan
 
 
 def _share(found: Array, counted: Array) -> float:

@@ -119,7 +119,7 @@ def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float
         "back_depth_error": solids.back_depth_error(spans, truth.visible),
         **solids.layer_recalls(layers, truth.depth, of_objects),
         "hidden_object_recall": solids.hidden_object_recall(
-            spans, truth.depth, truth.object_id, truth.entering
+            spans, truth.spans, truth.depth, truth.object_id
         ),
     }
     fronts_and_backs = np.stack(spans, axis=1).reshape(-1, layers.shape[1])

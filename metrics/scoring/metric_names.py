@@ -487,9 +487,9 @@ TABLE: Sequence[Metric] = (
              f"`layer_recall_0.02` of layer {number}.", **{**_LAYERS, "lacking": lacking})
       for number, lacking in ((2, "solids"), (3, "layer 3"), (4, "layer 4"))),
     _share("hidden_object_recall", "Hidden objects",
-           "fraction of the objects that less than 1% of their rays meet first of which at least"
-           " half of the rays have a predicted span with an IoU above 0.5 with the object's first"
-           " span.", **{**_LAYERS, "lacking": "hidden objects"}),
+           "fraction of the objects that less than 1% of their rays meet first for which at least"
+           " half of the rays have a predicted span with an IoU above 0.5 with the true one.",
+           **{**_LAYERS, "lacking": "hidden objects"}),
     _share("iqtt_accuracy", "IQTT accuracy",
            "1 if the correct option is chosen, else 0 (also abstentions); chance is 1 / options.",
            of="answers", tasks=("iqtt",), headline={"iqtt": 1}),

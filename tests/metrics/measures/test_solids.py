@@ -108,11 +108,12 @@ def test_hidden_objects_are_predicted_where_half_of_their_rays_are(start, end, p
     ids[:2, 0], rays = 2, np.arange(101) < 51
     spans = [np.stack([np.ones(101), np.where(rays, x, INF)]) for x in (start, end)]
     spans[1][0] = 2.0
-    truth = depth, ids, entering
+    truth = entered_spans(depth, entering), depth, ids
     assert hidden_object_recall(tuple(spans), *truth) == float(predicted)
     fewer = [np.where(np.arange(101) < 50, x, INF) for x in spans]
     assert hidden_object_recall(tuple(fewer), *truth) == 0.0
     ids[0, 50:52] = 3  # of 101 rays
+    depth[0, 50:52] = 3.5
     assert np.isnan(hidden_object_recall(tuple(spans), *truth))
 
 
