@@ -1,4 +1,4 @@
-"""Import meshes, one file for each image, as layers along the rays of its pixels."""
+"""Import meshes, a file or a folder of files for each image, as layers along its rays."""
 
 from collections.abc import Callable
 from functools import partial
@@ -58,7 +58,10 @@ def import_meshes(
     Of a reading, the scale, the frame, the alignment and the matching are used. Other arguments as
     `importing.import_rooms`. Raises MatchError, BadMeshError with the file's name, and as that.
     """
-    files = files_of(pattern, ENDINGS)
+    files, groups = files_of(pattern, ENDINGS), dict[Path, list[Path]]()
+    of_folders = not Path(pattern).parent.exists()  # as in 'out/*/*.glb'
+    for file in files:
+        groups.setdefault(file.parent if of_folders else file, []).append(file)
     with RoomPredictionWriter(
         out, truth, method=method, run=run, alignment=reading.alignment or "none", shown=shown,
         notes=notes, overwrite=overwrite,
@@ -66,11 +69,14 @@ def import_meshes(
         rooms = writer.truth
         if not isinstance(rooms, RoomsFile):
             raise SpecError(rooms.path, "ground truth of images alone", "rooms")
-        paths, how = match_files(files, names_of(rooms), partial(keys_of, rooms), reading.match)
-        lines, opened, unseen = [f"{len(paths)} files {how}"], 0, 0
+        paths, how = match_files(
+            sorted(groups), names_of(rooms), partial(keys_of, rooms), reading.match
+        )
+        noun = f"folders of {len(files)} files" if of_folders else "files"
+        lines, opened, unseen = [f"{len(paths)} {noun} {how}"], 0, 0
         tried: list[tuple[int, Array]] = []
         for row, path in enumerate(paths):
-            vertices, faces, closed = welded(*read_mesh(path))
+            vertices, faces, closed = _together(groups[path])
             vertices = vertices * FRAMES[reading.frame] * reading.scale
             camera = *size_of(rooms, row), float(rooms.read("camera/fov_y_degrees", row))
             layers = mesh_layers(vertices, faces, closed, *camera)
@@ -87,6 +93,18 @@ def import_meshes(
         if rooms.has_truth and (better := _better_frame(rooms, tried)):
             lines.append(f"hint: meshes look like {better}; see --frame")
     return "; ".join(lines)
+
+
+def _together(paths: list[Path]) -> tuple[Array, Array, Array]:
+    """Return what `layers.welded` makes of each file, as of one. Raises BadMeshError."""
+    parts, before, count = [], 0, 0
+    for path in paths:
+        vertices, faces, closed = welded(*read_mesh(path))
+        parts.append((vertices, faces + before, closed))
+        before, count = before + len(vertices), count + len(faces)
+        check_most(f"{path.parent}: faces", count, limits.MOST_FACES)
+    vertices, faces, closed = map(np.concatenate, zip(*parts, strict=True))
+    return vertices, faces, closed
 
 
 def read_mesh(path: Path) -> tuple[Array, Array]:

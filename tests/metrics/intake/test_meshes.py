@@ -62,6 +62,23 @@ def test_the_true_meshes_come_back(ending, change, reading, layered, tmp_path):
     assert "hint" not in how
 
 
+def test_an_image_may_have_a_file_for_each_object(layered, tmp_path, monkeypatch):
+    faces = []
+    with RoomsFile(layered) as rooms:
+        for room in rooms:
+            (folder := tmp_path / f"image-{room.index}").mkdir()
+            for k, mesh in enumerate(in_camera(room, True).split()):
+                mesh.export(folder / f"{k}.glb")
+                faces.append(len(mesh.faces))
+    read = {"method": "m", "reading": Reading(), "overwrite": True}
+    import_meshes(f"{tmp_path}/*/*.glb", layered, tmp_path / "p.h5", **read)
+    found = score([tmp_path / "p.h5"], layered, Settings(processes=1))
+    assert found.metrics["solid_iou"].value >= 0.999
+    monkeypatch.setattr(limits, "MOST_FACES", max(faces))
+    with refused(BadMeshError, "faces"):
+        import_meshes(f"{tmp_path}/*/*.glb", layered, tmp_path / "p.h5", **read)
+
+
 @pytest.mark.parametrize("turn", [np.diag([1.0, -1, -1]), np.eye(3)[[2, 0, 1]]])
 def test_a_turned_mesh_gets_a_hint(turn, layered, tmp_path):
     matrix = np.eye(4)
