@@ -194,8 +194,12 @@ def test_pages_and_the_3d_view_show_them(layered, tmp_path):
     with RoomsFile(layered) as rooms, open_predictions(path) as said:
         examples = [one for _, some in examples_of(scores, rooms, said) for one in some]
         assert [len(one.pictures) for one in examples] == [8] * len(examples)
-        scenes = list(predicted_scenes(said, rooms, scores))
-    assert sorted(view.row for scene in scenes for view in scene.views) == [0, 1, 2, 3]
+        views = [v for scene in predicted_scenes(said, rooms, scores) for v in scene.views]
+        count = [np.isfinite(rooms.read("layers/depth", v.row)[..., 1:]).sum() for v in views]
+    assert sorted(view.row for view in views) == [0, 1, 2, 3]
+    for view, points in zip(views, count, strict=True):
+        assert len(view.truth.hidden) == points > 0
+        np.testing.assert_allclose(view.prediction.hidden, view.truth.hidden, atol=1e-3)
 
 
 def test_they_are_aligned_by_least_squares_only(layered, tmp_path):
