@@ -79,8 +79,8 @@ def read_solids(files: Sequence[RoomsFile], size: int) -> Rooms:
             given.append(torch.from_numpy(given_maps(*front, fov)))
             thickness.append(torch.from_numpy(visible.reshape(size, size)).float())
             inside.append(torch.from_numpy(np.maximum(front[1], 0)))
-    maps = [torch.stack(each) for each in (given, thickness, inside)]
-    return replace(rooms, **dict(zip(("image", "depth", "inside"), maps, strict=True)))
+    image, depth, mask = (torch.stack(each) for each in (given, thickness, inside))
+    return replace(rooms, image=image, depth=depth, inside=mask)
 
 
 def lessons_of(rooms: Rooms, _settings: Settings, _folder: Path | None, _progress: Any) -> Lessons:

@@ -14,6 +14,7 @@ from metrics.intake.outputs import FRAMES
 from metrics.intake.reading import Reading
 from metrics.measured.reader import size_of
 from metrics.measures.solids import entered_spans
+from metrics.measures.surfaces.whole import drawn_points
 from metrics.submissions.hints.frames import AXES, frame_text
 from metrics.submissions.layout import Shown
 from metrics.submissions.writer import RoomPredictionWriter
@@ -80,7 +81,9 @@ def import_meshes(
             vertices = vertices * FRAMES[reading.frame] * reading.scale
             camera = *size_of(rooms, row), float(rooms.read("camera/fov_y_degrees", row))
             layers = mesh_layers(vertices, faces, closed, *camera)
-            writer.add(row, layers=layers)
+            whole = vertices.astype(np.float64)
+            points = drawn_points(whole, faces, row, "prediction")
+            writer.add(row, layers=layers, surface_points=points)
             opened += not closed.all()
             unseen += not np.isfinite(layers).any()
             if len(tried) < TRIED:

@@ -1,6 +1,6 @@
 """Scores of layers of one image: predicted surfaces along its rays against all true ones."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from metrics.measures import solids
 from metrics.measures.alignment import scale_and_shift
+from metrics.measures.surfaces import whole
 from metrics.measures.surfaces.chamfer_hausdorff import chamfer, nearest_distances
 from metrics.scoring.metric_names import CONSTANT, INFLATED, MIRRORED, SIZED, metric
 from metrics.scoring.truth_digests import LAYERS
@@ -16,6 +17,7 @@ from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import refuse_pixels
 from metrics.submissions.truths import TrueView
 from scenegen.camera import pixel_directions, pixel_size
+from scenegen.common.errors import SceneGenError
 from scenegen.files.content import row_digest
 from scenegen.rooms.reader import RoomsFile
 
@@ -103,14 +105,61 @@ def read_true_layers(truth: RoomsFile, row: int, view: TrueView) -> TrueLayers:
     return TrueLayers(scored, rays, pixel, bodies[scored], *layers, digests)
 
 
-def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float]:
+def true_points(truth: RoomsFile, row: int) -> list[Array] | None:
+    """Return two draws of points of a row's objects, camera frame; None without their meshes.
+
+    Points inside of solids, such as those of parts that overlap, are left out. They are known by
+    the layers of the 9 pixels around, from which they are 0.02 away or more.
+    """
+    import trimesh
+
+    from scenegen.objects.catalogue import objects_of
+    from scenegen.objects.scene_mesh import scene_parts
+
+    try:
+        objects = objects_of(truth.spec)
+    except SceneGenError:  # meshes of a folder
+        return None
+    room = truth[row]
+    meshes = [part.mesh for part in scene_parts(room.scene, objects.shape) if part.object_id]
+    if not meshes:
+        return None
+    mesh = trimesh.util.concatenate(meshes)
+    rotation, place = room.world_from_camera[:3, :3], room.world_from_camera[:3, 3]
+    layers = np.where(room.truth["layers/object_id"] > 0, room.truth["layers/depth"], np.nan)
+    height, width = room.depth.shape
+    padded = np.pad(layers, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan)
+    draws = []
+    for draw in whole.DRAWS[1:]:
+        points = (whole.drawn_points(mesh.vertices, mesh.faces, row, draw) - place) @ rotation
+        at = points[:, :2] / -points[:, 2:] / pixel_size(height, room.fov_y_degrees)
+        column = np.floor(at[:, 0] + width / 2).astype(int)
+        line = np.floor(height / 2 - at[:, 1]).astype(int)
+        seen = (column >= 0) & (column < width) & (line >= 0) & (line < height)
+        nearest = np.full(len(points), np.inf)
+        for i, j in np.ndindex(3, 3):
+            around = padded[line[seen] + i, column[seen] + j]
+            distance = np.abs(around + points[seen, 2:])
+            nearest[seen] = np.fmin(nearest[seen], np.fmin.reduce(distance, axis=1))
+        draws.append(points[~seen | (nearest < whole.NEAR)])
+    return draws
+
+
+def score_layers(
+    predicted: PredictedView, truth: TrueLayers, surfaces: list[Array] | None = None
+) -> dict[str, float]:
     """Return every score of predicted layers (H, W, L), fitted to the visible surfaces of objects.
 
-    They are NaN where no solid is visible. Raises PredictionError where a scored pixel breaks
-    `submissions.rules`.
+    `surfaces` are `true_points`. Scores are NaN where no solid is visible. Raises PredictionError
+    where a scored pixel breaks `submissions.rules`.
     """
     refuse_pixels(PredictionError, "predicted layers", "layers", predicted.geometry, truth.scored)
     layers = fitted_layers(predicted, truth)[truth.scored].T
+    points = predicted.surface_points
+    if points is not None:
+        scale, shift = _fit(predicted, truth)
+        depth = np.where(points[:, 2:] < 0, -points[:, 2:], np.inf)
+        points = points * (scale + shift / depth)
     layers = layers[: max(2, np.isfinite(layers).any(axis=1).sum())]
     of_objects = truth.object_id > 0
     spans = solids.paired_spans(layers)
@@ -122,6 +171,7 @@ def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float
             spans, truth.spans, truth.depth, truth.object_id
         ),
     }
+    scores |= whole.surface_scores(points, surfaces)
     fronts_and_backs = np.stack(spans, axis=1).reshape(-1, layers.shape[1])
     for name, which in (("seen_chamfer", np.s_[:1]), ("unseen_chamfer", np.s_[1:])):
         true = _points(truth, np.where(of_objects, truth.depth, np.inf)[which])
@@ -135,16 +185,25 @@ def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float
 
 def fitted_layers(predicted: PredictedView, truth: TrueLayers) -> Array:
     """Return layers (H, W, L) after the declared alignment of the first to visible objects."""
-    first = predicted.geometry[truth.scored, 0]
-    seen = np.isfinite(first) & (truth.object_id[0] > 0)
-    scale, shift = scale_and_shift(first[seen], truth.depth[0, seen], predicted.alignment)
+    scale, shift = _fit(predicted, truth)
     return np.asarray(scale * predicted.geometry + shift)
 
 
-def worst_of_layers(truth: TrueLayers) -> dict[str, float]:
+def _fit(predicted: PredictedView, truth: TrueLayers) -> tuple[float, float]:
+    """Return the scale and the shift of depth that the declared alignment allows."""
+    first = predicted.geometry[truth.scored, 0]
+    seen = np.isfinite(first) & (truth.object_id[0] > 0)
+    return scale_and_shift(first[seen], truth.depth[0, seen], predicted.alignment)
+
+
+def worst_of_layers(
+    predicted: PredictedView, truth: TrueLayers, surfaces: list[Array] | None = None
+) -> dict[str, float]:
     """Return the worst value of each score that an image has."""
-    nothing = PredictedView("layers", "none", np.full((*truth.scored.shape, 2), np.nan))
-    scores = score_layers(nothing, truth)
+    points = None if predicted.surface_points is None else np.full((1, 3), -1.0)
+    empty = np.full((*truth.scored.shape, 2), np.nan)
+    nothing = replace(predicted, geometry=empty, alignment="none", surface_points=points)
+    scores = score_layers(nothing, truth, surfaces)
     return {x: value if np.isnan(value) else metric(x).worst() for x, value in scores.items()}
 
 

@@ -22,7 +22,7 @@ from metrics.scoring.image_scores import (
     true_relief,
 )
 from metrics.scoring.kept_baselines import KeptBaselines, key_of
-from metrics.scoring.layers import read_true_layers, score_layers, worst_of_layers
+from metrics.scoring.layers import read_true_layers, score_layers, true_points, worst_of_layers
 from metrics.scoring.measured_rows import scores_of_view
 from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE
 from metrics.scoring.records import OBJECT_COLUMNS
@@ -288,6 +288,7 @@ class LayerScorer:
         """Take files that stay open as long as rows are scored."""
         self._files, self._truth = files, truth
         self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in files]
+        self._meshes = any(file.has_surface_points for file in files)
 
     def score(self, triples: Array) -> ScoredRows:
         """Return the scores of rows, (N, 3), as `RowScorer.score`."""
@@ -298,13 +299,14 @@ class LayerScorer:
             view = read_true_view(self._truth, row)
             layers, runs = read_true_layers(self._truth, row, view), []
             digests[row] = (*view_digests(view), *layers.digests)
+            surfaces = true_points(self._truth, row) if self._meshes else None
             for file, entries in zip(self._files, self._entries, strict=True):
                 predicted = file.view(entries[row])
                 try:
-                    runs.append(score_layers(predicted, layers))
+                    runs.append(score_layers(predicted, layers, surfaces))
                 except PredictionError as error:
                     bad[row] = ScoringError(*_placed(error, file, row))
-                    runs.append(worst_of_layers(layers))
+                    runs.append(worst_of_layers(predicted, layers, surfaces))
             images.append(runs)
             floors.append(layers.floors())
         scores = {
