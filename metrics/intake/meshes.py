@@ -81,8 +81,7 @@ def import_meshes(
             vertices = vertices * FRAMES[reading.frame] * reading.scale
             camera = *size_of(rooms, row), float(rooms.read("camera/fov_y_degrees", row))
             layers = mesh_layers(vertices, faces, closed, *camera)
-            whole = vertices.astype(np.float64)
-            points = drawn_points(whole, faces, row, "prediction")
+            points = drawn_points(vertices[faces], row, "prediction")
             writer.add(row, layers=layers, surface_points=points)
             opened += not closed.all()
             unseen += not np.isfinite(layers).any()

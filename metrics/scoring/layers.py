@@ -108,40 +108,46 @@ def read_true_layers(truth: RoomsFile, row: int, view: TrueView) -> TrueLayers:
 def true_points(truth: RoomsFile, row: int) -> list[Array] | None:
     """Return two draws of points of a row's objects, camera frame; None without their meshes.
 
-    Points inside of solids, such as those of parts that overlap, are left out. They are known by
-    the layers of the 9 pixels around, from which they are 0.02 away or more.
+    Points inside of solids, such as those of parts that overlap, are left out. They are those that
+    are inside on the rays of all 9 pixels around, and 0.02 away from the ends.
     """
-    import trimesh
-
     from scenegen.objects.catalogue import objects_of
-    from scenegen.objects.scene_mesh import scene_parts
+    from scenegen.objects.scene_mesh import world_from_object
 
     try:
         objects = objects_of(truth.spec)
     except SceneGenError:  # meshes of a folder
         return None
     room = truth[row]
-    meshes = [part.mesh for part in scene_parts(room.scene, objects.shape) if part.object_id]
+    meshes = []
+    for item in room.scene.objects:
+        pose = world_from_object(item.position, item.rotation, item.scale)
+        meshes.append(objects.shape(item.shape).triangles @ pose[:3, :3].T + pose[:3, 3])
     if not meshes:
         return None
-    mesh = trimesh.util.concatenate(meshes)
+    triangles = np.concatenate(meshes)
     rotation, place = room.world_from_camera[:3, :3], room.world_from_camera[:3, 3]
-    layers = np.where(room.truth["layers/object_id"] > 0, room.truth["layers/depth"], np.nan)
     height, width = room.depth.shape
-    padded = np.pad(layers, ((1, 1), (1, 1), (0, 0)), constant_values=np.nan)
+    layers = (room.truth[f"layers/{x}"] for x in ("depth", "entering"))
+    spans = solids.entered_spans(*(x.reshape(height * width, -1).T for x in layers))
+    starts, ends = (
+        np.pad(x.reshape(-1, height, width), ((0, 0), (1, 1), (1, 1)), constant_values=np.inf)
+        for x in spans
+    )
     draws = []
     for draw in whole.DRAWS[1:]:
-        points = (whole.drawn_points(mesh.vertices, mesh.faces, row, draw) - place) @ rotation
-        at = points[:, :2] / -points[:, 2:] / pixel_size(height, room.fov_y_degrees)
+        points = (whole.drawn_points(triangles, row, draw) - place) @ rotation
+        depth = -points[:, 2]
+        at = points[:, :2] / depth[:, None] / pixel_size(height, room.fov_y_degrees)
         column = np.floor(at[:, 0] + width / 2).astype(int)
         line = np.floor(height / 2 - at[:, 1]).astype(int)
-        seen = (column >= 0) & (column < width) & (line >= 0) & (line < height)
-        nearest = np.full(len(points), np.inf)
+        inside = (column >= 0) & (column < width) & (line >= 0) & (line < height)
+        line, column = np.where(inside, line, 0), np.where(inside, column, 0)
         for i, j in np.ndindex(3, 3):
-            around = padded[line[seen] + i, column[seen] + j]
-            distance = np.abs(around + points[seen, 2:])
-            nearest[seen] = np.fmin(nearest[seen], np.fmin.reduce(distance, axis=1))
-        draws.append(points[~seen | (nearest < whole.NEAR)])
+            start, end = starts[:, line + i, column + j], ends[:, line + i, column + j]
+            deep = (start + whole.NEAR < depth) & (depth < end - whole.NEAR)
+            inside &= deep.any(axis=0)
+        draws.append(points[~inside])
     return draws
 
 
@@ -157,6 +163,8 @@ def score_layers(
     layers = fitted_layers(predicted, truth)[truth.scored].T
     points = predicted.surface_points
     if points is not None:
+        where = "predicted points"
+        refuse_pixels(PredictionError, where, "surface_points", points, truth.scored)
         scale, shift = _fit(predicted, truth)
         depth = np.where(points[:, 2:] < 0, -points[:, 2:], np.inf)
         points = points * (scale + shift / depth)

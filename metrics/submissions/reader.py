@@ -199,7 +199,7 @@ class RoomPredictions(Predictions):
         normal = self.normal(index) if self.has_normals else None
         fov = float(self._arrays["fov_y_degrees"][index]) if self.has_fov else None
         sure = self.confidence(index) if self.has_confidence else None
-        points = self._read("surface_points", index) if self.has_surface_points else None
+        points = self.surface_points(index) if self.has_surface_points else None
         geometry = self.geometry(index)
         return PredictedView(self.kind, self.fitted, geometry, normal, fov, sure, points)
 
@@ -239,6 +239,10 @@ class RoomPredictions(Predictions):
         Raises FileFormatError where there is none, or it is damaged.
         """
         return self._read("confidence", index)
+
+    def surface_points(self, index: int) -> Array:
+        """Points of whole objects (P, 3) of entry `index`. Raises as `normal`."""
+        return self._read("surface_points", index)
 
     def _read(self, name: str, index: int) -> Array:
         if name not in self._arrays:

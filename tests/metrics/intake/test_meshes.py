@@ -41,7 +41,14 @@ def imported(folder, layered, change=lambda mesh: mesh, ending=".glb", alone=Tru
             change(in_camera(room, alone)).export(folder / f"{room.index}{ending}")
     out = folder.with_suffix(".h5")
     how = import_meshes(str(folder), layered, out, method="m", reading=Reading(**reading))
-    return score([out], layered, Settings(processes=1)).metrics["solid_iou"].value, how
+    found = score([out], layered, Settings(processes=1)).metrics
+    values = {name: one.value for name, one in found.items()}
+    if values["solid_iou"] > 0.999:  # whole surfaces, but for the room
+        assert values["whole_f_score_0.02"] > (0.98 if alone else 0.2)
+        assert (values["whole_chamfer"] < 1.1 * values["whole_chamfer_noise"] < 0.02) == alone
+    else:
+        assert values["whole_chamfer"] > 5 * values["whole_chamfer_noise"]
+    return values["solid_iou"], how
 
 
 @pytest.mark.parametrize(

@@ -128,6 +128,30 @@ def test_depth_has_no_scores_of_solids(layered, tmp_path):
     assert not set(score([path], layered, SETTINGS).metrics) & set(SOLID)
 
 
+def test_points_of_whole_surfaces_belong_to_layers_and_are_finite(layered, tmp_path):
+    out = RoomPredictionWriter(tmp_path / "d.h5", layered, method="m")
+    with refused(PredictionError, where="row 0: surface_points"), out:
+        out.add(0, np.ones((40, 48)), surface_points=np.ones((5, 3)))
+
+    def written(path, value):
+        out = RoomPredictionWriter(path, layered, method="m", allow_partial=True)
+        with RoomsFile(layered) as rooms, out:
+            out.add(0, layers=rooms.read("layers/depth", 0), surface_points=np.full((5, 3), value))
+        return path
+
+    with refused(PredictionError, where="row 0: surface_points"):
+        written(tmp_path / "p.h5", np.nan)
+    path = written(tmp_path / "p.h5", -1.0)
+    partial = Settings(processes=1, allow_partial=True, non_finite="penalise")
+    values = score([path], layered, partial).metrics
+    assert values["whole_chamfer"].value > values["whole_chamfer_noise"].value > 0
+    with h5py.File(path, "r+") as file:
+        file["surface_points"][0, 2] = np.inf
+        file["layers"][0, 0, 0, 0] = np.inf
+    assert ("surface_points", "finite") in {(p.dataset, p.rule) for p in validate(path, layered)}
+    assert score([path], layered, partial).metrics["whole_chamfer"].value == 4.0
+
+
 @pytest.mark.parametrize("name", SCORED[-3:])
 def test_changed_layers_are_refused(name, layered, tmp_path):
     """Of all rows, in submissions of layers and of depth."""
