@@ -30,7 +30,8 @@ def drawn_points(triangles: Array, row: int, draw: str) -> NDArray[np.float32]:
     ends = np.cumsum(np.sqrt(np.square(np.cross(aside, along)).sum(axis=1)))
     face = np.searchsorted(ends[:-1], rng.random(POINTS) * ends[-1])
     far, across = np.sqrt(rng.random((POINTS, 1))), rng.random((POINTS, 1))
-    return (start[face] + far * (aside[face] + across * along[face])).astype(np.float32)
+    points = start[face] + far * (aside[face] + across * along[face])
+    return np.asarray(points, np.float32)
 
 
 def surface_scores(predicted: Array | None, true: list[Array] | None) -> dict[str, float]:
