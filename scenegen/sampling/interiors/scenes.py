@@ -126,7 +126,7 @@ def scene_arrays(
         fov[row] = Camera.fov_y_from_square(degrees, spec.height, spec.width)
         told = Interior(
             room.size, room.openings, tuple(thing.stands_on for thing in things),
-            room.hour, room.facing_degrees, room.lit, room.mirrored,
+            room.hour, room.facing_degrees, room.lit,
         )  # fmt: skip
         interior[row] = to_json(told)
     used = shape >= 0
