@@ -43,12 +43,8 @@ CASES: dict[str, tuple[str, str, dict[str, Any], dict[str, Any]]] = {
     "ptn, questions": ("ptn", "questions", PTN, {"labels": 2}),
     "rezende": ("rezende", "questions", REZENDE, {"labels": 2}),
 }
-VARIANTS = (
-    "siamese",
-    "completed",
-    "solids",
-    "ptn, ids",
-)  # which share most of their code with another case
+# Which share most of their code with another case.
+VARIANTS = ("siamese", "completed", "solids", "ptn, ids")
 each = pytest.mark.parametrize(
     "case", [pytest.param(c, marks=[pytest.mark.slow] * (c in VARIANTS)) for c in CASES]
 )
@@ -56,7 +52,7 @@ Train = Callable[..., Path]
 
 
 def baseline_of(name: str) -> Baseline:
-    baseline: Baseline = import_module(f"baselines.{HOMES[name][0]}").BASELINE
+    baseline: Baseline = import_module(f"baselines.{HOMES[name]}").BASELINE
     return baseline
 
 
