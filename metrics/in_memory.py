@@ -81,7 +81,7 @@ def evaluate_room(
         truth.depth,
         truth.normal,
         truth.object_id,
-        truth.fov_y_degrees,
+        truth.lens,
         truth.world_from_camera,
         truth.truth.get("room/size"),
     )

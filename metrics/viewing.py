@@ -112,8 +112,7 @@ def _with_prediction(view: View, predictions: RoomPredictions, truth: Images) ->
     if isinstance(truth, MeasuredFile):
         points = points_as_declared(predicted, depth, rays_of(truth, view.row, height, width))
     else:
-        fov = float(truth.read("camera/fov_y_degrees", view.row))
-        points = points_as_scored(predicted, depth, fov)
+        points = points_as_scored(predicted, depth, truth.lens(view.row))
     normal = None if predicted.normal is None else predicted.normal[:height, :width]
     return replace(view, prediction=Surfaces(points, normal))
 

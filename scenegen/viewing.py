@@ -131,7 +131,7 @@ def room_view(room: Room) -> View:
         wrong, expected = f"{fov} degrees or {pose.tolist()}", "a finite pose, 0 to 180 degrees"
         raise FileFormatError(f"row {room.index}: camera", wrong, expected)
     height, width = room.depth.shape
-    matrix = intrinsics(height, width, fov, pixel_centers="half")
+    matrix = intrinsics(height, width, room.lens, pixel_centers="half")
     name, image = f"view_{room.view_index}", srgb_bytes(room.radiance)
     truth = Surfaces(room.points, room.normal)
     return View(name, room.index, image, room.object_id, pose, matrix, truth)

@@ -206,8 +206,7 @@ def padded_size(truth: Images) -> tuple[int, int]:
 def matrix_of(truth: Images, row: int) -> Array:
     """Return the pinhole matrix (3, 3) in pixels. Raises FileFormatError where it is not known."""
     if not isinstance(truth, MeasuredFile):
-        fov = float(truth.read("camera/fov_y_degrees", row))
-        return intrinsics(*size_of(truth, row), fov, pixel_centers="half")
+        return intrinsics(*size_of(truth, row), truth.lens(row), pixel_centers="half")
     matrix = truth.matrix(row)
     if matrix is None:
         raise FileFormatError(truth.place("intrinsics", row), "none", "a pinhole matrix", NO_MATRIX)
@@ -217,7 +216,7 @@ def matrix_of(truth: Images, row: int) -> Array:
 def rays_of(truth: Images, row: int, height: int, width: int) -> Array:
     """Return directions (h, w, 3), z = -1, of a row at any size. Raises as `matrix_of`."""
     if not isinstance(truth, MeasuredFile):
-        return pixel_directions(height, width, float(truth.read("camera/fov_y_degrees", row)))
+        return pixel_directions(height, width, truth.lens(row))
     matrix_of(truth, row)
     rays = truth.rays(row, height, width)
     assert rays is not None, "its matrix is known"

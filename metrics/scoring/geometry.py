@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from metrics.measures.alignment import Alignment, align, align_points, depth_of_disparity
 from metrics.submissions.reader import PredictedView
-from scenegen.camera import pixel_directions
+from scenegen.camera import Lens, pixel_directions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -32,7 +32,7 @@ class Geometry:
 
 
 def fitted_geometry(
-    predicted: PredictedView, true_depth: Array, fov_y_degrees: float, mask: Mask
+    predicted: PredictedView, true_depth: Array, lens: Lens, mask: Mask
 ) -> Geometry:
     """Return a prediction after its declared alignment to the true depth (H, W) of the mask.
 
@@ -40,7 +40,7 @@ def fitted_geometry(
     nothing is left open, nothing changes. What is predicted must be finite inside the mask.
     """
     height, width = true_depth.shape
-    rays = pixel_directions(height, width, fov_y_degrees)[mask]
+    rays = pixel_directions(height, width, lens)[mask]
     true = true_depth[mask].astype(np.float64)
     if predicted.kind == "layers":
         predicted = replace(predicted, kind="depth", geometry=predicted.geometry[..., 0])
@@ -60,12 +60,12 @@ def fitted_geometry(
     return Geometry(depth, rays * values[:, None], True)
 
 
-def depth_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees: float) -> Array:
+def depth_as_scored(predicted: PredictedView, true_depth: Array, lens: Lens) -> Array:
     """Return planar depth (H, W) as scores see it, for pictures; no value needs to be finite."""
-    return np.asarray(-points_as_scored(predicted, true_depth, fov_y_degrees)[..., 2])
+    return np.asarray(-points_as_scored(predicted, true_depth, lens)[..., 2])
 
 
-def points_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees: float) -> Array:
+def points_as_scored(predicted: PredictedView, true_depth: Array, lens: Lens) -> Array:
     """Return points (H, W, 3) as scores see them, NaN where one of both is not finite."""
     known = np.isfinite(true_depth)
     if predicted.kind == "layers":
@@ -73,7 +73,7 @@ def points_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees:
     finite = np.isfinite(predicted.geometry)
     known &= finite.all(axis=-1) if predicted.kind == "points" else finite
     image = np.full((*known.shape, 3), np.nan)
-    image[known] = fitted_geometry(predicted, true_depth, fov_y_degrees, known).points
+    image[known] = fitted_geometry(predicted, true_depth, lens, known).points
     return image
 
 

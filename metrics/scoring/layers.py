@@ -95,8 +95,8 @@ def read_true_layers(truth: RoomsFile, row: int, view: TrueView) -> TrueLayers:
     scored = view.mask & ~((ids > 0) & (entering == 0)).any(axis=-1)
     layers = depth[scored].T.astype(np.float64), ids[scored].T, entering[scored].T
     height, width = scored.shape
-    rays = pixel_directions(height, width, view.fov_y_degrees)[scored]
-    pixel, bodies = pixel_size(len(scored), view.fov_y_degrees), solids.round_bodies(view.object_id)
+    rays = pixel_directions(height, width, view.lens)[scored]
+    pixel, bodies = pixel_size(len(scored), view.lens), solids.round_bodies(view.object_id)
     return TrueLayers(scored, rays, pixel, bodies[scored], *layers)
 
 

@@ -190,14 +190,15 @@ class RowScorer:
         confident = any(file.has_confidence for file in self._files)
         for row, other, first in triples.tolist():
             view = read_true_view(self._truth, row)
-            seen = ("depth", "camera/world_from_camera", "camera/fov_y_degrees")
             relief, first_view = None, None
             if other != row:
-                depth, pose, fov = (self._truth.read(name, other) for name in seen)
-                relief = true_relief(depth, pose, float(fov), self._truth.room_size(other))
+                seen = ("depth", "camera/world_from_camera")
+                depth, pose = (self._truth.read(name, other) for name in seen)
+                size = self._truth.room_size(other)
+                relief = true_relief(depth, pose, self._truth.lens(other), size)
             if first not in (row, -1):
-                seen = ("depth", "object_id", "camera/world_from_camera")
-                first_view = FirstView(*(self._truth.read(name, first) for name in seen))
+                names = ("depth", "object_id", "camera/world_from_camera")
+                first_view = FirstView(*(self._truth.read(name, first) for name in names))
             digests[row] = view_digests(view)
             key = key_of(view, digests[row], first_view, row)
             reference = reference_of(view, first_view, row, kept := self._kept.read(key))

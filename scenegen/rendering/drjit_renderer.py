@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_size
+from scenegen.camera import Grid
 from scenegen.common.rotations import product
 from scenegen.description.specs import Request
 from scenegen.objects.cast_meshes import normal_table
@@ -101,7 +101,7 @@ def launch_pixels(
 def upload_scenes(
     batch: SceneBatch, variant: str, models: Sequence[Mesh], bounced: bool = False
 ) -> tuple[Scenes, Any]:
-    """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel size.
+    """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel height.
 
     `models` are those of the batch's names, unless these are basic shapes. If rays are `bounced`
     off models, `rays.closest_hit` meets these, too.
@@ -139,7 +139,7 @@ def upload_scenes(
     about[:, BEFORE_LIGHTS:] = lights.reshape(count, -1)
     glossy = spec.specular[1] > 0
     materials = [batch.reflectance, batch.gloss] if glossy else [batch.reflectance]
-    pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
+    pixel = np.array([grid.down for grid in batch.grids])
     camera = [batch.world_from_camera[:, :3].reshape(count, 12), pixel[:, None]]
     scenes = Scenes(
         unit=unit.scene,
@@ -190,6 +190,8 @@ def _trace(
     column = pixel - row * width
     camera = gather_row(cameras, item, 13)
     right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
+    wide = camera[12] * spec.pixel_aspect
+    grid = Grid(*batch.grids[0][:2], wide, camera[12])
 
     def look(x: Any, y: Any) -> tuple[Any, Any, Any, Any, Any]:
         """Return what the rays through the point (x, y) of each pixel meet.
@@ -198,8 +200,7 @@ def _trace(
 
         Their directions have -z = 1 in the camera frame, so t is planar depth.
         """
-        dx = (mi.Float(column) + x - width / 2) * camera[12]
-        dy = (height / 2 - (mi.Float(row) + y)) * camera[12]
+        dx, dy = grid.slopes(mi.Float(column) + x, mi.Float(row) + y)
         d = right * dx + up * dy - back
         own = mi.Vector3f(1)
         if cubes:

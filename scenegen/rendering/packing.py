@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import look_at
+from scenegen.camera import Grid, Lens, look_at
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check, to_json
 from scenegen.common.rotations import rotation_matrix
@@ -78,6 +78,15 @@ class SceneBatch:
 
     def __len__(self) -> int:
         return len(self.fov_y_degrees)
+
+    def lens(self, image: int) -> Lens:
+        """Return the lens of an image."""
+        return self.spec.lens(float(self.fov_y_degrees[image]))
+
+    @property
+    def grids(self) -> list[Grid]:
+        """Where the pixels of each image are on the plane at depth 1."""
+        return [self.lens(i).grid(self.spec.height, self.spec.width) for i in range(len(self))]
 
     def rows(self, which: Any) -> "SceneBatch":
         """Return some images, by a slice or their numbers, with only the models that they need."""

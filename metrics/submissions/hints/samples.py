@@ -90,7 +90,7 @@ def _sample(predictions: RoomPredictions, i: int, truth: Images) -> Sample | Non
         return _measured_sample(depth, truth, row)
     height, width = depth.shape
     grid = np.ix_(mirrored_grid(height, SIDE), mirrored_grid(width, SIDE))
-    fov = float(truth.read("camera/fov_y_degrees", row))
+    lens = truth.lens(row)
     true_depth = truth.read("depth", row)[grid].astype(np.float64)
     pose = truth.read("camera/world_from_camera", row)
     usable = np.isfinite(true_depth) & (np.abs(depth[grid]) <= LARGEST)
@@ -103,14 +103,14 @@ def _sample(predictions: RoomPredictions, i: int, truth: Images) -> Sample | Non
         depth[grid],
         true_depth,
         usable,
-        pixel_directions(height, width, fov)[grid],
-        pixel_size(height, fov),
+        pixel_directions(height, width, lens)[grid],
+        pixel_size(height, lens),
         points,
         None if normal is None else normal[grid],
         truth.read("normal", row)[grid].astype(np.float64),
         pose[:3, :3].T,
         pose[:3, 3],
-        fov,
+        lens.fov_y_degrees,
     )
 
 

@@ -20,7 +20,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_size
+from scenegen.camera import Grid
 from scenegen.common.rotations import product
 from scenegen.objects.solids import Mesh
 from scenegen.rendering.packing import SceneBatch
@@ -44,13 +44,14 @@ class Triangles:
 
     Attributes:
         images, height, width: of the batch.
+        middle, aspect: principal point, pixels, and width of a pixel over its height.
         rays: of an image, padded to whole SIMD packets.
         count: number of threads.
         vertices: of all models, in the frames of their unit shapes, (V, 3).
         faces: three vertices of each triangle, counted in its model, uint32 in packets of four.
         normals: at the vertices of smooth models, (N, 3); before them a row for no vertex.
         draw: of each thread, its draw.
-        placed: of each draw, (D, 13): rows of camera_from_object, and the size of a pixel.
+        placed: of each draw, (D, 13): rows of camera_from_object, and the height of a pixel.
         starts: of each draw, uint32 in packets of four: number of its image; of a triangle in
             `faces` minus its thread's, modulo 2^32; of its model's first row in `vertices` and in
             `normals`, which is 0 if it is flat.
@@ -60,6 +61,8 @@ class Triangles:
     images: int
     height: int
     width: int
+    middle: tuple[float, float]
+    aspect: float
     rays: int
     count: int
     vertices: Any
@@ -102,8 +105,8 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
     placed = np.zeros((max(1, len(model)), 13))
     moved = product(camera_from_world[image], batch.world_from_object[image, slot])
     placed[: len(model), :12] = moved.reshape(-1, 12)
-    pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
-    placed[: len(model), 12] = pixel[image]
+    grids = batch.grids
+    placed[: len(model), 12] = np.array([grid.down for grid in grids])[image]
 
     shift = (first_face[model] - first_thread) % 2**32
     starts = np.stack([image, shift, first_vertex[model], first_normal[model]], axis=1)
@@ -111,6 +114,8 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
         images=len(batch),
         height=spec.height,
         width=spec.width,
+        middle=grids[0][:2],
+        aspect=spec.pixel_aspect,
         rays=rays,
         count=int(threads.sum()),
         vertices=vertices,
@@ -158,8 +163,8 @@ def _cover(triangles: Triangles, keys: Any, thread: Any, start: Any, x: Any, y: 
     """
     draw = dr.gather(mi.UInt32, triangles.draw, thread)
     image = dr.gather(mi.Vector4u, triangles.starts, draw).x
-    a, b, c, size = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
-    left, top, columns, rows = _rectangle(triangles, a, b, c, size, x, y)
+    a, b, c, grid = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
+    left, top, columns, rows = _rectangle(triangles, a, b, c, grid, x, y)
     area = mi.UInt32(columns * rows)
     planes = [edge_plane(b, c), edge_plane(c, a), edge_plane(a, b)]
     normal = dr.cross(b - a, c - a)
@@ -170,9 +175,8 @@ def _cover(triangles: Triangles, keys: Any, thread: Any, start: Any, x: Any, y: 
     end = dr.minimum(area, start + CHUNK)
     row = mi.Int32(start) // dr.maximum(columns, 1)
     column = mi.Int32(start) - row * columns
-    while dr.hint(i < end, exclude=[triangles, keys]):
-        dx = (mi.Float(left + column) + x - triangles.width / 2) * size
-        dy = (triangles.height / 2 - (mi.Float(top + row) + y)) * size
+    while dr.hint(i < end, exclude=[triangles, keys, grid]):
+        dx, dy = grid.slopes(mi.Float(left + column) + x, mi.Float(top + row) + y)
         sides = [dx * n.x + dy * n.y - n.z for n in planes]
         inside = ((sides[0] >= 0) & (sides[1] >= 0) & (sides[2] >= 0)) | (
             (sides[0] <= 0) & (sides[1] <= 0) & (sides[2] <= 0)
@@ -255,7 +259,7 @@ def _corners(triangles: Triangles, thread: Any, draw: Any) -> tuple[list[Any], l
 
 
 def _in_camera(triangles: Triangles, draw: Any, corners: list[Any]) -> tuple[Any, Any, Any, Any]:
-    """Return a triangle's corners in the camera frame, and the size of a pixel at depth 1."""
+    """Return a triangle's corners in the camera frame, and the grid of its pixels."""
     m = gather_row(triangles.placed, draw, 13)
     a, b, c = (
         mi.Vector3f(
@@ -264,7 +268,7 @@ def _in_camera(triangles: Triangles, draw: Any, corners: list[Any]) -> tuple[Any
         )
         for p in corners
     )  # fmt: skip
-    return a, b, c, m[12]
+    return a, b, c, Grid(*triangles.middle, m[12] * triangles.aspect, m[12])
 
 
 def _cross(a: Any, b: Any) -> Any:
@@ -285,7 +289,7 @@ def _cross(a: Any, b: Any) -> Any:
 
 
 def _rectangle(
-    triangles: Triangles, a: Any, b: Any, c: Any, size: Any, x: Any, y: Any
+    triangles: Triangles, a: Any, b: Any, c: Any, grid: Grid, x: Any, y: Any
 ) -> tuple[Any, Any, Any, Any]:
     """Return left column, top row, columns and rows of the pixels that a triangle may cover.
 
@@ -294,8 +298,8 @@ def _rectangle(
     """
     height, width = triangles.height, triangles.width
     corners = (a, b, c)
-    across = [corner.x / (-corner.z * size) + width / 2 for corner in corners]
-    down = [height / 2 - corner.y / (-corner.z * size) for corner in corners]
+    places = [grid.places(corner.x, corner.y, -corner.z) for corner in corners]
+    across, down = ([place[k] for place in places] for k in (0, 1))
     before = dr.minimum(a.z, dr.minimum(b.z, c.z)) < -BEHIND
     whole = dr.maximum(a.z, dr.maximum(b.z, c.z)) < -NEAR
     ahead = [corner.z < -NEAR for corner in corners]
@@ -304,8 +308,7 @@ def _rectangle(
         p, q = corners[i], corners[j]
         share = (-NEAR - p.z) / dr.select(ahead[i] != ahead[j], q.z - p.z, 1)
         right, up = p.x + share * (q.x - p.x), p.y + share * (q.y - p.y)
-        cut = right / (NEAR * size) + width / 2, height / 2 - up / (NEAR * size)
-        cuts.append((ahead[i] != ahead[j], *cut))
+        cuts.append((ahead[i] != ahead[j], *grid.places(right, up, NEAR)))
 
     def span(values: list[Any], part: int, at: Any, most: int) -> tuple[Any, Any]:
         low = dr.minimum(values[0], dr.minimum(values[1], values[2])) - at

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import drjit
 import mitsuba
 
+from scenegen.camera import Grid
 from scenegen.rendering.tables import unit
 
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -82,20 +83,18 @@ class Room(Protocol):
 
 
 class Camera(NamedTuple):
-    """A camera on the device: axes and position, world, and the size of a pixel at depth 1."""
+    """A camera on the device: axes and position, world, and the grid of its pixels."""
 
     right: Any
     up: Any
     back: Any
     origin: Any
-    size: Any
-    width: Any
-    height: Any
+    grid: Grid
 
     def ray(self, x: Any, y: Any) -> Any:
         """Return directions through places of the picture, in pixels."""
-        right = self.right * ((x - self.width / 2) * self.size)
-        return unit(right + self.up * ((self.height / 2 - y) * self.size) - self.back)
+        dx, dy = self.grid.slopes(x, y)
+        return unit(self.right * dx + self.up * dy - self.back)
 
 
 class Samples(NamedTuple):

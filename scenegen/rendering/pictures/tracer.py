@@ -12,7 +12,7 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_size
+from scenegen.camera import Grid
 from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import from_json
 from scenegen.description.interiors import Interior
@@ -54,8 +54,9 @@ def trace_images(batch: SceneBatch, variant: str) -> Array:
     item, pixel = index // (pixels * lanes), index // lanes % pixels
     row = gather_row(cameras, item, 13)
     right, up, back, origin = (mi.Vector3f(*row[i:12:4]) for i in range(4))
-    width, height = (dr.opaque(mi.Float, n) for n in (spec.width, spec.height))
-    camera = Camera(right, up, back, origin, row[12], width, height)
+    x, y = (dr.opaque(mi.Float, n) for n in batch.grids[0][:2])
+    grid = Grid(x, y, row[12] * spec.pixel_aspect, row[12])
+    camera = Camera(right, up, back, origin, grid)
     seeds = np.array([path_seed(batch, b) for b in range(count)], np.uint64)
     halves = upload(seeds.astype("<u8").view("<u4"), np.uint32)
     low, high = (mi.UInt64(dr.gather(mi.UInt32, halves, 2 * item + i)) for i in range(2))
@@ -154,11 +155,11 @@ def _sums(
 
 def device_camera(batch: SceneBatch, b: int) -> Camera:
     """Return a camera. Its numbers are variables, so that all cameras share a kernel."""
-    spec = batch.spec
-    size = pixel_size(spec.height, float(batch.fov_y_degrees[b]))
-    numbers = [*batch.world_from_camera[b, :3].T.ravel().tolist(), size, spec.width, spec.height]
+    grid = batch.lens(b).grid(batch.spec.height, batch.spec.width)
+    numbers = [*batch.world_from_camera[b, :3].T.ravel().tolist(), *grid]
     values = [dr.opaque(mi.Float, float(number)) for number in numbers]
-    return Camera(*(mi.Vector3f(*values[i : i + 3]) for i in (0, 3, 6, 9)), *values[12:])
+    right, up, back, origin = (mi.Vector3f(*values[i : i + 3]) for i in (0, 3, 6, 9))
+    return Camera(right, up, back, origin, Grid(*values[12:]))
 
 
 def _albedo(spec: InteriorSpec, room: Room, camera: Camera) -> Array:
