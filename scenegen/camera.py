@@ -6,6 +6,7 @@ Camera: x right, y up, looking along -z (OpenGL). `world_from_camera` maps camer
 Pixels: row 0 on top, column 0 on the left, centres at +0.5.
 Depth: planar, -z in the camera frame. A pixel's ray is (x, y, -1) in the camera frame, so the ray
 parameter of a hit IS its depth.
+Panoramas: rays are unit vectors, so that their depth is the distance along the ray.
 Lens: how pixels map to rays. Where a function takes a number in place of a `Lens`, the number is
 the vertical field of view in degrees, pixels are square, and the principal point is the middle.
 """
@@ -33,7 +34,7 @@ class Camera:
     Attributes:
         position: centre of projection, world, scene units.
         target: the point it looks at, world; not straight above or below `position`.
-        fov_y_degrees: vertical field of view.
+        fov_y_degrees: vertical field of view; 180 for panoramas.
     """
 
     position: Vector3
@@ -41,7 +42,7 @@ class Camera:
     fov_y_degrees: float
 
     def __post_init__(self) -> None:
-        check(0 < self.fov_y_degrees < 180, "fov_y_degrees", self.fov_y_degrees, "0 to 180")
+        check(0 < self.fov_y_degrees <= 180, "fov_y_degrees", self.fov_y_degrees, "0 to 180")
         check(self.position != self.target, "camera", self.position, "a target elsewhere")
 
     @staticmethod
@@ -125,15 +126,23 @@ class Lens:
             the middle.
         principal_point: x and y, as fractions of width and height from the upper left corner.
         pixel_aspect: width of a pixel over its height.
+        projection: "perspective", or "equirectangular" for a panorama. Its columns are longitudes
+            from -180 to 180 degrees, 0 straight ahead, and its rows are latitudes from 90 to -90.
     """
 
     fov_y_degrees: float
     principal_point: tuple[float, float] = (0.5, 0.5)
     pixel_aspect: float = 1.0
+    projection: str = "perspective"
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether the image is a plane, as of a pinhole camera."""
+        return self.projection == "perspective"
 
     @property
     def is_centred(self) -> bool:
-        """Whether pixels are square and the principal point is the middle."""
+        """Whether the image is flat, pixels are square, and the principal point is the middle."""
         return self == Lens(self.fov_y_degrees)
 
     def edges(self, height: int, width: int) -> tuple[float, float, float, float]:
@@ -145,7 +154,11 @@ class Lens:
         return -2 * x * wide, 2 * (1 - x) * wide, 2 * y * high, -2 * (1 - y) * high
 
     def grid(self, height: int, width: int) -> Grid:
-        """Return where the pixels of an image are on the plane at depth 1."""
+        """Return where the pixels of an image are on the plane at depth 1.
+
+        Raises SpecError for panoramas, as does all that needs a plane.
+        """
+        check(self.is_flat, "projection", self.projection, "a perspective camera")
         cosine, sine = half_angle(self.fov_y_degrees)
         down = 2 * (sine / cosine) / height
         x, y = self.principal_point
@@ -169,10 +182,17 @@ def pixel_size(height: int, lens: Lens | float) -> float:
 def pixel_directions(height: int, width: int, lens: Lens | float) -> NDArray[np.float64]:
     """Return the directions of the rays through the pixel centres: (height, width, 3).
 
-    They are in the camera frame and have z = -1.
+    They are in the camera frame and have z = -1; those of panoramas have length 1.
     """
-    grid = as_lens(lens).grid(height, width)
-    directions = np.empty((height, width, 3))
+    lens, directions = as_lens(lens), np.empty((height, width, 3))
+    if not lens.is_flat:
+        east, north = ((np.arange(n) + 0.5) / n - 0.5 for n in (width, height))
+        (ahead, right), (level, down) = cos_sin(east), cos_sin(north / 2)
+        level = level[:, None]
+        directions[..., 0], directions[..., 1] = level * right, -down[:, None]
+        directions[..., 2] = -level * ahead
+        return directions
+    grid = lens.grid(height, width)
     x, y = grid.slopes(np.arange(width) + 0.5, np.arange(height) + 0.5)
     directions[..., 0], directions[..., 1] = x, y[:, None]
     directions[..., 2] = -1.0
@@ -180,7 +200,7 @@ def pixel_directions(height: int, width: int, lens: Lens | float) -> NDArray[np.
 
 
 def back_project(depth: Array, lens: Lens | float) -> NDArray[np.float64]:
-    """Return the surface points of a planar depth map in the camera frame: (H, W) -> (H, W, 3).
+    """Return the surface points of a depth map in the camera frame: (H, W) -> (H, W, 3).
 
     Points are NaN where the depth is not finite.
     """
@@ -210,7 +230,7 @@ def intrinsics(
         pixel_centers: where the tool puts the centre of the first pixel: "half" for (0.5, 0.5), as
             here, in COLMAP and in nerfstudio; "integer" for (0, 0), as in OpenCV and Open3D.
 
-    Raises SpecError for another name.
+    Raises SpecError for another name, and for panoramas.
     """
     check(pixel_centers in _FIRST_CENTER, "pixel_centers", pixel_centers, "half or integer")
     lens = as_lens(lens)

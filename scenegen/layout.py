@@ -157,7 +157,15 @@ LENS = (  # columns of images that are crops, or have pixels that are not square
            "pinhole matrix of a camera with x right, y down, looking along +z; the centre of the"
            " first pixel is (0.5, 0.5)"),
 )
-OF_CROPS = {"meaning": "vertical field of view, if the principal point were the image's middle"}
+OF_CROPS = {
+    "camera/fov_y_degrees": "vertical field of view, if the principal point were the image's middle"
+}
+OF_PANORAMAS = {
+    "depth": "distance of the hit along the one ray through the pixel's centre; NaN where it meets"
+    " nothing",
+    "camera/fov_y_degrees": "vertical field of view of the panorama, which is 360 degrees wide:"
+    " columns are longitudes from -180 to 180, 0 straight ahead, rows are latitudes from 90 to -90",
+}
 FURTHER = {  # columns of `DatasetSpec.truth`, by its names
     "amodal": (
         _column("object/amodal_mask", ("object_slot", "y", "x"), "uint8",
@@ -203,15 +211,17 @@ FURTHER = {  # columns of `DatasetSpec.truth`, by its names
 def fields(spec: Request) -> list[Column]:
     """Return the columns of a file that answers that spec, without the sizes of their axes."""
     further = [column for name in spec.truth for column in FURTHER[name]]
-    centred = spec.lens(FOV[0]).is_centred
-    lens, closed = () if centred else LENS, INTERIOR if spec.interior else ()
-    words = {} if centred else {"camera/fov_y_degrees": OF_CROPS}
+    lens = spec.lens(FOV[0])
+    matrix = LENS if lens.is_flat and not lens.is_centred else ()
+    meanings = OF_CROPS if matrix else {} if lens.is_flat else OF_PANORAMAS
+    words = {name: {"meaning": meaning} for name, meaning in meanings.items()}
+    closed = INTERIOR if spec.interior else ()
     if spec.interior and spec.image_dtype == "uint8":
         words["image"] = DEVELOPED
     unit = "metre" if spec.interior else "scene unit"
     return [
         replace(f, **{"unit": f.unit.replace("scene unit", unit), **words.get(f.name, {})})
-        for f in (*FIELDS, *lens, *closed, *further)
+        for f in (*FIELDS, *matrix, *closed, *further)
     ]
 
 

@@ -197,8 +197,8 @@ class RowScorer:
                 size = self._truth.room_size(other)
                 relief = true_relief(depth, pose, self._truth.lens(other), size)
             if first not in (row, -1):
-                names = ("depth", "object_id", "camera/world_from_camera")
-                first_view = FirstView(*(self._truth.read(name, first) for name in names))
+                maps = ("depth", "object_id", "camera/world_from_camera")
+                first_view = FirstView(*(self._truth.read(name, first) for name in maps))
             digests[row] = view_digests(view)
             key = key_of(view, digests[row], first_view, row)
             reference = reference_of(view, first_view, row, kept := self._kept.read(key))

@@ -95,7 +95,7 @@ class RoomSpec:
         fov_degrees: field of view of a square image; others have its diagonal.
         fov_spread_degrees: range of the field of view above `fov_degrees`; each scene samples its
             own, uniformly.
-        principal_point, pixel_aspect: as in `camera.Lens`.
+        principal_point, pixel_aspect, projection: as in `camera.Lens`.
         stereo: distance between the cameras of a stereo pair; 0 for single cameras. Each view is
             then followed by a view whose camera is moved along its x axis.
         truth: additional ground truth, some of TRUTHS (`rooms.truth`).
@@ -137,6 +137,12 @@ class RoomSpec:
     pixel_aspect: float = setting(
         1.0, "Width of a pixel over its height", limits=(0.25, 4.0), later=True
     )
+    projection: str = setting(
+        "perspective",
+        "equirectangular: panoramas of interiors, 360 x 180 degrees, whose depth is the distance"
+        " along the ray; twice as wide as high",
+        choices=("perspective", "equirectangular"), later=True,
+    )  # fmt: skip
     stereo: float = setting(
         0.0,
         "Baseline of stereo pairs in scene units (metres in interiors), such as 0.065: each view"
@@ -176,11 +182,16 @@ class RoomSpec:
         eyes = 2 if self.stereo else 1
         return tuple(angle for angle in self.views for _ in range(eyes))
 
+    @property
+    def middle(self) -> tuple[float, float]:
+        """Column and row of the principal point, in pixels from the upper left corner."""
+        return self.principal_point[0] * self.width, self.principal_point[1] * self.height
+
     def lens(self, fov_y_degrees: float) -> "Lens":
         """Return the lens of images with this vertical field of view."""
         from scenegen.camera import Lens
 
-        return Lens(fov_y_degrees, self.principal_point, self.pixel_aspect)
+        return Lens(fov_y_degrees, self.principal_point, self.pixel_aspect, self.projection)
 
     def fov_y(self, fov_degrees: float) -> float:
         """Return the vertical field of view with the diagonal of a square image's."""
@@ -189,8 +200,8 @@ class RoomSpec:
         return Camera.fov_y_from_square(fov_degrees, self.height, self.width * self.pixel_aspect)
 
     def check_centred(self, where: Any) -> None:
-        """Raise SpecError unless the principal point is the middle and pixels are square."""
-        expected = "images with the principal point in the middle and square pixels"
+        """Raise SpecError unless `Lens.is_centred`."""
+        expected = "perspective images with square pixels around the principal point"
         check(self.lens(FOV[0]).is_centred, str(where), "other images", expected)
 
     @property
@@ -437,9 +448,24 @@ def _check_image(spec: RoomSpec) -> None:
     point = spec.principal_point
     near = len(point) == 2 and all(abs(x - 0.5) <= FARTHEST for x in point)
     check(near, "principal point", point, f"x,y from {0.5 - FARTHEST:g} to {0.5 + FARTHEST:g}")
+    _check_panorama(spec)
     least = spec.min_visible_pixels
     expected = f"from 0 to the image's {pixels} pixels"
     check(0 <= least <= pixels, "min visible pixels", least, expected)
+
+
+def _check_panorama(spec: RoomSpec) -> None:
+    if spec.projection == "perspective":
+        return
+    expected = "interiors, which surround the camera"
+    check(isinstance(spec, InteriorSpec), "projection", "a panorama of an open room", expected)
+    sides = f"{spec.height}x{spec.width}"
+    check(spec.width == 2 * spec.height, "size", sides, "panoramas twice as wide as high")
+    flat = [name for name in ("flow", "layers") if name in spec.truth]
+    flat += ["stereo"] if spec.stereo else []
+    flat += ["principal point"] if spec.principal_point != (0.5, 0.5) else []
+    flat += ["pixel aspect"] if spec.pixel_aspect != 1 else []
+    check(not flat, ", ".join(flat), "with a panorama", "a perspective camera")
 
 
 def _check_objects(spec: RoomSpec) -> None:

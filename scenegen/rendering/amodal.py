@@ -76,8 +76,8 @@ def _beside(batch: SceneBatch, right: Array, down: Array) -> SceneBatch:
     points away from the middle of the adjoining image.
     """
     spec, matrix = batch.spec, batch.world_from_camera.copy()
-    pixels = np.array([grid[2:] for grid in batch.grids])
-    offsets = np.stack([right * spec.width, -down * spec.height], axis=1) * pixels
+    steps = np.stack([right * spec.width * spec.pixel_aspect, -down * spec.height], axis=1)
+    offsets = steps * batch.pixel_heights[:, None]
     matrix[:, :3, 2] -= np.einsum("bic,bc->bi", matrix[:, :3, :2], offsets)
     return replace(batch, world_from_camera=matrix)
 

@@ -28,6 +28,7 @@ from scenegen.rendering.meshes.rasteriser import (
     color_of_nearest,
     nearest_triangle,
     rasterise,
+    ray_of,
     upload_triangles,
 )
 from scenegen.rendering.meshes.unit_scene import UnitScene, stacked, unit_scene
@@ -139,8 +140,7 @@ def upload_scenes(
     about[:, BEFORE_LIGHTS:] = lights.reshape(count, -1)
     glossy = spec.specular[1] > 0
     materials = [batch.reflectance, batch.gloss] if glossy else [batch.reflectance]
-    pixel = np.array([grid.down for grid in batch.grids])
-    camera = [batch.world_from_camera[:, :3].reshape(count, 12), pixel[:, None]]
+    camera = [batch.world_from_camera[:, :3].reshape(count, 12), batch.pixel_heights[:, None]]
     scenes = Scenes(
         unit=unit.scene,
         grid=unit.grid,
@@ -190,27 +190,30 @@ def _trace(
     column = pixel - row * width
     camera = gather_row(cameras, item, 13)
     right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
-    wide = camera[12] * spec.pixel_aspect
-    grid = Grid(*batch.grids[0][:2], wide, camera[12])
+    grid = Grid(*spec.middle, camera[12] * spec.pixel_aspect, camera[12])
 
     def look(x: Any, y: Any) -> tuple[Any, Any, Any, Any, Any]:
         """Return what the rays through the point (x, y) of each pixel meet.
 
         That is t, object id, normal, radiance and own colour.
 
-        Their directions have -z = 1 in the camera frame, so t is planar depth.
+        Their directions have -z = 1 in the camera frame, so t is planar depth. Those of panoramas
+        have length 1, so that it is the distance, and pass through the middles of pixels.
         """
-        dx, dy = grid.slopes(mi.Float(column) + x, mi.Float(row) + y)
-        d = right * dx + up * dy - back
+        if meshes:
+            local = ray_of(meshes, grid, column, row, x, y)
+        else:
+            local = (*grid.slopes(mi.Float(column) + x, mi.Float(row) + y), -1.0)
+        d = right * local[0] + up * local[1] + back * local[2]
         own = mi.Vector3f(1)
         if cubes:
             t, object_id, n = closest_cube(cubes, item, origin, d)
         elif meshes:
             keys = rasterise(meshes, x, y)
-            hit = nearest_triangle(meshes, keys, item * rays + pixel, dx, dy)
+            hit = nearest_triangle(meshes, keys, item * rays + pixel, local)
             t, object_id, flat, smooth = nearer_than_room(scenes, item, origin, d, hit)
             if colors is not None:
-                color = color_of_nearest(meshes, keys, item * rays + pixel, dx, dy, colors)
+                color = color_of_nearest(meshes, keys, item * rays + pixel, local, colors)
                 own = dr.select(object_id > 0, color, own)
         else:
             t, object_id, face, uv = closest_hit(scenes, item, origin, d)

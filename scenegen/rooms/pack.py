@@ -85,7 +85,7 @@ def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
     classes = [spec.shapes.index(name.partition("/")[0]) for name in batch.names]
     shape, view = batch.shape[images], batch.view[images]
     more = _interior(batch, images) if batch.interior is not None else {}
-    if not batch.lens(0).is_centred:
+    if batch.lens(0).is_flat and not batch.lens(0).is_centred:
         size = spec.height, spec.width
         matrices = [intrinsics(*size, batch.lens(i), pixel_centers="half") for i in images]
         more["camera/intrinsics"] = np.array(matrices)

@@ -82,18 +82,34 @@ class Room(Protocol):
         """Return whether a surface is nearer than `distance`."""
 
 
+class Sphere(NamedTuple):
+    """The pixels of a panorama, which shows all directions."""
+
+    width: Any
+    height: Any
+
+    def ray(self, x: Any, y: Any) -> Any:
+        """Return the components of unit vectors, camera frame, through places of the picture."""
+        right, ahead = dr.sincos(dr.two_pi * (x / self.width - 0.5))
+        up, level = dr.sincos(dr.pi * (0.5 - y / self.height))
+        return level * right, up, -level * ahead
+
+
 class Camera(NamedTuple):
-    """A camera on the device: axes and position, world, and the grid of its pixels."""
+    """A camera on the device: axes and position, world, and its pixels."""
 
     right: Any
     up: Any
     back: Any
     origin: Any
-    grid: Grid
+    pixels: Grid | Sphere
 
     def ray(self, x: Any, y: Any) -> Any:
         """Return directions through places of the picture, in pixels."""
-        dx, dy = self.grid.slopes(x, y)
+        if isinstance(self.pixels, Sphere):
+            right, up, back = self.pixels.ray(x, y)
+            return unit(self.right * right + self.up * up + self.back * back)
+        dx, dy = self.pixels.slopes(x, y)
         return unit(self.right * dx + self.up * dy - self.back)
 
 

@@ -29,7 +29,7 @@ from scenegen.rendering.pictures.development import develop
 from scenegen.rendering.pictures.lights import Window, lights_of
 from scenegen.rendering.pictures.matter import gather_matter
 from scenegen.rendering.pictures.paper_rooms import PaperRooms, with_intensities
-from scenegen.rendering.pictures.paths import Camera, Room, Samples, trace_paths
+from scenegen.rendering.pictures.paths import Camera, Room, Samples, Sphere, trace_paths
 from scenegen.rendering.pictures.sky import Outside, outside
 from scenegen.rendering.pictures.sun import SUNLESS, sun_height
 from scenegen.rendering.pixel_samples import sample_positions
@@ -54,7 +54,7 @@ def trace_images(batch: SceneBatch, variant: str) -> Array:
     item, pixel = index // (pixels * lanes), index // lanes % pixels
     row = gather_row(cameras, item, 13)
     right, up, back, origin = (mi.Vector3f(*row[i:12:4]) for i in range(4))
-    x, y = (dr.opaque(mi.Float, n) for n in batch.grids[0][:2])
+    x, y = (dr.opaque(mi.Float, n) for n in spec.middle)
     grid = Grid(x, y, row[12] * spec.pixel_aspect, row[12])
     camera = Camera(right, up, back, origin, grid)
     seeds = np.array([path_seed(batch, b) for b in range(count)], np.uint64)
@@ -155,11 +155,12 @@ def _sums(
 
 def device_camera(batch: SceneBatch, b: int) -> Camera:
     """Return a camera. Its numbers are variables, so that all cameras share a kernel."""
-    grid = batch.lens(b).grid(batch.spec.height, batch.spec.width)
-    numbers = [*batch.world_from_camera[b, :3].T.ravel().tolist(), *grid]
+    spec, lens = batch.spec, batch.lens(b)
+    pixels = lens.grid(spec.height, spec.width) if lens.is_flat else Sphere(spec.width, spec.height)
+    numbers = [*batch.world_from_camera[b, :3].T.ravel().tolist(), *pixels]
     values = [dr.opaque(mi.Float, float(number)) for number in numbers]
     right, up, back, origin = (mi.Vector3f(*values[i : i + 3]) for i in (0, 3, 6, 9))
-    return Camera(right, up, back, origin, Grid(*values[12:]))
+    return Camera(right, up, back, origin, type(pixels)(*values[12:]))
 
 
 def _albedo(spec: InteriorSpec, room: Room, camera: Camera) -> Array:

@@ -88,7 +88,10 @@ class Encoding:
             "world_from_camera": room.world_from_camera.tolist(),
             "fov_y_degrees": room.fov_y_degrees,
         }
-        if not room.lens.is_centred:
+        if not room.lens.is_flat:
+            about["projection"] = room.lens.projection
+            about["depth"] = {**about["depth"], "kind": "distance along the ray"}
+        elif not room.lens.is_centred:
             height, width = room.depth.shape
             matrix = intrinsics(height, width, room.lens, pixel_centers="half")
             about["intrinsics"] = matrix.tolist()
