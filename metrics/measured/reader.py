@@ -198,6 +198,11 @@ def size_of(truth: Images, row: int) -> tuple[int, int]:
     return truth.spec.height, truth.spec.width
 
 
+def is_flat(truth: Images) -> bool:
+    """Return whether images are planes, as of pinhole cameras."""
+    return isinstance(truth, MeasuredFile) or truth.spec.projection == "perspective"
+
+
 def padded_size(truth: Images) -> tuple[int, int]:
     """Return height and width of what is stored of each image."""
     return truth.shape if isinstance(truth, MeasuredFile) else size_of(truth, 0)

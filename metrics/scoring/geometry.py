@@ -21,7 +21,8 @@ class Geometry:
     """What is predicted for one image after the declared alignment, as scores take it.
 
     Attributes:
-        depth: planar depth, (H, W), scene units: -z of the points; NaN outside of the mask.
+        depth: planar depth, (H, W), scene units: -z of the points; in panoramas, their distance;
+            NaN outside of the mask.
         points: camera frame, scene units, (N, 3), of the N pixels of the mask.
         on_rays: whether the points lie on the rays of their pixels, as those of depth do.
     """
@@ -49,7 +50,7 @@ def fitted_geometry(
         points = predicted.geometry[mask].astype(np.float64)
         if len(true):
             points = align_points(points, rays * true[:, None], predicted.alignment)
-        depth[mask] = -points[:, 2]
+        depth[mask] = _depth_of(points, lens)
         return Geometry(depth, points, False)
     values = predicted.geometry[mask].astype(np.float64)
     if predicted.kind == "disparity" and len(true):
@@ -60,9 +61,14 @@ def fitted_geometry(
     return Geometry(depth, rays * values[:, None], True)
 
 
+def _depth_of(points: Array, lens: Lens) -> Array:
+    away = -points[..., 2] if lens.is_flat else np.sqrt(np.square(points).sum(axis=-1))
+    return np.asarray(away)
+
+
 def depth_as_scored(predicted: PredictedView, true_depth: Array, lens: Lens) -> Array:
-    """Return planar depth (H, W) as scores see it, for pictures; no value needs to be finite."""
-    return np.asarray(-points_as_scored(predicted, true_depth, lens)[..., 2])
+    """Return depth (H, W) as scores see it, for pictures; no value needs to be finite."""
+    return _depth_of(points_as_scored(predicted, true_depth, lens), lens)
 
 
 def points_as_scored(predicted: PredictedView, true_depth: Array, lens: Lens) -> Array:

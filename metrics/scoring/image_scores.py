@@ -350,7 +350,7 @@ def score_prediction(
     Raises PredictionError with the count and the first pixel, unless they are penalised, and
     ValueError on other shapes than the truth's.
     """
-    if non_finite == "penalise" and _breaks_rules(predicted, truth):
+    if non_finite == "penalise" and breaks_rules(predicted, truth):
         return _worst(predicted, truth, reference, other_relief, edge_distance)
     for name, values in predicted.columns:
         if values is not None:
@@ -421,7 +421,8 @@ def scores_of_confidence(
     return scores
 
 
-def _breaks_rules(predicted: PredictedView, truth: TrueView) -> bool:
+def breaks_rules(predicted: PredictedView, truth: TrueView) -> bool:
+    """Return whether a scored pixel breaks `submissions.rules`."""
     against = Against(surface=truth.mask)
     return any(
         True

@@ -2,7 +2,7 @@
 
 import atexit
 import functools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,6 +17,7 @@ from metrics.measures.alignment import Alignment
 from metrics.measures.confidence import distance_from_edges
 from metrics.scoring.image_scores import (
     FirstView,
+    ImageScores,
     reference_of,
     score_prediction,
     true_relief,
@@ -25,12 +26,13 @@ from metrics.scoring.kept_baselines import KeptBaselines, key_of
 from metrics.scoring.layers import read_true_layers, score_layers, worst_of_layers
 from metrics.scoring.measured_rows import scores_of_view
 from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE
+from metrics.scoring.panoramas import baselines_of, score_panorama
 from metrics.scoring.records import OBJECT_COLUMNS
 from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.scoring.truth_digests import RowDigests, view_digests
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import Identity, RoomPredictions, on_any_machine, open_predictions
-from metrics.submissions.truths import read_true_view
+from metrics.submissions.truths import TrueView, read_true_view
 from scenegen.common.cgroup import processors
 from scenegen.common.threads import one_thread
 from scenegen.files.pool import LostWorkerError
@@ -187,38 +189,24 @@ class RowScorer:
         bad: dict[int, ScoringError] = {}
         digests: dict[int, RowDigests] = {}
         images, floors = [], []
-        confident = any(file.has_confidence for file in self._files)
         for row, other, first in triples.tolist():
             view = read_true_view(self._truth, row)
-            relief, first_view = None, None
-            if other != row:
-                seen = ("depth", "camera/world_from_camera")
-                depth, pose = (self._truth.read(name, other) for name in seen)
-                size = self._truth.room_size(other)
-                relief = true_relief(depth, pose, self._truth.lens(other), size)
-            if first not in (row, -1):
-                maps = ("depth", "object_id", "camera/world_from_camera")
-                first_view = FirstView(*(self._truth.read(name, first) for name in maps))
             digests[row] = view_digests(view)
-            key = key_of(view, digests[row], first_view, row)
-            reference = reference_of(view, first_view, row, kept := self._kept.read(key))
-            if kept is None:
-                self._kept.write(key, reference.floors)
-            edges = distance_from_edges(self._truth.read("image", row)) if confident else None
+            if view.lens.is_flat:
+                score, baselines = self._of_plane(view, digests[row], row, other, first)
+            else:
+                score = functools.partial(score_panorama, truth=view)
+                baselines = baselines_of(view)
             scores = []
             for file, entries in zip(self._files, self._entries, strict=True):
-                i = entries[row]
-                predicted = file.view(i)
-                score = functools.partial(
-                    score_prediction, predicted, view, reference, relief, edge_distance=edges
-                )
+                predicted = file.view(entries[row])
                 try:
-                    scores.append(score())
+                    scores.append(score(predicted))
                 except PredictionError as error:
                     bad[row] = ScoringError(*_placed(error, file, row))
-                    scores.append(score(non_finite="penalise"))
+                    scores.append(score(predicted, non_finite="penalise"))
             images.append(scores)
-            floors.append(reference.floors)
+            floors.append(baselines)
         names = images[0][0].scores
         counts = [len(scores[0].objects["object"]) for scores in images]
         objects = {"row": np.repeat(triples[:, 0], counts)}
@@ -236,6 +224,28 @@ class RowScorer:
             bad,
             digests,
         )
+
+    def _of_plane(
+        self, view: TrueView, digests: RowDigests, row: int, other: int, first: int
+    ) -> tuple[Callable[..., ImageScores], dict[str, float]]:
+        """Return what scores a prediction of an image, and the scores of its baselines."""
+        relief, first_view, edges = None, None, None
+        if other != row:
+            names = ("depth", "camera/world_from_camera")
+            depth, pose = (self._truth.read(name, other) for name in names)
+            size = self._truth.room_size(other)
+            relief = true_relief(depth, pose, self._truth.lens(other), size)
+        if first not in (row, -1):
+            maps = ("depth", "object_id", "camera/world_from_camera")
+            first_view = FirstView(*(self._truth.read(name, first) for name in maps))
+        key = key_of(view, digests, first_view, row)
+        reference = reference_of(view, first_view, row, kept := self._kept.read(key))
+        if kept is None:
+            self._kept.write(key, reference.floors)
+        if any(file.has_confidence for file in self._files):
+            edges = distance_from_edges(self._truth.read("image", row))
+        about = {"reference": reference, "other_relief": relief, "edge_distance": edges}
+        return functools.partial(score_prediction, truth=view, **about), reference.floors
 
 
 class MeasuredScorer:

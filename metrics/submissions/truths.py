@@ -46,7 +46,8 @@ class TrueView:
     """The true depth, normals and objects of one image, as stored.
 
     Attributes:
-        depth: planar depth, (H, W), scene units; the pixels where it is finite are scored.
+        depth: planar depth, (H, W), scene units, in panoramas the distance; the pixels where it is
+            finite are scored.
         normal: (H, W, 3), camera frame, unit, facing the viewer.
         object_id: (H, W).
         lens: of the camera.
@@ -203,7 +204,7 @@ def read_true_view(truth: RoomsFile, row: int) -> TrueView:
             raise FileFormatError(truth.place(name, row), found, expected)
     if not surface.any():
         raise FileFormatError(truth.place("object_id", row), "no surface", "a pixel to be scored")
-    if not 0.0 < view.lens.fov_y_degrees < 180.0:
+    if view.lens.is_flat and not 0.0 < view.lens.fov_y_degrees < 180.0:
         where = truth.place("camera/fov_y_degrees", row)
         raise FileFormatError(where, view.lens.fov_y_degrees, "between 0 and 180")
     if not _is_rigid(view.world_from_camera):

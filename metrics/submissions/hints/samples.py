@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measured.reader import Images, MeasuredFile
+from metrics.measured.reader import Images, MeasuredFile, is_flat
 from metrics.submissions.reader import RoomPredictions
 from metrics.submissions.rules import LARGEST
 from scenegen.camera import pixel_directions, pixel_size
@@ -63,7 +63,7 @@ class Sample:
 def sample_rooms(predictions: RoomPredictions, truth: Images) -> list[Sample]:
     """Return the usable ones of some rows that are spread evenly over a submission."""
     entries = np.flatnonzero((predictions.rows >= 0) & (predictions.rows < len(truth)))
-    if len(entries) == 0:
+    if len(entries) == 0 or not is_flat(truth):
         return []
     spread = np.linspace(0, len(entries) - 1, ROWS).astype(np.int64)
     samples = (_sample(predictions, int(i), truth) for i in entries[np.unique(spread)])
