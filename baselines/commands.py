@@ -43,9 +43,9 @@ UNTRAINED = {
     "empty-room": "rooms: ground-truth walls and ground, no objects",
     "cut-out": "rooms: ground-truth masks, flat, at the true distance of each object",
     "picture-outline": "rooms: a foreground mask from the image, at a constant height",
-    "balls": "rooms: a sphere proxy for each component of that mask in the first view",
-    "outline-regression": "rooms: that mask, heights by a regression learned from --train",
-    "outline-relief": "rooms: that mask, heights by trees learned from --train",
+    "balls": "rooms: a sphere for each component of the picture-outline mask in the first view",
+    "outline-regression": "rooms: the picture-outline mask, heights by a regression on --train",
+    "outline-relief": "rooms: the picture-outline mask, heights by trees trained on --train",
     "nearest": "rooms: the heights of the most similar image of --train",
     "oracle": "the ground truth, which scores perfectly",
     "chance": "questions: random options",
@@ -250,7 +250,8 @@ def _check_task(name: str, data: str) -> None:
         of_rooms = stored == "questions" and MARK in str(opened.file.attrs.get("spec", ""))
     if of_rooms and name in OF_SHAPES:
         expected = "try oracle-warp, outline, features, cnn or siamese"
-        raise click.UsageError(f"{name} knows shapes alone, and {data} shows rooms; {expected}")
+        why = f"{name} does not answer questions about rooms, such as those of {data}"
+        raise click.UsageError(f"{why}; {expected}")
     if task in ("rooms", "questions") and task != stored:
         others = ", ".join(other for other in ALL if ALL[other].startswith(f"{stored}:"))
         raise click.UsageError(f"{name} predicts {task}, and {data} holds {stored}; try {others}")

@@ -63,8 +63,6 @@ def write_warp(
 def warp_scores(scenes: tuple[SceneSpec, ...], depth: Array) -> Array:
     """Return how well each option agrees with the reference, (K,), at most 0.
 
-    A mirror image is seen from the mirrored camera, so both of two options are compared from both.
-
     Args:
         scenes: of the reference and of K options, one camera each.
         depth: of their images, (1 + K, H, W).
@@ -72,20 +70,11 @@ def warp_scores(scenes: tuple[SceneSpec, ...], depth: Array) -> Array:
     reference, *options = scenes
     fov = reference.cameras[0].fov_y_degrees
     place = reference.cameras[0].world_from_camera
-    assert reference.interior is not None
-    flip = np.diag([-1.0, 1.0, 1.0, 1.0])
-    width = np.eye(4)
-    width[0, 3] = reference.interior.size[0]
-    mirrored = width @ flip @ place @ flip  # the flip of the image's x keeps it a rotation
     scores = []
     for scene, shown in zip(options, depth[1:], strict=True):
         camera = scene.cameras[0].world_from_camera
-        found = [
-            _before(depth[0], shown, np.linalg.inv(camera) @ of, fov)
-            + _before(shown, depth[0], np.linalg.inv(of) @ camera, fov)
-            for of in ((place,) if len(options) > 2 else (place, mirrored))
-        ]
-        scores.append(-min(found))
+        before = _before(depth[0], shown, np.linalg.inv(camera) @ place, fov)
+        scores.append(-before - _before(shown, depth[0], np.linalg.inv(place) @ camera, fov))
     return np.array(scores)
 
 

@@ -9,7 +9,6 @@
 The others run by name:
 
     gpu         whether a GPU draws what the CPU draws, and how fast
-    cluster     images a second of worker processes and of a Dask cluster
     torture     runs that are killed or meet trouble, and then go on
     results     the commands behind the tables of docs/results.md and of docs/data
     public_sets questions as public generators draw them

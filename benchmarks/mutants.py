@@ -55,18 +55,7 @@ def survives(mutant: dict[str, Any], tree: Path) -> bool:
             f" mend the row in {TABLE.name}"
         )
     path.write_text(text.replace(mutant["old"], mutant["new"]))
-    command = [
-        sys.executable,
-        "-B",
-        "-m",
-        "pytest",
-        "-q",
-        "-x",
-        "-n",
-        "0",
-        "-p",
-        "no:cacheprovider",
-    ]
+    command = f"{sys.executable} -B -m pytest -q -x -n 0 -p no:cacheprovider".split()
     environment = {**os.environ, "PYTHONPATH": str(tree)}
     try:
         ended = subprocess.run(

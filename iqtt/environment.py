@@ -180,8 +180,9 @@ def _first_within(pools: Pools, place: int, angle: tuple[float, float], device: 
             if within and shows_every_cube(pools.spec, drawn, device):
                 return drawn
         first += count
-    expected = f"a rotation of {angle[0]:g} to {angle[1]:g} degrees"
-    raise PlacementError("question", f"none among {first} candidates", expected)
+    range_ = f"{angle[0]:g} to {angle[1]:g} degrees"
+    why = f"none of {first} candidates has a rotation of {range_}"
+    raise PlacementError("question", why, hint="use a wider range of angles")
 
 
 @lru_cache(maxsize=16)

@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 
+from iqtt.audit.probes.masks import costs_of_masks
 from iqtt.audit.probes.rules import Probe, run_floor_probes
 from iqtt.audit.table import open_paths, read_table
 from iqtt.files.make import make_split
 from iqtt.files.split import FILES
-from iqtt.floors import CHANCE, Floor, Measured, settings_of
-from iqtt.questions.specs import SplitSpec
+from iqtt.floors import CHANCE, Floor, Measured, Settings, settings_of
+from iqtt.perspective.specs import PerspectiveSpec
 from iqtt.shapes.splits import TooFewShapesError
 
 QUESTIONS = 6_000  # of each kind
@@ -27,7 +28,7 @@ SEED = int.from_bytes(b"floors")
 
 
 def measure_floors(
-    specs: Sequence[SplitSpec],
+    specs: Sequence[Settings],
     count: int = QUESTIONS,
     *,
     workers: int = 1,
@@ -44,8 +45,8 @@ def measure_floors(
 
     Also returns, for each floor, all probes. Raises as `make_split`.
     """
-    floors: dict[SplitSpec, list[Floor]] = {}
-    probes: dict[SplitSpec, list[tuple[Probe, ...]]] = {}
+    floors: dict[Settings, list[Floor]] = {}
+    probes: dict[Settings, list[tuple[Probe, ...]]] = {}
     for (settings, kind), spec in floor_specs(specs, count).items():
         with tempfile.TemporaryDirectory(prefix="iqtt-floors-") as folder:
             try:
@@ -60,7 +61,7 @@ def measure_floors(
     return [(Measured(s, tuple(floors[s])), probes[s]) for s in floors]
 
 
-def floor_specs(specs: Iterable[SplitSpec], count: int) -> dict[tuple[SplitSpec, str], SplitSpec]:
+def floor_specs(specs: Iterable[Settings], count: int) -> dict[tuple[Settings, str], Settings]:
     """Return what each floor is measured on, by `settings_of` and the kind of question."""
     drawn = {}
     for spec in specs:
@@ -78,9 +79,12 @@ def probe_file(path: Path, progress: Callable[[int], Any] = lambda done: None) -
     """Run the probes without 3D that may beat chance on a file of labelled questions."""
     with open_paths([path]) as opened:
         name, questions = next(one for one in opened.items() if one[1].has_answers and len(one[1]))
-        table = read_table(name, questions, np.arange(len(questions)), progress)
+        rows = np.arange(len(questions))
+        table = read_table(name, questions, rows, progress)
+        of_rooms = isinstance(questions.spec, PerspectiveSpec)
+        masks = costs_of_masks(table, rows) if of_rooms else None
     assert table.answers is not None
-    return run_floor_probes(table.statistics, table.answers.astype(np.int64))
+    return run_floor_probes(table.statistics, table.answers.astype(np.int64), masks)
 
 
 def floor_of(kind: str, answers: int, probes: tuple[Probe, ...]) -> Floor:

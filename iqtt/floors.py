@@ -12,13 +12,16 @@ from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
+from iqtt.perspective.specs import PerspectiveSpec
 from iqtt.questions.specs import QuestionSpec, SplitSpec
 from scenegen.common.records import check, from_json
 
 SHIPPED = "floors.json"
 CHANCE = "chance, which no classifier beats"
+SIDE = 96  # pixels of images of rooms that floors are measured on
+Settings: TypeAlias = SplitSpec | PerspectiveSpec
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Floor:
 class Measured:
     """The floors of questions with these settings (`settings_of`), one for each kind."""
 
-    settings: SplitSpec
+    settings: Settings
     floors: tuple[Floor, ...]
 
 
@@ -63,16 +66,24 @@ class FloorFile:
     measured: tuple[Measured, ...]
 
 
-def settings_of(spec: SplitSpec) -> SplitSpec:
+def settings_of(spec: Settings) -> Settings:
     """Return the settings that floors depend on: the others are the same for all.
 
     Left out are the seed, the numbers of questions, how pictures are stored, and the kind and the
-    number of answers, which the kind of a floor tells.
+    number of answers, which the kind of a floor tells. Floors of rooms are those of small images of
+    the objects for training, as masks of objects decide them.
     """
-    return replace(
+    spec = replace(
         spec, seed=None, train=1, labeled=0, val=0, test=0, distractors="mixed", answers=3,
         image_dtype="uint8", with_depth=False,
     )  # fmt: skip
+    if isinstance(spec, PerspectiveSpec):
+        less = SIDE / min(spec.height, spec.width)
+        return replace(
+            spec, height=round(less * spec.height), width=round(less * spec.width),
+            object_split="train", spp=1, denoise=False,
+        )  # fmt: skip
+    return spec
 
 
 def read_floors(text: str | bytes) -> tuple[Measured, ...]:
@@ -107,7 +118,7 @@ def floors_of(spec: QuestionSpec | None, path: str | Path | None = None) -> dict
     Raises OSError, and SpecError where the file is none of floors.
     """
     ours = () if path is None else read_floors(Path(path).read_bytes())
-    if not isinstance(spec, SplitSpec):  # released, or about rooms
+    if not isinstance(spec, SplitSpec | PerspectiveSpec):  # released
         return {}
     groups = [group for group in (*shipped_floors(), *ours) if group.settings == settings_of(spec)]
     return {floor.kind: floor for group in groups for floor in group.floors}

@@ -88,7 +88,7 @@ def evaluate_room(
         truth.truth.get("room/size"),
     )
     if not view.lens.is_flat:
-        return score_panorama(predicted, view, non_finite).scores | baselines_of(view)
+        return score_panorama(predicted, view, non_finite == "penalise") | baselines_of(view)
     reference = reference_of(view, row=truth.index)
     scores = score_prediction(predicted, view, reference, non_finite=non_finite).scores
     own = {name: value for name, value in scores.items() if not name.startswith(OTHER_SCENE)}

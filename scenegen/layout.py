@@ -149,8 +149,8 @@ INTERIOR = (  # columns of closed rooms
            " -1 in unused slots"),
     _column("room/size", ("xyz",), "float64", "scene unit", "world", "inner size of the room"),
     _column("exposure", ("setting",), "float64", "1", "-",
-           "how the picture was developed: factor of radiance, factors of red, green and blue, and"
-           " the exposed radiance that is white (docs/interiors.md has the tone curve)"),
+           "tone mapping of the image: exposure, gains of red, green and blue, and the exposed"
+           " radiance that is white (docs/rendering.md has the tone curve)"),
 )
 LENS = (  # columns of images that are crops, or have pixels that are not square
     _column("camera/intrinsics", ("image_axis", "camera_axis"), "float64", "pixel", "camera",

@@ -8,7 +8,7 @@ import pytest
 
 HEAVY = (
     "mitsuba", "drjit", "numpy", "h5py", "trimesh", "scipy", "PIL", "OpenEXR", "tqdm", "torch",
-    "lightning_fabric", "safetensors", "tensorboard", "pyarrow", "inspect_ai", "rerun",
+    "safetensors", "tensorboard", "pyarrow", "inspect_ai", "rerun",
 )  # fmt: skip
 LIGHT = (
     "scenegen --help", "scenegen --version", "scenegen render --help", "scenegen verify --help",

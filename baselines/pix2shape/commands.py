@@ -4,7 +4,6 @@ Heavy imports happen inside the commands, so that `--help` is quick and works wi
 """
 
 import shlex
-import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, nullcontext
 from typing import Any
@@ -15,9 +14,8 @@ from scenegen.command_line.groups import EXAMPLE, needs
 from scenegen.command_line.options import LARGEST, MOST_PROCESSES, OVERWRITE, Items
 from scenegen.command_line.output import print_line, progress_bar
 from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder, OutputPath
-from scenegen.common.errors import SceneGenError
 
-PACKAGES = ("torch", "lightning_fabric", "safetensors", "tensorboard")
+PACKAGES = ("torch", "safetensors", "tensorboard")
 A_MODEL = "Weights: a .safetensors file, or the name of bundled weights"
 
 WEIGHTS_PATH = InputPath()
@@ -101,10 +99,9 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
 @click.option(
     "--config",
     type=click.Choice(["rays", "views", "paper"]),
-    help="Configuration. rays: for rooms with several views, given ground and walls as input, at 64"
-    " pixels and an eighth of the paper's width, 40 minutes on a CPU. views: for questions, with a"
-    " separate encoder whose codes are compared. paper: the paper's size and losses, needs a GPU"
-    " [rays for rooms, views for questions].",
+    help="Configuration. rays: rooms with several views; takes 40 minutes on a CPU. views:"
+    " questions. paper: the paper's size and losses; needs a GPU [rays for rooms, views for"
+    " questions].",
 )
 @click.option(
     "--set",
@@ -134,18 +131,6 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
 @MINUTES
 @DEVICE
 @click.option(
-    "--devices",
-    type=click.IntRange(1, MOST_PROCESSES),
-    help="Number of GPUs, or CPU processes, per machine that share each batch [1, or the number"
-    " that"
-    " torchrun started].",
-)
-@click.option(
-    "--nodes",
-    type=click.IntRange(1, MOST_PROCESSES),
-    help="Number of machines, see docs/pix2shape.md [1, or the number given to torchrun].",
-)
-@click.option(
     "--precision",
     type=click.Choice(["32", "bf16"]),
     help="Precision of the networks. Losses and renderer always use 32 bits [32; with --resume,"
@@ -167,8 +152,6 @@ def train(
     every: int,
     minutes: float | None,
     device: str,
-    devices: int | None,
-    nodes: int | None,
     precision: str | None,
     allow_test_set: bool,
 ) -> None:
@@ -179,47 +162,30 @@ def train(
     needs_torch()
     from baselines.pix2shape.network.config import model_config
     from baselines.pix2shape.training.run import train_run
-    from baselines.training.machine import (
-        Machine,
-        is_first_here,
-        is_told_elsewhere,
-        torchrun_counts,
-    )
+    from baselines.training.machine import Machine
 
     chosen = named_once(settings, **({} if seed is None else {"seed": seed}))
     if resume and (config or chosen or labels or conditional or start):
         options = "--config, --set, --seed, --labels, --conditional and --start"
         raise click.UsageError(f"--resume uses the {options} of the run: leave them out")
-    here, machines = torchrun_counts()
-    machine = Machine(device, devices or here, nodes or machines, workers, every, minutes)
-    try:
-        given = training_data(() if data is None else (data,), stream, allow_test_set)
-        with given as files, shown_training(out, every) as show:
-            name = config or ("views" if files.hold_questions else "rays")
-            weights = train_run(
-                out,
-                files,
-                None if resume else model_config(name, **chosen),
-                machine,
-                labels=labels,
-                conditional=conditional,
-                start=start,
-                precision=precision,
-                chosen=chosen,
-                progress=show,
-            )
-    except KeyboardInterrupt:
-        if not is_first_here():
-            sys.exit(1)
-        raise
-    except (SceneGenError, OSError) as error:
-        if is_told_elsewhere(error):
-            sys.exit(2)
-        raise
-    if weights is not None:  # None in all processes but the first
-        named = shlex.quote(str(weights))
-        print_line(f"{weights}: trained on {files.where}")
-        print_line(f"now: pix2shape predict --weights {named} --data ...")
+    machine = Machine(device, workers, every, minutes)
+    given = training_data(() if data is None else (data,), stream, allow_test_set)
+    with given as files, shown_training(out, every) as show:
+        name = config or ("views" if files.hold_questions else "rays")
+        weights = train_run(
+            out,
+            files,
+            None if resume else model_config(name, **chosen),
+            machine,
+            labels=labels,
+            conditional=conditional,
+            start=start,
+            precision=precision,
+            chosen=chosen,
+            progress=show,
+        )
+    print_line(f"{weights}: trained on {files.where}")
+    print_line(f"now: pix2shape predict --weights {shlex.quote(str(weights))} --data ...")
 
 
 def training_data(paths: tuple[str, ...], stream: str | None, allow_test_set: bool) -> Any:
@@ -255,7 +221,7 @@ def shown_training(
     def show(done: int, total: int, losses: Mapping[str, float]) -> None:
         nonlocal bar
         text = ", ".join(f"{name} {value:.3g}" for name, value in losses.items())
-        if bar is None:  # the first iteration, of a resumed run too; only the first process shows
+        if bar is None:  # the first iteration, of a resumed run too
             bar = progress_bar(total, "it")
             bar.initial = bar.n = max(0, done - 1)
         bar.total = total
@@ -267,14 +233,9 @@ def shown_training(
     try:
         yield show
     except KeyboardInterrupt:
-        from baselines.training.machine import is_first_here
-
-        if is_first_here():
-            click.echo()
-            where = f" after {bar.n} of {bar.total} iterations of its schedule" if bar else ""
-            print_line(
-                f"stopped{where}; --resume continues from the last checkpoint in {out}, if any"
-            )
+        click.echo()
+        where = f" after {bar.n} of {bar.total} iterations of its schedule" if bar else ""
+        print_line(f"stopped{where}; --resume continues from the last checkpoint in {out}, if any")
         raise
     finally:
         if bar is not None:

@@ -48,7 +48,7 @@ def drawn(model: Pix2Shape, code: Tensor, views: Views) -> tuple[Tiles, Tiles, T
     image = shaded(surfels, model.lit(code, views))
     if not (depth.isfinite().all() and image.isfinite().all()):
         hint = "these weights are for other rooms"
-        raise SceneGenError("picture", "depth or radiance that is not finite", hint=hint)
+        raise SceneGenError("picture", "depth or radiance is not finite", hint=hint)
     normals = normals_from_depth(depth, views.scene.fov_y_degrees)
     if opacity is not None:
         depth = torch.where(opacity > 0.5, depth, torch.nan)

@@ -2,8 +2,7 @@
 
     baseline.py     a baseline as data, its training and submissions; start reading here
     checkpoint.py   settings, the card of weights, files of both, and the folder of a run
-    processes.py    a batch that several processes share
-    machine.py      where and how long a run trains, and how Lightning Fabric starts its processes
+    machine.py      where and how long a run trains
     fit.py          the training loop
     data.py         files to learn from, which are no named test sets
     streams.py      rooms and questions to learn from that are rendered meanwhile

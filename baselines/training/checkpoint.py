@@ -255,7 +255,7 @@ def load_tensors(path: str | Path) -> tuple[dict[str, Tensor], dict[str, str]]:
         with safe_open(path, "pt") as file:
             return {name: file.get_tensor(name) for name in file.keys()}, file.metadata() or {}  # noqa: SIM118
     except SafetensorError as error:
-        raise FileFormatError(path, f"no safetensors file, or a damaged one ({error})") from error
+        raise FileFormatError(path, f"not a safetensors file, or damaged ({error})") from error
 
 
 def check_tensors(
@@ -282,7 +282,7 @@ def check_tensors(
         cast = value.to(like.dtype)
         not_negative = name.endswith(("running_var", "exp_avg_sq", "step"))
         if not torch.isfinite(cast).all() or (not_negative and (cast < 0).any()):
-            raise FileFormatError(place, "NaN, infinity, or below 0 where that cannot be")
+            raise FileFormatError(place, "it holds NaN, infinity or invalid negative numbers")
 
 
 def _stored_tensors(

@@ -1,8 +1,7 @@
 """The training loop of every baseline.
 
 Everything random in an iteration derives from the seed and the iteration's number, so that training
-goes on after a kill as if it had never stopped. Where several processes train, each computes the
-losses of its share of every batch, and all learn what one process would, up to rounding.
+goes on after a kill as if it had never stopped.
 
 A GPU works on while the next steps are prepared. Asking for a number would wait for it, so losses
 are fetched once in a while, and looked at then.
@@ -30,7 +29,7 @@ from baselines.training.checkpoint import (
     save_weights,
 )
 from baselines.training.machine import Machine
-from baselines.training.processes import TrainingError, average, is_first, processes
+from scenegen.common.errors import SceneGenError
 from scenegen.common.records import check
 
 Progress = Callable[[int, int, Mapping[str, float]], Any]  # iterations done, in all, losses
@@ -38,6 +37,10 @@ DIVERGED = "begin again with a smaller learning rate or other weights of the los
 FETCHED = 20  # iterations after which losses come from a GPU
 PLANS = 50  # how often a run with a limit of time plans the rest of its schedule
 UNPLANNED = 10**7  # iterations of its schedule before it knows its pace
+
+
+class TrainingError(SceneGenError):
+    """Training cannot go on: a loss is not finite, memory is short, or a reader was killed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +70,7 @@ def fit(
     With a limit of time, the iterations of the state's settings become as many as fit into it.
 
     Args:
-        folder: gets checkpoint and weights, from the first of several processes.
+        folder: gets checkpoint and weights.
         losses: yields the losses of an iteration, by its number. After each a step is taken, so
             that what is computed next sees the new weights.
         rate: the learning rate of a card's settings in an iteration.
@@ -75,12 +78,11 @@ def fit(
         clip: largest norm of the gradients of a step; None for any.
         rows: of a stream that each iteration shows.
         prepare: called before a checkpoint is written.
-        progress: called after each iteration, by the first process alone.
+        progress: called after each iteration.
 
     Raises:
         TrainingError: a loss, a gradient or a weight is not finite, or the GPU has too little
             memory. The files are those of the last checkpoint.
-        LostProcessError: another process that trains with this one ended.
         SpecError: a limit of time is over, or cannot be kept.
         OSError.
     """
@@ -96,18 +98,22 @@ def fit(
         save_checkpoint(folder, state)
         save_weights(folder / WEIGHTS, method, state.network, state.card)
 
-    if state.card.iteration == state.card.settings.iterations and is_first():
+    if state.card.iteration == state.card.settings.iterations:
         save()  # the run may have ended between its last checkpoint and its weights
     state.network.train()
-    reported = _Reported(fetch_interval(next(state.network.parameters()).device))
+    interval = fetch_interval(next(state.network.parameters()).device)
+    waiting, reported = list[Tensor](), dict[str, float]()
     while state.card.iteration < state.card.settings.iterations:
         number = state.card.iteration
-        for optimiser in state.optimisers.values():
-            for group in optimiser.param_groups:
+        for each in state.optimisers.values():
+            for group in each.param_groups:
                 group["lr"] = rate(state.card.settings, number)
+        numbers: dict[str, Tensor] = {}
         try:
             for loss in losses(number):
-                _step(state.optimisers[loss.optimiser], loss, clip, reported, number)
+                optimiser = state.optimisers[loss.optimiser]
+                waiting += _step(optimiser, loss, clip, number if interval == 1 else None)
+                numbers |= {name: value.detach() for name, value in loss.numbers.items()}
         except torch.OutOfMemoryError as error:
             message = f"no memory left on the GPU for a batch of {state.card.settings.batch}"
             raise TrainingError("training", message, hint="--set batch=N needs less") from error
@@ -117,12 +123,11 @@ def fit(
             state.card = plan.planned(state.card)
         last = state.card.settings.iterations
         saves = done % machine.every == 0 or done == last
-        if saves or done % reported.every == 0:
-            reported.fetch()
-        if saves and is_first():
+        if saves or done % interval == 0:
+            reported, waiting = _fetched(waiting, numbers, number), []
+        if saves:
             save()
-        if is_first():
-            progress(done, last, reported.numbers)
+        progress(done, last, reported)
 
 
 def fetch_interval(device: torch.device) -> int:
@@ -134,14 +139,9 @@ class _Plan:
     """How many iterations fit into a limit of time, by the pace of the last ones."""
 
     def __init__(self, machine: Machine, card: Card) -> None:
-        """Begin.
-
-        Raises SpecError where the time is over already, or where several processes train, whose
-        clocks differ.
-        """
+        """Begin. Raises SpecError where the time is over already."""
         limit, left = f"{machine.minutes:g}", machine.seconds_left()
         check(left > 0, "minutes", limit, "more: they passed while the data were read")
-        check(processes() == 1, "minutes", limit, "no limit where several processes train")
         self._machine, self._done, self._left = machine, card.iteration, left
         begun = 0 < card.iteration < card.settings.iterations
         self._iterations = card.settings.iterations if begun else UNPLANNED
@@ -159,40 +159,17 @@ class _Plan:
         return replace(card, settings=replace(card.settings, iterations=self._iterations))
 
 
-class _Reported:
-    """The losses of the last iteration that was fetched from the device.
-
-    Attributes:
-        every: iterations after which they are fetched; 1 fetches the numbers of every step at once.
-        numbers: losses by name.
-    """
-
-    def __init__(self, every: int) -> None:
-        self.every, self.numbers = every, dict[str, float]()
-        self._number, self._waiting = -1, list[tuple[int, list[str], Tensor]]()
-
-    def add(self, number: int, names: list[str], values: Tensor) -> None:
-        """Take numbers of an iteration, (1 + N,); the first has no name and has to be finite.
-
-        Raises TrainingError where it is not, now or when the numbers are fetched.
-        """
-        self._waiting.append((number, names, values))
-        if self.every == 1:
-            self.fetch()
-
-    def fetch(self) -> None:
-        """Wait for the numbers. Raises as `add`."""
-        waiting, self._waiting = self._waiting, []
-        fetched = iter(torch.cat([v for *_, v in waiting]).tolist() if waiting else [])
-        for number, names, _ in waiting:
-            if number != self._number:
-                self._number, self.numbers = number, {}
-            first = next(fetched)
-            self.numbers |= {name: next(fetched) for name in names}
-            if not math.isfinite(first):
-                shown = ", ".join(f"{name} {value:.3g}" for name, value in self.numbers.items())
-                problem = f"a loss or gradient that is not finite ({shown})"
-                raise TrainingError(f"iteration {number}", problem, hint=DIVERGED)
+def _fetched(
+    checked: list[Tensor], numbers: Mapping[str, Tensor], iteration: int
+) -> dict[str, float]:
+    """Return numbers from their device. Raises TrainingError where a checked one is not finite."""
+    values = torch.stack([v.detach() for v in (*checked, *numbers.values())]).tolist()
+    shown = dict(zip(numbers, values[len(checked) :], strict=True))
+    if not all(map(math.isfinite, values[: len(checked)])):
+        text = ", ".join(f"{name} {value:.3g}" for name, value in shown.items())
+        problem = f"a loss or gradient that is not finite ({text})"
+        raise TrainingError(f"iteration {iteration}", problem, hint=DIVERGED)
+    return shown
 
 
 def falling_late(settings: Any, iteration: int) -> float:
@@ -201,23 +178,24 @@ def falling_late(settings: Any, iteration: int) -> float:
     return float(settings.learning_rate * min(1.0, 2 * left))
 
 
-def _step(
-    optimiser: Adam, loss: Loss, clip: float | None, reported: _Reported, number: int
-) -> None:
-    """Take one step. Raises as `_Reported.add` where the loss or a gradient is not finite."""
+def _step(optimiser: Adam, loss: Loss, clip: float | None, number: int | None) -> list[Tensor]:
+    """Take one step; return the loss and the norm of its gradients, which have to be finite.
+
+    Given the number of the iteration, they are checked at once. Raises as `_fetched`.
+    """
     optimiser.zero_grad()
-    values = torch.stack([loss.total.detach(), *(n.detach() for n in loss.numbers.values())])
-    average([values])
-    reported.add(number, [*loss.numbers], values)  # before torch's slopes, which may crash on a CPU
+    if number is not None:  # before torch's slopes, which may crash on a CPU
+        _fetched([loss.total], loss.numbers, number)
     torch.autograd.backward(loss.total)
     parameters = optimiser.param_groups[0]["params"]
     gradients = [parameter.grad for parameter in parameters if parameter.grad is not None]
-    average(gradients)  # DDP allows neither several backward passes nor second gradients
     norm = torch.nn.utils.get_total_norm(gradients)
-    reported.add(number, [], norm[None])
+    if number is not None:
+        _fetched([norm], loss.numbers, number)
     if clip is not None:
         torch.nn.utils.clip_grads_with_norm_(parameters, clip, norm)
     optimiser.step()
+    return [loss.total.detach(), norm]
 
 
 def _require_finite(state: State[Any, Any]) -> None:

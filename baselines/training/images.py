@@ -69,12 +69,9 @@ class Draws(Sampler[list[int]]):
     The rows of a batch depend on its number alone, so that training can go on where it stopped.
     """
 
-    def __init__(
-        self, rows: int, batch: int, seed: int, first: int = 0, share: slice = slice(None)
-    ) -> None:
-        """Begin with batch `first`; this process takes a `share` of the rows of every batch."""
-        self._rows, self._batch, self._seed = rows, batch, seed
-        self._first, self._share = first, share
+    def __init__(self, rows: int, batch: int, seed: int, first: int = 0) -> None:
+        """Begin with batch `first`."""
+        self._rows, self._batch, self._seed, self._first = rows, batch, seed, first
 
     def __iter__(self) -> Iterator[list[int]]:
         epoch, order = -1, np.empty(0, int)
@@ -85,7 +82,7 @@ class Draws(Sampler[list[int]]):
                     epoch = place // self._rows
                     order = item_rng(self._seed, epoch, Purpose.ORDER).permutation(self._rows)
                 rows.append(int(order[place % self._rows]))
-            yield rows[self._share]
+            yield rows
 
 
 def mapped(record: T, function: Callable[[Tensor], Tensor]) -> T:

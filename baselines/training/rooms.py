@@ -97,7 +97,11 @@ def _read_file(rooms: RoomsFile, size: int, depth: bool) -> Rooms:
             inside[row] = inside_objects(_alone(rooms.read("object_id", row), size))
             depths[row] = reduced(rooms.read("depth", row), size)
             if not np.isfinite(depths[row]).any():
-                raise FileFormatError(f"{rooms.path}: depth, row {row}", "no surface", "some")
+                raise FileFormatError(
+                    f"{rooms.path}: depth, row {row}",
+                    "no surface",
+                    "at least one pixel with a surface",
+                )
     scene, angle = (rooms.read(n, slice(None)) for n in ("scene_index", "view_angle_degrees"))
     return Rooms(
         torch.from_numpy(images),

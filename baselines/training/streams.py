@@ -96,15 +96,14 @@ class Shown:
         data = "\n".join(spec.to_json() for spec in self.specs)
         return {"data": data, "fingerprint": hashlib.sha256(f"stream\n{data}".encode()).hexdigest()}
 
-    def blocks(self, before: int, rows: int, workers: int, **share: int) -> Iterator["Block"]:
+    def blocks(self, before: int, rows: int, workers: int) -> Iterator["Block"]:
         """Yield blocks of so many rows without end, rendered by `workers`.
 
         Args:
-            before: rows that were shown before, by all processes that train.
-            share: `rank` and `world_size`, where they are not those of torch.
+            before: rows that were shown before.
         """
         requests = dict.fromkeys(self.specs, 1.0)
-        how: dict[str, Any] = {"batch": rows, "workers": workers, **share}
+        how: dict[str, Any] = {"batch": rows, "workers": workers}
         if isinstance(self.specs[0], SplitSpec):
             fields = QUESTION_FIELDS + ["depth"] * self.specs[0].with_depth
             how |= {"fields": fields, "start": MAX_QUESTIONS + before}

@@ -39,18 +39,13 @@ WAYS = ("merged", "instances")
 DEPTH = 3  # channel of the distance, behind the colour
 NEAR = 0.01  # Mitsuba counts distances from its near plane; this is its default
 DIRECT = {"type": "direct", "emitter_samples": 1, "bsdf_samples": 0}
-COARSE_FROM = 1000  # triangles; shapes with fewer stay as they are
-COARSE_GRID = 6  # cells in a unit, to whose corners coarse meshes are rounded
 
 
-def rooms(
-    path: str, count: int, repeats: int, variant: str, coarse: bool, **roots: str
-) -> dict[str, Any]:
+def rooms(path: str, count: int, repeats: int, variant: str, **roots: str) -> dict[str, Any]:
     """Time load, render and conversion to numpy of the first scenes of a file.
 
-    Coarse meshes have about a thousand triangles, which a user may accept who has to build them
-    anew for every scene. `roots` are those of `file_objects`. Raises AssertionError where the
-    depths are not those of the file.
+    `roots` are those of `file_objects`. Raises AssertionError where the depths are not those of the
+    file.
     """
     _choose(variant)
     with RoomsFile(path) as file:
@@ -58,7 +53,7 @@ def rooms(
         depth = np.asarray(file.read("depth", 0))
     names = {item.shape for scene in scenes for item in scene.objects}
     objects = file_objects(spec, **roots)
-    meshes = {name: _mesh(objects.shape(name), coarse) for name in names}
+    meshes = {name: _mesh(objects.shape(name)) for name in names}
     integrator = {"type": "aov", "aovs": "distance:depth,normal:sh_normal", "colour": DIRECT}
     records = {}
     for way in WAYS:  # instances last: Mitsuba slows down with the number of shapes that are alive
@@ -172,19 +167,11 @@ def _sensor(spec: DatasetSpec | SplitSpec, camera: Camera) -> dict[str, Any]:
     return {"type": "perspective", **lens, "film": film, "sampler": sampler}
 
 
-def _mesh(shape: UnitShape, coarse: bool) -> Mesh:
+def _mesh(shape: UnitShape) -> Mesh:
     """Return a unit shape with corners that triangles share."""
     points, normals = shape.triangles.reshape(-1, 3), shape.normals.reshape(-1, 3)
-    coarse = coarse and len(shape.triangles) >= COARSE_FROM
-    if coarse:
-        points = np.round(points * COARSE_GRID) / COARSE_GRID
-    corners = points if coarse else np.concatenate([points, normals], axis=1)
-    first, number = unique_rows(corners, digits=6)
-    faces = number.reshape(-1, 3)
-    if coarse:
-        faces = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
-        faces = faces[np.unique(np.sort(faces, axis=1), axis=0, return_index=True)[1]]
-    return points[first], normals[first], faces
+    first, number = unique_rows(np.concatenate([points, normals], axis=1), digits=6)
+    return points[first], normals[first], number.reshape(-1, 3)
 
 
 def _moved(mesh: Mesh, world_from_object: Array) -> Mesh:

@@ -1,11 +1,10 @@
-"""How fast rooms are rendered, beside plain Mitsuba and the bare ray cast: Markdown tables.
+"""How fast rooms are rendered, beside plain Mitsuba: Markdown tables.
 
     python -m benchmarks.rendering.render [--quick]
 
 The first is of basic shapes, the second of the built-in objects, the third of a folder of meshes
 of 20,480 faces, all at 128x128 pixels with depth and normals. (a) is plain Mitsuba, see
-`plain_mitsuba`; (c) casts the same rays and evaluates nothing but the ray parameter and an id, so
-it is an upper bound. MiB is the peak memory of the process and its workers.
+`plain_mitsuba`. MiB is the peak memory of the process and its workers.
 """
 
 import argparse
@@ -17,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.timing import Row, fastest, measured, print_ratio, print_table, processors_busy
+from benchmarks.timing import Row, fastest, print_ratio, print_table, processors_busy
 
 VARIANTS = ("llvm_ad_rgb", "scalar_rgb")
 
@@ -70,60 +69,6 @@ def end_to_end(
     return {**record, "workers": used, "note": f"{used} workers"}
 
 
-def bare_cast(rooms: str, count: int, repeats: int, size: int) -> dict[str, Any]:
-    """Time the nearest hits of the primary rays alone, in batches of a size.
-
-    Every object is cast at its unit shape, in the structures of `scenegen.rendering`.
-    """
-    import drjit as dr
-    import mitsuba as mi
-    import numpy as np
-
-    from scenegen.camera import pixel_size
-    from scenegen.rendering.backend import select_variant
-    from scenegen.rendering.drjit_renderer import upload_scenes
-    from scenegen.rendering.packing import SceneBatch, pack
-    from scenegen.rendering.rays import closest_hit
-    from scenegen.rendering.tables import upload
-    from scenegen.rooms.reader import RoomsFile
-
-    variant = select_variant("cpu")
-    mi.set_variant(variant)
-    with RoomsFile(rooms) as file:
-        spec, scenes = file.spec, [file.scene(row) for row in range(count)]
-    batches = [pack(spec, scenes[i : i + size]) for i in range(0, count, size)]
-
-    def cameras(batch: SceneBatch) -> Any:
-        """Return 13 floats an image, padded to 16: 3x4 world_from_camera and the pixel size."""
-        table = np.zeros((len(batch), 16), np.float32)
-        table[:, :12] = batch.world_from_camera[:, :3].reshape(-1, 12)
-        table[:, 12] = [pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()]
-        return upload(table)
-
-    def cast(batch: SceneBatch, uploaded: Any, table: Any) -> None:
-        pixels = spec.height * spec.width
-        index = dr.arange(mi.UInt32, len(batch) * pixels)
-        item = index // pixels
-        pixel = index - item * pixels
-        row = pixel // spec.width
-        column = pixel - row * spec.width
-        camera = [dr.gather(mi.Float, table, item * 16 + i) for i in range(13)]
-        right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
-        x = (mi.Float(column) + 0.5 - spec.width / 2) * camera[12]
-        y = (spec.height / 2 - 0.5 - mi.Float(row)) * camera[12]
-        t, object_id, _, _ = closest_hit(uploaded, item, origin, right * x + up * y - back)
-        dr.eval(t, object_id)
-
-    ready = [(batch, upload_scenes(batch, variant, ())[0], cameras(batch)) for batch in batches]
-
-    def cast_all() -> None:
-        for arguments in ready:
-            cast(*arguments)
-        dr.sync_thread()
-
-    return {**measured(cast_all, repeats), "images": count, "note": f"batches of {size}"}
-
-
 def mesh_folder(root: Path, count: int) -> None:
     """Write meshes of 20,480 faces: balls with dents, of different lengths."""
     import numpy as np
@@ -142,16 +87,12 @@ def basic_shapes(folder: str, quick: bool) -> Iterator[Row]:
     """Yield the rows of basic shapes; the first makes the file whose scenes all others take."""
     rooms = f"{folder}/rooms.h5"
     first, second, largest = (500, 1000, 2000) if quick else (1000, 5000, 20000)
-    scenes, few, repeats = (256, 8, 2) if quick else (1000, 40, 3)
+    few, repeats = (8, 2) if quick else (40, 3)
     whole = {"rooms": rooms, "repeats": repeats}
     yield f"(b) end to end, N = {first:,}", "rendering.render:end_to_end", {**whole, "count": first}
-    shared = {"rooms": rooms, "count": scenes, "repeats": repeats}
-    yield "(c) bare cast", "rendering.render:bare_cast", {**shared, "size": 256}
     plain = {"path": rooms, "count": few, "repeats": repeats}
-    for coarse, meshes in ((False, "the same"), (True, "coarse")):
-        for variant in VARIANTS:
-            how = {**plain, "variant": variant, "coarse": coarse}
-            yield f"(a) {meshes} meshes, {variant}", "rendering.plain_mitsuba:rooms", how
+    for variant in VARIANTS:
+        yield f"(a) {variant}", "rendering.plain_mitsuba:rooms", {**plain, "variant": variant}
     name, how = f"(b) end to end, N = {second:,}", {**whole, "count": second}
     yield f"{name}, --workers 1", "rendering.render:end_to_end", {**how, "workers": 1}
     yield name, "rendering.render:end_to_end", how
@@ -173,7 +114,7 @@ def built_in_objects(folder: str, quick: bool) -> Iterator[Row]:
     yield f"{name}, warm cache", "rendering.render:end_to_end", how
     how = {**whole, "count": largest, "repeats": 1}
     yield f"(b) end to end, N = {largest:,}, warm cache", "rendering.render:end_to_end", how
-    plain = {"path": rooms, "count": 8 if quick else 60, "repeats": repeats, "coarse": False}
+    plain = {"path": rooms, "count": 8 if quick else 60, "repeats": repeats}
     for variant in VARIANTS:
         yield f"(a) {variant}", "rendering.plain_mitsuba:rooms", {**plain, "variant": variant}
 
@@ -185,7 +126,7 @@ def folder_of_meshes(folder: str, quick: bool) -> Iterator[Row]:
     mesh_folder(Path(root), models)
     whole = {"rooms": rooms, "count": count, "repeats": repeats, "root": root}
     yield f"(b) end to end, N = {count:,}", "rendering.render:end_to_end", whole
-    plain = {"path": rooms, "count": 8 if quick else 20, "repeats": repeats, "coarse": False}
+    plain = {"path": rooms, "count": 8 if quick else 20, "repeats": repeats}
     for variant in VARIANTS:
         how = {**plain, "variant": variant, "objects_root": root}
         yield f"(a) {variant}", "rendering.plain_mitsuba:rooms", how
@@ -198,10 +139,8 @@ def main() -> None:
     quick = parser.parse_args().quick
     with tempfile.TemporaryDirectory(prefix="bench-") as folder:
         shapes = print_table("basic shapes", basic_shapes(folder, quick), folder)
-        whole, cast = fastest(shapes, "(b) end to end"), fastest(shapes, "(c)")
-        print_ratio("end to end / (a), the same meshes", whole, fastest(shapes, "(a) the same"), 6)
-        print_ratio("end to end / (a), coarse meshes", whole, fastest(shapes, "(a) coarse"), 6)
-        print_ratio("end to end / (c)", whole, cast, 0.3)
+        whole = fastest(shapes, "(b) end to end")
+        print_ratio("end to end / (a)", whole, fastest(shapes, "(a)"), 6)
         print()
         objects = print_table("built-in objects", built_in_objects(folder, quick), folder)
         plain = fastest(objects, "(a)")

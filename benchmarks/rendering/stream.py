@@ -1,4 +1,4 @@
-"""Streams beside files of the same rows, once both are running: a Markdown table, and what follows.
+"""Streams beside files of the same rows, once both are running: a Markdown table and ratios.
 
     python -m benchmarks.rendering.stream [--quick]
 
@@ -7,19 +7,12 @@ To leave the start out, each row is the difference between a run of 3 N rows and
 """
 
 import argparse
-import os
-import subprocess
-import sys
 import tempfile
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from benchmarks.timing import Row, Speed, print_ratio, print_table, processors_busy
-
-STEP, ROWS = 0.04, 64  # seconds of a step of training that waits, and its images
-FIRST = "import scenegen; next(iter(scenegen.RoomStream('shapes', batch=64)))"
 
 
 def running(what: str, preset: str, count: int, workers: int, folder: str) -> dict[str, Any]:
@@ -70,42 +63,8 @@ def rows(folder: str, quick: bool) -> Iterator[Row]:
         )
 
 
-def waiting(steps: int) -> float:
-    """Return which share of its time a loop waits whose step takes STEP seconds for ROWS images."""
-    from scenegen import RoomStream
-
-    waited, batches = 0.0, iter(RoomStream("shapes", batch=ROWS, workers=2))
-    next(batches)
-    start = time.perf_counter()
-    for _ in range(steps):
-        asked = time.perf_counter()
-        next(batches)
-        waited += time.perf_counter() - asked
-        time.sleep(STEP)
-    return waited / (time.perf_counter() - start)
-
-
-def growth(count: int) -> float:
-    """Return by how many MiB the memory of a loop and its processes grows, of its last 9 tenths."""
-    from scenegen import RoomStream
-
-    def resident() -> int:
-        children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-        pages = (Path(f"/proc/{pid}/statm").read_text().split()[1] for pid in ("self", *children))
-        return sum(map(int, pages)) * os.sysconf("SC_PAGE_SIZE")
-
-    done, begun = 0, 0
-    for batch in RoomStream("shapes", batch=64, workers=2, stop=count):
-        done += len(batch["depth"])
-        if done >= count // 10 and not begun:
-            begun = resident()
-        if done + 64 >= count:
-            return (resident() - begun) / 2**20
-    return float("nan")
-
-
 def main() -> None:
-    """Print the table, and what is measured beside it."""
+    """Print the table, and ratios beside their goals."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="measure fewer rows")
     quick = parser.parse_args().quick
@@ -118,15 +77,6 @@ def main() -> None:
     for what, goal in goals.items():
         stream, file = (named[what.format(kind)] for kind in ("stream", "file"))
         print_ratio(what.format("stream / file"), stream, file, goal)
-    for _ in range(2):
-        start, used = time.perf_counter(), os.times().children_user
-        subprocess.run([sys.executable, "-c", FIRST], check=True)
-        seconds, processor = time.perf_counter() - start, os.times().children_user - used
-    cost = f"{seconds:.1f} s, {processor:.1f} s of processor"
-    print(f"- first batch of a second start: {cost}; goal 1.3 s")
-    print(f"- waiting, with a step of 40 ms for 64 images: {waiting(500):.1%}; goal below 10%")
-    count = 10_000 if quick else 50_000
-    print(f"- memory grows over {count:,} rooms by {growth(count):.0f} MiB; goal below 50 MB")
 
 
 if __name__ == "__main__":

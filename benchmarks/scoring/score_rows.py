@@ -1,7 +1,6 @@
 """Milliseconds that `bench score` takes for one row, in test sets of more and more rows.
 
     python -m benchmarks.scoring.score_rows [--rows 1000 10000 50000]
-    python -m benchmarks.scoring.score_rows --interiors 64 512
 
 The cost of a row should not depend on how many other rows the test set has. Images are as small as
 the format allows, so that the work around the measures shows beside the measures themselves. The
@@ -10,28 +9,20 @@ predictions are the truth with noise.
 One process scores 1,000 rows of each test set, spread evenly. Opening the files is so divided among
 fewer rows than in real use: for large test sets the figures are rather too high. Processor time
 leaves out what other programs take of a busy machine.
-
-With --interiors, rows of closed rooms of these sizes are scored twice, as a first and a second
-submission: what depends on the truth alone is kept from the first. The predictions are the truth
-with smooth errors of 3%.
 """
 
 import argparse
-import os
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.scoring.rows import score_rows
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import open_predictions
-from scenegen.description.presets import preset_spec
 from scenegen.description.specs import DatasetSpec
-from scenegen.objects.sources import object_source
 from scenegen.rooms.make import make_dataset
 from scenegen.rooms.reader import RoomsFile
 
@@ -48,46 +39,11 @@ def write_predictions(path: Path, truth: Path) -> None:
             out.add(row, depth * rng.uniform(0.99, 1.01, depth.shape), rooms.read("normal", row))
 
 
-def score_twice(size: int, folder: Path) -> None:
-    """Print the processor time of a row of interiors, for a first and a second submission."""
-    truth, predictions, count = (
-        folder / "rooms.h5",
-        folder / "predictions.h5",
-        32_768 // size**2 + 6,
-    )
-    os.environ["XDG_CACHE_HOME"] = str(folder)
-    source = object_source("interiors")
-    settings = {"height": size, "width": size, "seed": 3, "spp": 1, "denoise": False}
-    spec = preset_spec("interiors", **settings, **source.settings)
-    make_dataset(truth, spec, count, command="benchmark", objects=source.objects)
-    rng = np.random.default_rng(0)
-    with RoomsFile(truth) as rooms, RoomPredictionWriter(predictions, truth, method="x") as out:
-        for row in range(count):
-            depth = rooms.read("depth", row)
-            smooth = gaussian_filter(rng.standard_normal(depth.shape), size / 80)
-            error = np.exp(0.03 * smooth / smooth.std())
-            out.add(row, np.where(np.isfinite(depth), depth * error, 1.0).astype(np.float32))
-    spent = []
-    for _ in range(2):
-        with open_predictions(predictions) as file, RoomsFile(truth) as rooms:
-            start = time.process_time()
-            score_rows([file], rooms, np.arange(count), Settings(processes=1))
-            spent.append(1e3 * (time.process_time() - start) / count)
-    first, second = spent
-    print(f"{size:5d} pixels: first {first:7.1f} ms, second {second:7.1f} ms, {second / first:.2f}")
-
-
 def main() -> None:
     """Print a line for each number of rows."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--rows", type=int, nargs="+", default=[1_000, 10_000, 50_000])
-    parser.add_argument("--interiors", type=int, nargs="+", default=[])
     options = parser.parse_args()
-    for size in options.interiors:
-        with tempfile.TemporaryDirectory() as folder:
-            score_twice(size, Path(folder))
-    if options.interiors:
-        return
     print(f"{'rows':>8}  {'ms a row':>8}  {'of processor time':>17}")
     for count in options.rows:
         with tempfile.TemporaryDirectory() as folder:

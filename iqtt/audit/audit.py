@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from iqtt.audit.features.frames import stored_frames
 from iqtt.audit.features.statistics import SHAPE_STATISTICS, shape_statistics
+from iqtt.audit.probes.masks import costs_of_masks
 from iqtt.audit.probes.rules import Evidence, Probe, run_probes
 from iqtt.audit.proofs import explanations, images, kinds, rooms, splits, views
 from iqtt.audit.proofs import shapes as shape_proofs
@@ -210,13 +211,15 @@ def _evidence(
         [its_shapes.class_name for its_shapes in shapes],
         [its_shapes.whole for its_shapes in shapes],
     )
-    parts, angles = [], []
+    parts, angles, masks = [], [], []
     for table, its_shapes, place, described in zip(tables, shapes, right, numbers, strict=True):
         answered = place[table.measured] >= 0
         rows = table.measured[answered]
         mirrored = _mirror_images(its_shapes, place, rows)
         stored = _frames(table, its_shapes, rows)
         angles.append(table.truth.get("angle_degrees", np.zeros(len(table)))[rows])
+        if isinstance(table.spec, PerspectiveSpec):
+            masks.append(costs_of_masks(table, rows))
         parts.append((table.statistics[answered], place[rows], mirrored, described[rows], stored))
     statistics, places, mirrored, cubes, frames = map(np.concatenate, zip(*parts, strict=True))
     return Evidence(
@@ -226,7 +229,7 @@ def _evidence(
         cubes={name: cubes[:, :, i] for i, name in enumerate(SHAPE_STATISTICS)},
         frames=frames,
         places=[place[place >= 0] for place in right],
-        of_rooms=isinstance(tables[0].spec, PerspectiveSpec),
+        masks=np.concatenate(masks) if masks else None,
         angles=np.concatenate(angles),
     )
 

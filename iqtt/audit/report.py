@@ -3,7 +3,16 @@
 from collections.abc import Iterator, Sequence
 
 from iqtt.audit.audit import Audit
-from iqtt.audit.probes.rules import ERROR_RATE, FRAMES, LIGHT, MIRRORED, OUTLINE, WITHOUT, Probe
+from iqtt.audit.probes.rules import (
+    ERROR_RATE,
+    FRAMES,
+    LIGHT,
+    MIRRORED,
+    OUTLINE,
+    SPANS,
+    WITHOUT,
+    Probe,
+)
 from scenegen.common.text_table import aligned, piped, printable
 
 _BLOCKS = (
@@ -22,6 +31,7 @@ _BLOCKS = (
     ),
     (FRAMES, "stored rotations and cube orders", ("nearest", "farthest", "learned")),
     (OUTLINE, "option and reference, by silhouette", ("nearest", "farthest", "learned")),
+    (OUTLINE, "option and reference, by angle in degrees", SPANS),
 )
 
 

@@ -54,9 +54,10 @@ option = partial(click.option, show_default=True)
     default="small",
     help="Numbers of questions. small: 1,000 for training (100 of them labelled), 200 for"
     " validation, 200 for testing; v2: as in the released data, in float32; paper: as in the paper;"
-    " suite: one folder per distractor type, each with 5,000 for training (1,000 labelled), 500 and"
-    " 2,000; perspective: furnished rooms, 100, 40 and 60; perspective-suite: one folder per"
-    " distractor type of rooms.",
+    " suite: one folder per distractor type, each with 5,000 for training (1,000 labelled), 500 for"
+    " validation and 2,000 for testing; perspective: questions about furnished rooms, 100 for"
+    " training, 40 for validation and 60 for testing; perspective-suite: one folder per distractor"
+    " type of such questions.",
 )
 @option("--train", type=int, help="Number of training questions, labelled and unlabelled.")
 @option(
@@ -86,9 +87,9 @@ option = partial(click.option, show_default=True)
     default="mixed",
     help="Distractor type: what the wrong options show. "
     + "".join(f"{name}: {kind.meaning}; " for name, kind in QUESTION_KINDS.items())
-    + "of rooms "
-    + "".join(f"{name}: {kind.meaning}; " for name, kind in ROOM_KINDS.items())
-    + "mixed: one of these types per question.",
+    + "mixed: one of these types per question. For --preset perspective: "
+    + "; ".join(f"{name}: {kind.meaning}" for name, kind in ROOM_KINDS.items())
+    + "; mixed.",
 )
 @option(
     "--options",
@@ -97,25 +98,31 @@ option = partial(click.option, show_default=True)
     former="--answers",
     type=int,
     default=3,
-    help="Number of options per question, 3 or 2. One option is correct. A mirror-pair of rooms has"
-    " 2.",
+    help="Number of options per question, 3 or 2. One option is correct. Questions about rooms have"
+    " 3.",
 )
 @click.option(
     "--angle",
     type=Range(float),
-    help="Degrees between the views of reference and options, of rooms [default: 20-120].",
+    help="With --preset perspective: degrees between the views of reference and options [default:"
+    " 20-120].",
 )
-@click.option("--objects", type=Range(int), help="Number of objects of a room [default: 12-40].")
+@click.option(
+    "--objects",
+    type=Range(int),
+    help="With --preset perspective: number of objects of a room [default: 12-40].",
+)
 @click.option(
     "--object-split",
     type=click.Choice(["all", "train", "val", "test"]),
-    help="Objects of which split furnish rooms [default: all].",
+    help="With --preset perspective: split of the objects in the rooms [default: all].",
 )
-@click.option("--spp", type=int, help="Colour samples per pixel of rooms.")
+@click.option("--spp", type=int, help="With --preset perspective: colour samples per pixel.")
 @click.option(
     "--denoise/--no-denoise",
     default=None,
-    help="Whether images of rooms are denoised [default: if the extra `denoise` is there].",
+    help="With --preset perspective: denoise the images [default: if the extra `denoise` is"
+    " installed].",
 )
 @option(
     "--min-angle",
@@ -129,9 +136,9 @@ option = partial(click.option, show_default=True)
     "--min-sight-angle",
     "min_sight_angle_degrees",
     type=float,
-    help="Minimum angle, in degrees, between the viewing directions of these views. Close or"
-    " opposite"
-    " viewing directions give similar silhouettes [default: 40; 0 with v2 and paper].",
+    help="Minimum angle, in degrees, between the viewing directions of the reference and of each"
+    " option. Close or opposite directions give similar silhouettes [default: 40; 0 with v2 and"
+    " paper].",
 )
 @option(
     "--min-cube-pixels",
@@ -203,7 +210,7 @@ def make_split(
     known = {field.name for field in fields(kind)}
     _refuse_others(given & settings.keys(), known, preset, of_rooms)
     if secret_seed is not None and "seed" in given:
-        raise SpecError("--secret-seed", "--seed as well", "only one of the two")
+        raise SpecError("--secret-seed", "--seed is given as well", hint="pass only one of them")
     chosen = {x: v for x, v in settings.items() if x in known and v is not None}
     if of_rooms:  # other defaults than those of the options
         chosen = {name: value for name, value in chosen.items() if name in given}
@@ -265,10 +272,10 @@ def _refuse_others(given: set[str], known: set[str], preset: str, of_rooms: bool
     for name in sorted(given):
         flag = {"answers": "options"}.get(name, name.removesuffix("_degrees").replace("_", "-"))
         if name not in known:
-            which = "--preset perspective" if of_rooms else "a preset other than perspective"
-            raise SpecError(f"--{flag}", f"{which} as well", "only one of the two")
+            why = "has no effect with" if of_rooms else "is only for"
+            raise SpecError(f"--{flag}", f"this option {why} --preset perspective; leave it out")
         if preset.endswith("suite") and name in ("distractors", "answers"):
-            raise SpecError(f"--{flag}", f"--preset {preset} as well", "only one of the two")
+            raise SpecError(f"--{flag}", f"--preset {preset} decides this; leave it out")
 
 
 @click.command(epilog=f"{EXAMPLE}iqtt merge iqtt-split/iqtt-train.h5 --out iqtt-train.h5")

@@ -62,7 +62,7 @@ def show(
     beside, first = answers_beside(file) if answers else None, open_tables(file)[0]
     with first, QuestionsFile(first.opened, part or first.part, beside) as questions:
         if answers and not (questions.has_answers or questions.has_truth):
-            raise SpecError(file, "no answer key, and no file with one next to it", "an answer key")
+            raise SpecError(file, "this file has no answer key, nor has its folder")
         rows = pick_rows(len(questions), items, default=SHOWN)
         task = questions.attributes.get("task", "")
         sheet = question_sheet([questions[row] for row in rows], answers, task)
@@ -114,8 +114,8 @@ def audit(
 ) -> None:
     """Check that questions are correct, and search them for shortcuts.
 
-    SPLIT is a question file, a folder of question files (the released ones included), or a folder
-    of such folders, which are audited one by one.
+    SPLIT is a question file, a folder of question files (also of the released 3D-IQTT files), or a
+    folder of such folders.
 
     Proofs recompute each property of the questions with code that is independent of the generator.
     Shortcut classifiers try to select the correct option without comparing shapes. The exit code is
@@ -198,25 +198,23 @@ def floors(
     """Measure the accuracy of 2D-only baselines for the settings of SPLIT.h5.
 
     The command makes new questions about shapes of the training split, which takes minutes, and
-    answers them with all shortcut classifiers of `iqtt audit` that use the images alone. The best
-    accuracy is the zero of the skill score in `bench score --baselines`. The baselines of the
+    answers them with all shortcut classifiers of `iqtt audit` that use the images alone. For
+    questions about rooms, these classifiers also get the true masks of objects. The best
+    accuracy becomes the baseline of `bench score --baselines`. The baselines of the
     presets are part of the package.
     """
     from iqtt.files.reader import open_tables
     from iqtt.floor_probes import floor_specs, measure_floors
     from iqtt.floors import to_json
-    from iqtt.questions.specs import SplitSpec
     from scenegen.common.errors import SpecError
     from scenegen.files.new_file import check_writable, write_text
 
     check_writable(Path(out), overwrite)
-    specs = []
+    specs: list[Any] = []
     for path in splits:
         with open_tables(path)[0] as table:
             if table.spec is None:
                 raise SpecError(path, "a file without settings", "one that iqtt make-split wrote")
-            if not isinstance(table.spec, SplitSpec):
-                raise SpecError(path, "questions about rooms", "questions about shapes")
             specs.append(table.spec)
     with progress_bar(2 * questions * len(floor_specs(specs, questions)), "question") as bar:
         found = measure_floors(
@@ -253,7 +251,7 @@ def verify(
 ) -> None:
     """Check all files of a split in FOLDER, and make some questions again from the seed.
 
-    Exits with 1 if a check fails. `iqtt audit` proves that the answer key is correct.
+    The exit code is 1 if a check fails. `iqtt audit` proves that the answer key is correct.
     """
     from iqtt.files.verify import verify_split
     from iqtt.questions.specs import secret_seed as read_seed

@@ -20,7 +20,7 @@ option = partial(click.option, show_default=True)
 @option("--questions", type=int, default=20, help="Number of scored questions. All participants"
                                                   " get the same.")
 @option("--practice", type=int, default=2,
-        help="Number of practice questions with feedback before them. The paper used 1.")
+        help="Number of practice questions, which come first and give feedback. The paper used 1.")
 @option("--seed", type=click.IntRange(0, LARGEST), default=0, help="Seed of the choice of"
                                                                    " questions.")
 @click.option("--contact", default="", help="Contact of the study, shown on the first page.")

@@ -409,12 +409,12 @@ def table_names(opened: OpenFile, content: str) -> tuple[str, ...]:
         images = path.name.replace("-answers", "")
         what = images if images != path.name else "the file of questions"
         hint = f"open {what} instead, with this file as the answer key"
-        raise NoImagesError(path, "an answer key without images", "questions", hint)
+        raise NoImagesError(path, "this is an answer key without images", hint=hint)
     if content == "answers" and "questions" in file:
         hint = "ask the creators of the questions for the answer key"
-        raise NoAnswersError(path, "questions without an answer key", "answers", hint)
+        raise NoAnswersError(path, "this file has no answer key, nor has its folder", hint=hint)
     expected = f"a dataset {content!r}, 'labeled/{content}' or 'unlabeled/{content}'"
-    raise FileFormatError(path, "no question file", expected)
+    raise FileFormatError(path, "a file without questions", expected)
 
 
 def _identity(file: QuestionsFile) -> str:

@@ -6,7 +6,6 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from iqtt.perspective.rooms import IN_PLAY
 from iqtt.perspective.specs import PerspectiveSpec
 from iqtt.questions.kinds import DISTRACTOR_KINDS
 from scenegen.description.scenes import SceneSpec
@@ -31,10 +30,8 @@ class RoomTruth:
 
     Attributes:
         scenes: of each image, with one camera.
-        in_play: numbers of the objects in which answers differ; of mirror images, three objects
-            that all images show.
-        visible_pixels, whole_pixels: pixels that show each of these, and would if nothing hid it,
-            (1 + K, n).
+        in_play: number of the object in which answers differ.
+        visible_pixels, whole_pixels: pixels that show it, and would if nothing hid it, (1 + K,).
         exposure: how images were developed, (1 + K, 5).
         picture_seed: of surfaces and of the noise of images.
         distractor_kind: kind of each answer, such as "moved"; None for the right one.
@@ -43,7 +40,7 @@ class RoomTruth:
     """
 
     scenes: tuple[SceneSpec, ...]
-    in_play: tuple[int, ...]
+    in_play: int
     visible_pixels: Array
     whole_pixels: Array
     exposure: Array
@@ -55,12 +52,11 @@ class RoomTruth:
 
 def room_truth(values: Mapping[str, Any]) -> RoomTruth:
     """Return the record of one row of `room_columns`. Raises SpecError for a wrong scene."""
-    count = int((values["in_play"] > 0).sum())
     return RoomTruth(
         scenes=tuple(SceneSpec.from_json(bytes(text).decode()) for text in values["scene"]),
-        in_play=tuple(values["in_play"][:count].tolist()),
-        visible_pixels=values["visible_pixels"][:, :count],
-        whole_pixels=values["whole_pixels"][:, :count],
+        in_play=int(values["in_play"]),
+        visible_pixels=values["visible_pixels"],
+        whole_pixels=values["whole_pixels"],
         exposure=values["exposure"],
         picture_seed=int(values["picture_seed"]),
         distractor_kind=tuple(
@@ -89,12 +85,10 @@ def room_columns(spec: PerspectiveSpec) -> list[Column]:
         Column("angle_degrees", (), "float64", "degree", "-",
                "difficulty: from the reference's line of sight to that of the answers, about the"
                " vertical axis", within=(0, 180)),
-        Column("in_play", (IN_PLAY,), "int8", "1", "by object id",
-               "objects in which answers differ; of mirror images, objects that all images show; 0"
-               " where unused", within=(0, 100)),
-        Column("visible_pixels", (images, IN_PLAY), "int32", "pixel", "-",
-               "pixels that show each of these objects"),
-        Column("whole_pixels", (images, IN_PLAY), "int32", "pixel", "-",
+        Column("in_play", (), "int8", "1", "-", "id of the object in which answers differ",
+               within=(1, 100)),
+        Column("visible_pixels", (images,), "int32", "pixel", "-", "pixels that show this object"),
+        Column("whole_pixels", (images,), "int32", "pixel", "-",
                "the same if nothing hid it, up to half an image beyond the border"),
         Column("exposure", (images, 5), "float64", "1", "-",
                "how images are developed: factor of radiance, factors of red, green and blue, and"

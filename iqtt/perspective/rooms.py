@@ -24,7 +24,7 @@ from scenegen.description.specs import InteriorSpec
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.rendering.amodal import whole_pixels
 from scenegen.rendering.ground_truth import encode_image, visible_pixels
-from scenegen.rendering.packing import SceneBatch, pack_arrays
+from scenegen.rendering.packing import pack_arrays
 from scenegen.rendering.pictures.development import redeveloped
 from scenegen.rendering.renderer import launch_fields, trace
 from scenegen.sampling.interiors.alternatives import draw_alternatives
@@ -34,11 +34,9 @@ from scenegen.sampling.interiors.scenes import scene_arrays
 Array = NDArray[Any]
 ATTEMPTS = 1024  # rooms that are drawn for a question
 ANCHORS = 2  # other objects, at least, that all images show
-IN_PLAY = 3  # most objects in play, and those of a pair of mirror images
 LEAST_SHOWN = 0.005  # share of an image's pixels that show an object in play
 LEAST_SHARE = 0.5  # of the pixels of an object in play, if nothing hid it, those that show it
 LEAST_CHANGED = 0.005  # share of pixels in which two options show other objects
-MIRROR = DISTRACTOR_KINDS.index("mirror")
 REFERENCE, OPTION = 0, 1  # cameras
 
 
@@ -60,17 +58,16 @@ class Drawn:
         kind: of the wrong options, index into DISTRACTOR_KINDS.
         angle_degrees: between the lines of sight of reference and options.
         scenes: of each camera, K rooms with one view each.
-        in_play: numbers of the objects in which options differ, (IN_PLAY,) int8; 0 in unused slots.
+        in_play: number of the object in which options differ.
         ids, depth: of each camera and room, (2, K, H, W).
-        visible, whole: pixels that show each object in play, and would if nothing hid it,
-            (2, K, IN_PLAY).
+        visible, whole: pixels that show this object, and would if nothing hid it, (2, K).
     """
 
     index: int
     kind: int
     angle_degrees: float
     scenes: tuple[SceneArrays, SceneArrays]
-    in_play: Array
+    in_play: int
     ids: Array
     depth: Array
     visible: Array
@@ -109,7 +106,7 @@ def draw_question(
         tally.refused += 1
     raise PlacementError(
         f"{split} question {index}",
-        f"none of {ATTEMPTS} rooms to have places for a question of the kind {kind!r}",
+        f"none of {ATTEMPTS} rooms has places for a question of type {kind!r}",
         hint="try more --objects, a smaller --angle, or other --distractors",
     )
 
@@ -129,7 +126,7 @@ def _seen(
     kind: str,
     angle: float,
     scenes: tuple[SceneArrays, SceneArrays],
-    in_play: Sequence[int],
+    in_play: int,
     device: str,
 ) -> Drawn | None:
     """Return a question if both cameras see all its rooms well, else None."""
@@ -144,33 +141,17 @@ def _seen(
     least = LEAST_SHOWN * spec.height * spec.width
     flat = ids.reshape(-1, *ids.shape[2:])
     shown = visible_pixels(flat, rooms.interior.object_slots).reshape(2, count, -1)
-    order = np.argsort(-shown.min(axis=(0, 1)), kind="stable")
-    if np.count_nonzero(shown.min(axis=(0, 1)) >= least) < (len(in_play) or 1) + ANCHORS:
+    large, visible = np.all(shown >= least, axis=(0, 1)), shown[..., in_play - 1]
+    if not large[in_play - 1] or np.count_nonzero(large) < 1 + ANCHORS:
         return None
-    chosen = np.array(in_play, int) - 1 if in_play else order[: 2 * IN_PLAY]
-    chosen = chosen[(shown[:, :, chosen] >= least).all(axis=(0, 1))]
-    if len(chosen) < (len(in_play) or IN_PLAY):
+    every = np.arange(count)
+    slot = np.full(count, in_play - 1)
+    whole = np.stack([whole_pixels(batch, every, slot, device) for batch in batches])
+    if (visible < LEAST_SHARE * whole).any():
         return None
-    whole = np.stack([_whole(batch, chosen, device) for batch in batches])
-    good = (shown[:, :, chosen] >= LEAST_SHARE * whole).all(axis=(0, 1))
-    if np.count_nonzero(good) < (len(in_play) or IN_PLAY):
-        return None
-    kept = np.flatnonzero(good)[:IN_PLAY]
-    slots = np.zeros(IN_PLAY, np.int8)
-    slots[: len(kept)] = 1 + chosen[kept]
-    visible, wholes = np.zeros((2, 2, count, IN_PLAY), np.int32)
-    visible[:, :, : len(kept)], wholes[:, :, : len(kept)] = (
-        shown[:, :, chosen[kept]], whole[:, :, kept]
-    )  # fmt: skip
-    code = MIRROR if kind == "mirror-pair" else DISTRACTOR_KINDS.index(kind)
     depth = np.stack([found["depth"] for found in pixels])
-    return Drawn(index, code, angle, scenes, slots, ids, depth, visible, wholes)
-
-
-def _whole(batch: SceneBatch, slots: Array, device: str) -> Array:
-    """Return `amodal.whole_pixels` of some objects in all images, (B, S)."""
-    image, slot = (x.ravel() for x in np.meshgrid(np.arange(len(batch)), slots, indexing="ij"))
-    return whole_pixels(batch, image, slot, device).reshape(len(batch), len(slots))
+    code = DISTRACTOR_KINDS.index(kind)
+    return Drawn(index, code, angle, scenes, in_play, ids, depth, visible, whole)
 
 
 @dataclass(frozen=True, eq=False)
@@ -257,7 +238,7 @@ def room_rows(rendered: Sequence[RenderedRooms]) -> dict[str, Any]:
         "scene": np.array([one.scenes for one in rendered], object),
         "distractor_kind": kinds,
         "angle_degrees": np.array([one.drawn.angle_degrees for one in rendered]),
-        "in_play": np.array([one.drawn.in_play for one in rendered]),
+        "in_play": np.array([one.drawn.in_play for one in rendered], np.int8),
         "visible_pixels": np.array([one.of_images(one.drawn.visible) for one in rendered]),
         "whole_pixels": np.array([one.of_images(one.drawn.whole) for one in rendered]),
         "exposure": np.array([one.exposure for one in rendered]),

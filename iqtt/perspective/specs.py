@@ -8,12 +8,13 @@ from typing import Any, ClassVar
 from iqtt.questions.kinds import ROOM_KINDS, QuestionKind
 from iqtt.questions.specs import QuestionSpec, SplitSpec
 from scenegen.common.names import check_choice
-from scenegen.common.records import check_range
+from scenegen.common.records import check, check_range
 from scenegen.description.presets import preset_spec
 from scenegen.description.specs import SPLITS, InteriorSpec
 
 MARK = '"scenes":"interiors"'  # in the JSON of these settings and of no others
 ANGLES = (20.0, 120.0)  # degrees
+ANGLE_BINS = (20, 40, 60, 90, 120)  # degrees, by which results are reported
 PRESETS: dict[str, dict[str, Any]] = {
     "perspective": {"train": 100, "labeled": 100, "val": 40, "test": 60},
     "perspective-suite": {"train": 0, "labeled": 0, "val": 8, "test": 100},
@@ -49,6 +50,7 @@ class PerspectiveSpec(QuestionSpec):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        check(self.answers == 3, "answers", self.answers, "3 with questions about rooms")
         check_range("angle", self.angle, *ANGLES)
         check_choice("object split", self.object_split, SPLITS)
         check_choice("scenes", self.scenes, ("interiors",))
@@ -83,15 +85,9 @@ def split_spec(text: str | bytes) -> QuestionSpec:
 
 
 def perspective_spec(preset: str, **settings: Any) -> PerspectiveSpec:
-    """Return the spec of a preset, some settings replaced, as `specs.preset_spec`.
-
-    Questions with the mirror image of a room have two answers, the others three.
-    """
+    """Return the spec of a preset, some settings replaced, as `specs.preset_spec`."""
     check_choice("preset", preset, PRESETS)
     chosen = {**PRESETS[preset], **settings}
     if "train" in settings and "labeled" not in settings:
         chosen["labeled"] = chosen["train"]
-    options = ROOM_KINDS.get(chosen.get("distractors", ""), QuestionKind("")).options
-    if len(options) == 1:
-        chosen.setdefault("answers", options[0])
     return PerspectiveSpec(**chosen)

@@ -193,8 +193,8 @@ def draw_shapes(pools: Pools, split: str, requests: Sequence[tuple[int, int]]) -
         if rows:
             raise PlacementError(
                 f"{split} question {requests[rows[0]][0]}",
-                f"none of {SHAPE_ATTEMPTS} {pools.spec.shapes} shapes of {cubes} cubes to have"
-                f" {kind!r} distractors that no other split may use",
+                f"none of {SHAPE_ATTEMPTS} {pools.spec.shapes} shapes of {cubes} cubes has"
+                f" {kind!r} distractors of the same split",
                 hint="use more --cubes, or another distractor type (--distractors)",
             )
     return [shapes for shapes in drawn if shapes is not None]

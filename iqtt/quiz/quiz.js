@@ -16,7 +16,7 @@ const WORDS = {
     title: "Which room is the same? A quiz",
     thing: "a furnished room",
     task: "One option is the same room, seen from another place. In the other options, furniture" +
-      " stands elsewhere or faces another way, or the room is mirrored. Which option is the same room?",
+      " stands elsewhere or faces another way. Which option is the same room?",
     rule: "All options are seen from one place.",
     ask: "Which option is the same room as the reference?",
   },

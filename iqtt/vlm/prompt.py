@@ -12,7 +12,7 @@ ASK = "Which answer shows the same shape as the reference?"
 ROOMS_RULE = (
     "Each picture shows a furnished room. One of the answers shows the same room as the reference,"
     " seen from another place. The other answers differ from it in where some furniture is or in"
-    " what direction it faces, or they are its mirror image. All answers are seen from one place."
+    " what direction it faces. All answers are seen from one place."
 )
 ROOMS_ASK = "Which answer shows the same room as the reference?"
 # Not a sentence to be learned: whoever trains on text with this mark has trained on test data.

@@ -76,7 +76,7 @@ def reading_options(*kinds: str) -> Callable[[Command], Command]:
     return together(
         click.option(
             "--kind", type=click.Choice(kinds), default="depth", show_default=True,
-            help="Prediction type. depth: planar depth; disparity: 1 / depth, larger for closer"
+            help="Type of the values. depth: planar depth; disparity: 1 / depth, larger for closer"
             " pixels; distance: distance along the ray" + points + "."),
         click.option("--unit", type=click.Choice(["m", "cm", "mm"]),
                      help="Unit of the values. One scene unit counts as 1 m."),
@@ -91,8 +91,8 @@ def reading_options(*kinds: str) -> Callable[[Command], Command]:
         click.option("--array", help="Name of the array in NPZ files, or of the channel in EXR"
                                      " files."),
         click.option("--match", type=click.Choice(["number", "name"]), default="number",
-                     show_default=True, help="Assignment of files to images. number: by the name"
-                     " of the image, or by the number in the file name; name: in alphabetical"
+                     show_default=True, help="Assignment of files to images. number: a file belongs"
+                     " to the image with the same name or number; name: files are in alphabetical"
                      " order."),
     )  # fmt: skip
 
@@ -117,11 +117,11 @@ def read_as(
               help="Predictions: a folder, a quoted pattern such as 'out/*.png', or one NPY or NPZ"
               " file with all images. Formats: PNG, TIFF, EXR, PFM, NPY and NPZ.")
 @click.option("--layers", metavar="FILES",
-              help="Predictions of hidden surfaces, too: NPY or NPZ files with depths (h, w, L) or"
-              " points (h, w, L, 3), nearest first, NaN behind the last layer.")
+              help="Predictions of all surfaces along each ray: NPY or NPZ files with depths (h, w,"
+              " L) or points (h, w, L, 3), nearest first, NaN behind the last layer.")
 @click.option("--meshes", metavar="FILES",
               help="Predictions of whole objects: a GLB, PLY or OBJ file per image, in the frame of"
-              " the camera. They are cast along the rays of the pixels.")
+              " the camera. The rays of the pixels are cast against these meshes.")
 @reading_options(*DEPTH_KINDS, "points")
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
               help="Alignment that the predictions need: what the method cannot determine [default:"
@@ -167,8 +167,8 @@ def import_(
 
     texts: dict[str, Any] = {"run": run_name, "notes": notes, "overwrite": overwrite}
     if expanded:
-        found = f"{expanded[0]} after the options: the shell has expanded a pattern"
-        raise click.UsageError(f"found {found}; quote patterns, such as 'out/*.png'")
+        why = "the shell has expanded a pattern"
+        raise click.UsageError(f"{expanded[0]}: {why}; quote patterns, such as 'out/*.png'")
     if sum(source is not None for source in (pattern, layers, meshes, answers, people)) != 1:
         ways = "--depth, --layers or --meshes for rooms"
         raise click.UsageError(f"give {ways}, or --responses or --quiz for questions")

@@ -78,7 +78,7 @@ def compare(
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Compare methods with a reference, paired by item and under one alignment.
+    """Compare methods with a reference, paired by image or question, and under one alignment.
 
     Each argument is a score file of `bench score --json`, or a submission, which is scored first.
     The output lists differences with confidence intervals and significance tests, and the smallest

@@ -17,7 +17,7 @@ TRUTH = click.option(
     type=InputPath(),
     help="Ground truth: a file of rooms, or the answer key of questions [default: the path stored"
     " in"
-    " PREDICTIONS; only scores on named benchmarks are then ranked].",
+    " PREDICTIONS. Without --truth, only scores on named benchmarks are ranked].",
 )
 
 
@@ -258,7 +258,7 @@ def view(
 
 @click.command("describe-format", epilog=EXAMPLE + "bench describe-format")
 def describe_format() -> None:
-    """Print the file format of submissions, with code that writes one."""
+    """Print the file format of submissions, with example code that writes a submission."""
     from metrics.submissions.layout import describe_format as text
 
     click.echo(text())

@@ -57,7 +57,7 @@ def read_array(path: Path, name: str | None = None, vectors: bool = False) -> Ar
         raise ArrayFileError(error.where, error.found, error.expected, hint) from error
     except Exception as error:  # of five libraries, which share no class of errors
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise ArrayFileError(path, f"a file that cannot be read ({reason:.120})") from error
+        raise ArrayFileError(path, f"cannot be read ({reason:.120})") from error
 
 
 def _check_size(path: Path, shape: tuple[int, ...], most: int = MAX_PIXELS * MOST_CHANNELS) -> None:

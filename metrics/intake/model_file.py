@@ -194,10 +194,12 @@ class Model:
                 raise self._lost(place)
             if timeout is not None and seconds > timeout:
                 self.kill()
-                found, hint = f"no result after {timeout:g} s", "--timeout may give it more"
+                found, hint = f"no result after {timeout:g} s", "pass a longer --timeout"
                 raise ModelError(place, found, "", hint)
             if seconds > told:
-                self._note(f"{place}: at work for {seconds:.0f} s; Ctrl-C ends it")
+                self._note(
+                    f"{place}: the model has been running for {seconds:.0f} s; Ctrl-C ends it"
+                )
                 told *= 2
         self.calls.popleft()
         succeeded, content = answer[:1] == b"+", model_runner.loads(answer[1:])

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from metrics.intake.resampling import filled, nearest, resampled
 from metrics.measures.alignment import Alignment
 from metrics.submissions.problems import PredictionError
+from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import LAYERS
 from metrics.submissions.writer import as_array
 from scenegen.common.errors import SceneGenError
@@ -52,26 +53,14 @@ class OutputError(SceneGenError):
 
 
 @dataclass(frozen=True, eq=False)
-class Geometry:
-    """What is predicted for one image, in the conventions of the submission format.
+class Geometry(PredictedView):
+    """What is predicted for one image, of any size (h, w); NaN for no value.
 
-    Attributes:
-        kind, alignment: as in `submissions.layout.KINDS`.
-        geometry: depth or disparity (h, w), points (h, w, 3), or layers (h, w, L), camera frame;
-            NaN for no value.
-        normal: (h, w, 3), camera frame; None where there are none.
-        fov_y_degrees: vertical field of view; None where it is not estimated.
+    Attributes, besides those of `PredictedView`:
         key: the name that the model gave to the geometry.
-        confidence: of each pixel, (h, w), larger is surer; None where there is none.
     """
 
-    kind: str
-    alignment: Alignment
-    geometry: Array
-    normal: Array | None = None
-    fov_y_degrees: float | None = None
     key: str = ""
-    confidence: Array | None = None
 
     def within(self, mask: Array, name: str = "mask") -> "Geometry":
         """Return the geometry without values where a mask (h, w) is False. Raises OutputError."""
@@ -84,12 +73,8 @@ class Geometry:
     @property
     def values(self) -> dict[str, Any]:
         """The arguments of `RoomPredictionWriter.add`, beside the row."""
-        values = {self.kind: self.geometry}
-        values |= {} if self.normal is None else {"normal": self.normal}
-        values |= {} if self.confidence is None else {"confidence": self.confidence}
-        return values | (
-            {} if self.fov_y_degrees is None else {"fov_y_degrees": self.fov_y_degrees}
-        )
+        values = {**dict(self.columns), "fov_y_degrees": self.fov_y_degrees}
+        return {name: value for name, value in values.items() if value is not None}
 
 
 @contextmanager
@@ -147,8 +132,8 @@ def read_output(
         image_of(output[chosen], chosen, vectors=kind == "points"),
         None if normal is None else image_of(normal, "normal", vectors=True),
         _fov(output.get("intrinsics"), height),
-        chosen,
         _confidence(output),
+        chosen,
     )
     if mask is not None:
         geometry = geometry.within(image_of(mask, "mask") > 0.5)

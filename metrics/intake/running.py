@@ -247,7 +247,7 @@ def _geometry(arrays: Mapping[str, Any]) -> Geometry:
     fov = float(arrays["fov"]) if "fov" in arrays else None
     kind, key = str(arrays["kind"]), str(arrays["key"])
     normal, sure = arrays.get("normal"), arrays.get("confidence")
-    return Geometry(kind, alignment, arrays["geometry"], normal, fov, key, sure)
+    return Geometry(kind, alignment, arrays["geometry"], normal, fov, sure, key)
 
 
 # ---- questions ----
@@ -278,7 +278,8 @@ def _write_answers(
     form = "scores" if values and values[0].ndim else "answer"
     predicted: dict[str, Any] = {form: np.array(values)}
     write_answers(out, questions, **texts, **predicted)
-    return f"{form} to {len(values)} questions"
+    what = "scores" if form == "scores" else "responses"
+    return f"{what} for {len(values)} questions"
 
 
 def _answer(value: Any, offered: int, where: str) -> Array:

@@ -33,11 +33,10 @@ from scenegen.files.input_file import (
 )
 from scenegen.files.pictures import opened_picture, picture_size, read_picture
 from scenegen.files.places import files_below
+from scenegen.rooms.export.moge import log_depth
 
 Array = NDArray[Any]
 Measure = Callable[..., tuple[Array, Array | None]]  # from files to depth and matrix
-STEPS = 65533  # of MoGe's depth, between near and far
-INFINITE = 65535
 PICTURES = (".png", ".jpg", ".jpeg")  # of KITTI, whose pictures many keep as JPEG
 SINTEL_TAG = 202021.25  # begins files of depth and of cameras
 SINTEL_SKY = 1e9  # Blender's depth of what is no surface is 1e10
@@ -124,18 +123,14 @@ def moge(folder: Path, _split: Path | None) -> Iterator[Source]:
 def _of_moge(place: Path) -> tuple[Array, Array]:
     path = _other(place / "depth.png", "depth")
     about = _json(_other(place / "meta.json", "camera"))
-    codes = read_array(path).astype(np.float64)
     try:
         with opened_picture(path, MAX_PIXELS) as image:
-            near, far = (float(image.info[name]) for name in ("near", "far"))
-            unit = float(image.info.get("unit", 1.0))  # of older files, metres
-        height, width = codes.shape
+            depth = log_depth(np.asarray(image), image.info)
+        height, width = depth.shape
         matrix = np.array(about["intrinsics"], np.float64) * [[width], [height], [1.0]]
     except (KeyError, TypeError, ValueError) as error:
         raise TruthError(place, f"{error!s:.80}", "near, far and a matrix, as MoGe has") from error
-    depth = unit * near * (far / near) ** ((codes - 1.0) / STEPS)
-    known = (codes > 0) & (codes < INFINITE)
-    return np.where(known, depth, 0.0), matrix
+    return depth, matrix
 
 
 def _json(path: Path) -> Any:

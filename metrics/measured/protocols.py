@@ -133,7 +133,9 @@ def scored_pixels(protocol: Protocol, depth: Array) -> Array:
         inside = (depth > protocol.least) & (depth < protocol.largest)
     inside &= crop_mask(protocol.crops, *depth.shape)
     if not inside.any():
-        raise ProtocolError("depth", "no pixel that it scores", "some inside of crop and range")
+        raise ProtocolError(
+            "depth", "no scored pixel", "pixels inside the crop and the range of depth"
+        )
     return np.asarray(inside)
 
 

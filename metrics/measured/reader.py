@@ -124,7 +124,9 @@ class MeasuredFile(RowFile):
             square = np.einsum("ijk,ijk->ij", normal, normal, dtype=np.float64)
             if (~(np.abs(square - 1.0) <= UNIT_TOLERANCE) & (square != 0.0)).any():
                 expected = "vectors of length 1, or 0 where there is none"
-                raise FileFormatError(self.place("normal", row), "others", expected)
+                raise FileFormatError(
+                    self.place("normal", row), "vectors of other lengths", expected
+                )
         rays = self.rays(row, height, width)
         return MeasuredView(depth[:height, :width], normal, rays, tuple(map(row_digest, stored)))
 

@@ -87,7 +87,11 @@ def write_measured(
                 shapes = columns(height, width, "normal" in row)
                 table = Table(file, shapes, len(sources))
             if ("normal" in row) != ("normal" in table.datasets):
-                raise TruthError(f"{item.name}: normals", "some", "normals of all or of none")
+                raise TruthError(
+                    f"{item.name}: normals",
+                    "normals of some images",
+                    "normals of all images or of none",
+                )
             table.append(row)
             table.write_packed(WAITING)
             progress(1)

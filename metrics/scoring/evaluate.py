@@ -9,10 +9,9 @@ from metrics.measured.protocols import ProtocolError
 from metrics.measured.reader import MeasuredFile, open_images
 from metrics.measures.alignment import Alignment
 from metrics.scoring.geometry import alignments_scored
-from metrics.scoring.measured import score_measured
 from metrics.scoring.questions import score_questions
 from metrics.scoring.records import ScoreFile
-from metrics.scoring.rooms import score_rooms
+from metrics.scoring.rooms import score_measured, score_rooms
 from metrics.scoring.runs import (
     MeasuredRuns,
     Progress,

@@ -21,7 +21,7 @@ class KnownTest:
         command: what makes the set, but for its place.
         purpose: what it is for.
         pictures: digest of the images; empty where they differ between machines by rounding, and
-            `scenegen verify` compares them.
+            `scenegen verify` or `iqtt verify` compares them.
         superseded: whether older code made it, whose bits were others.
     """
 
@@ -42,7 +42,19 @@ class KnownTest:
 
 
 _RENDER = "scenegen render --n 300 --views 0,5,35,55,80"
-_QUESTIONS = "iqtt make-split --preset suite --train 0 --labeled 0 --val 0 --test 500"
+_QUESTIONS = {  # purpose, questions of each distractor type, command
+    "rotation-1": (
+        "mental-rotation questions, by distractor type",
+        500,
+        "iqtt make-split --preset suite --train 0 --labeled 0 --val 0 --test 500",
+    ),
+    "perspective-1": (
+        "questions about furnished rooms, by distractor type",
+        300,
+        "iqtt make-split --preset perspective-suite --train 0 --labeled 0 --val 0 --test 300"
+        " --seed 1000 --object-split test --spp 16 --denoise --shard-size 10",
+    ),
+}
 _ROOMS = {  # purpose, rows, command
     "sample-1": ("the rooms in examples/sample", 8, "scenegen render --n 8 --size 48"),
     "rooms-1": (
@@ -164,17 +176,10 @@ KNOWN_TESTS = (
         for name, (purpose, rows, command) in _ROOMS.items()
     ),
     *(
-        KnownTest(
-            name,
-            "iqtt",
-            truth,
-            500,
-            _QUESTIONS,
-            "mental-rotation questions, by distractor type",
-            pictures,
-        )
+        KnownTest(name, "iqtt", truth, rows, command, purpose, pictures)
+        for start, (purpose, rows, command) in _QUESTIONS.items()
         for name, (truth, pictures) in _DIGESTS.items()
-        if name.startswith("rotation-1/")
+        if name.startswith(f"{start}/")
     ),
     *(
         KnownTest(name, "rooms", digest, rows, f"scenegen render {options}", superseded=True)

@@ -14,8 +14,8 @@ from metrics.measures.depth import DepthPair, depth_scores, scale_log2
 from metrics.measures.surfaces.normals import angular_errors_degrees, normal_scores
 from metrics.measures.surfaces.points import point_map_scores, ray_error_degrees
 from metrics.scoring.geometry import alignments_scored, fitted_geometry, scored_alignment
-from metrics.scoring.image_scores import ImageScores, NonFinite, breaks_rules
-from metrics.scoring.metric_names import FLAT, OBJECT_SCORES, SKILLED, metric
+from metrics.scoring.image_scores import breaks_rules
+from metrics.scoring.metric_names import FLAT, SKILLED, metric
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import refuse_pixels
@@ -26,10 +26,14 @@ Array = NDArray[Any]
 
 
 def score_panorama(
-    predicted: PredictedView, truth: TrueView, non_finite: NonFinite = "error"
-) -> ImageScores:
-    """Return the scores of a panorama, as `image_scores.score_prediction`, and raise as it does."""
-    broken = non_finite == "penalise" and breaks_rules(predicted, truth)
+    predicted: PredictedView, truth: TrueView, penalise: bool = False
+) -> dict[str, float]:
+    """Return every score of what is predicted for a panorama, by name.
+
+    With `penalise`, an image with a scored pixel that breaks `submissions.rules` has the worst
+    value of every score. Else it raises PredictionError.
+    """
+    broken = penalise and breaks_rules(predicted, truth)
     for name, values in () if broken else predicted.columns:
         if values is not None:
             refuse_pixels(PredictionError, f"predicted {name}", name, values, truth.mask)
@@ -54,8 +58,7 @@ def score_panorama(
         scores |= normal_scores(angular_errors_degrees(normal, truth.normal, mask))
     if broken:
         scores = {name: metric(name).worst(float(true.max())) for name in scores}
-    none = {name: np.zeros(0, np.int64) for name in ("object", "pixels", *OBJECT_SCORES)}
-    return ImageScores(scores, none)
+    return scores
 
 
 def baselines_of(truth: TrueView) -> dict[str, float]:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
 
 Array = NDArray[Any]
-ANGLE_BINS = (0, 30, 60, 90, 120, 150, 180)  # degrees, of IQTT's rotations
+ANGLE_BINS = (0, 30, 60, 90, 120, 150, 180)  # degrees, of rotations of shapes
 
 
 def score_questions(
@@ -37,6 +37,8 @@ def score_questions(
 ) -> ScoreFile:
     """Score runs of one method on an open file of answers; raises as `evaluate.score`."""
     from iqtt.floors import floors_of
+    from iqtt.perspective.specs import ANGLE_BINS as OF_ROOMS
+    from iqtt.perspective.specs import PerspectiveSpec
     from iqtt.questions.kinds import question_kind
 
     files, truth = runs.files, runs.truth
@@ -78,10 +80,9 @@ def score_questions(
     if len(files) == 1:  # runs may differ in these
         groups |= _groups_of_texts(files[0], answers[0, rows], true, rows, shapes, meta)
     if kinds:
-        bins = np.clip(
-            np.digitize(columns["angle_degrees"][rows], ANGLE_BINS) - 1, 0, len(ANGLE_BINS) - 2
-        )
-        spans = np.array([f"{a}-{b}" for a, b in itertools.pairwise(ANGLE_BINS)])
+        edges = OF_ROOMS if isinstance(truth.spec, PerspectiveSpec) else ANGLE_BINS
+        bins = np.digitize(columns["angle_degrees"][rows], edges[1:-1])
+        spans = np.array([f"{a}-{b}" for a, b in itertools.pairwise(edges)])
         groups["by_distractor"] = grouped(np.array(kinds))
         groups["by_rotation_angle"] = grouped(spans[bins])
     items = {"question": rows, ACCURACY: right}

@@ -1,4 +1,4 @@
-"""Scores of submissions that predict rooms, from the scores of their rows."""
+"""Score files of submissions that predict images: rooms, or those whose truth was measured."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -6,11 +6,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from metrics.measured.protocols import BY_NAME, DECLARED, PROTOCOLS, ProtocolError
 from metrics.scoring.geometry import scored_alignment
-from metrics.scoring.metric_names import OBJECT_SCORES
+from metrics.scoring.measured_rows import PIXELS, require_suited, suits
+from metrics.scoring.metric_names import OBJECT_SCORES, OF_TRUTH, metric
 from metrics.scoring.records import OBJECT_COLUMNS, SHAPE_COLUMN, ScoreFile
-from metrics.scoring.rows import score_rows
+from metrics.scoring.rows import ScoredRows, score_rows
 from metrics.scoring.runs import (
+    MeasuredRuns,
     Progress,
     RoomRuns,
     ScoringError,
@@ -22,37 +25,23 @@ from metrics.scoring.runs import (
 from metrics.scoring.truth_digests import images_digest
 from metrics.submissions.reader import RoomPredictions
 from scenegen.common.errors import FileFormatError
+from scenegen.common.names import check_choice
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[Any]
 IDS_SHOWN = 8
 
 
-def score_rooms(
-    runs: RoomRuns,
-    settings: Settings,
-    progress: Progress,
-) -> ScoreFile:
+def score_rooms(runs: RoomRuns, settings: Settings, progress: Progress) -> ScoreFile:
     """Score runs of one method on an open rooms file; raises as `evaluate.score`."""
     files, truth = runs.files, runs.truth
-    rows = matched_rows(runs, settings.allow_partial)
-    require_one_kind(files)
-    scored = score_rows(files, truth, rows, settings, progress)
-    scores, bad = scored.scores, scored.bad
-    require_scored(bad, settings)
-
-    def alike(i: int, j: int) -> bool:
-        return all(np.array_equal(x[i], x[j], equal_nan=True) for x in scores.values())
-
-    refuse_copies(files, alike)
-    digest = images_digest(truth, scored.digests)
+    rows, scored, digest = _scored(runs, settings, progress)
     scene = truth.read("scene_index", slice(None))
     view = truth.read("view_index", slice(None))
     angle = view_angles(scene, view, truth.read("camera/world_from_camera", slice(None)))[rows]
-    shape = object_shapes(truth, scored.objects["row"], scored.objects["object"])
     counts = {
         "rows_in_truth": len(truth),
-        "rows_penalised": len(bad),
+        "rows_penalised": len(scored.bad),
         "pixels": truth.spec.height * truth.spec.width,
     }
     items = {
@@ -60,31 +49,93 @@ def score_rooms(
         "scene_index": scene[rows],
         "view_index": view[rows],
         "view_angle_degrees": angle,
-        **scores,
+        **scored.scores,
         **scored.floors,
     }
     objects = {name: scored.objects[name] for name in (*OBJECT_COLUMNS, *OBJECT_SCORES)}
+    objects[SHAPE_COLUMN] = object_shapes(truth, objects["row"], objects["object"])
     meta = meta_of(runs, truth.fingerprint, digest, settings, counts)
     alignment = scored_alignment(files[0].kind, files[0].fitted)
-    objects[SHAPE_COLUMN] = shape
     more: dict[str, Any] = {"shown": files[0].shown}
     more |= {"length": "metre"} if truth.spec.interior else {}
     return ScoreFile("rooms", files[0].method, alignment, items, meta, objects, **more)
 
 
+def score_measured(
+    runs: MeasuredRuns, settings: Settings, progress: Progress, all_protocols: bool = False
+) -> list[ScoreFile]:
+    """Score runs on measured truth under the protocol of the settings, or under all that suit.
+
+    Raises as `evaluate.score`, and ProtocolError where the protocol does not suit the truth, or
+    what the method predicts.
+    """
+    file, truth = runs.files[0], runs.truth
+    if all_protocols:
+        protocols = [p for p in PROTOCOLS if suits(p, file.kind, file.fitted)]
+    else:
+        name = settings.protocol or DECLARED.name
+        check_choice("protocol", name, BY_NAME, ProtocolError)
+        protocols = [BY_NAME[name]]
+        require_suited(protocols[0], file.kind, file.fitted)
+    rows, scored, digest = _scored(runs, settings, progress, tuple(p.name for p in protocols))
+    counts = {"rows_in_truth": len(truth), "rows_penalised": len(scored.bad)}
+    meta = meta_of(runs, truth.fingerprint, digest, settings, counts)
+    found = []
+    for protocol in protocols:
+        ours = {
+            key.removeprefix(f"{protocol.name} "): values
+            for key, values in scored.scores.items()
+            if key.startswith(f"{protocol.name} ")
+        }
+        pixels = ours.pop(PIXELS)[0].astype(np.int64)
+        if not pixels.all():  # of all protocols; one alone is refused
+            continue
+        # A score that some image cannot have, as it shows no normals, is none of this set.
+        scores = {
+            name: values
+            for name, values in ours.items()
+            if name.startswith(OF_TRUTH) or metric(name).lacking or not np.isnan(values).any()
+        }
+        items = {"row": rows, "group": truth.groups[rows], "pixels": pixels, **scores}
+        alignment = protocol.alignment or scored_alignment(file.kind, file.fitted)
+        found.append(
+            ScoreFile("measured", file.method, alignment, items, meta, protocol=protocol.name)
+        )
+    return found
+
+
+def _scored(
+    runs: RoomRuns | MeasuredRuns,
+    settings: Settings,
+    progress: Progress,
+    protocols: tuple[str, ...] = (),
+) -> tuple[Array, ScoredRows, str]:
+    """Return the rows that all runs predict, their scores, and the digest of the truth."""
+    files, truth = runs.files, runs.truth
+    rows = matched_rows(runs, settings.allow_partial)
+    require_one_kind(files)
+    scored = score_rows(files, truth, rows, settings, progress, protocols)
+    require_scored(scored.bad, settings)
+
+    def alike(i: int, j: int) -> bool:
+        values = scored.scores.values()
+        return all(np.array_equal(x[i], x[j], equal_nan=True) for x in values)
+
+    refuse_copies(files, alike)
+    return rows, scored, images_digest(truth, scored.digests)
+
+
 def require_one_kind(files: Sequence[RoomPredictions]) -> None:
     """Raise ScoringError unless all submissions are alike in kind and columns."""
+    first = files[0]
     for file in files:
-        if file.kind != files[0].kind:
-            expected = f"{files[0].kind} as in {files[0].path}"
-            raise ScoringError(f"{file.path}: {file.kind}", file.kind, expected)
-        if file.has_normals != files[0].has_normals:
-            found, expected = ("normals", "none") if file.has_normals else ("none", "normals")
-            raise ScoringError(f"{file.path}: normal", found, f"{expected} as in {files[0].path}")
-        if file.has_confidence != files[0].has_confidence:
-            found, expected = ("one", "none") if file.has_confidence else ("none", "one")
-            expected = f"{expected} as in {files[0].path}"
-            raise ScoringError(f"{file.path}: confidence", found, expected)
+        for name, held in (("kind", "kind"), ("normal", "has_normals"),
+                           ("confidence", "has_confidence")):  # fmt: skip
+            ours, theirs = getattr(file, held), getattr(first, held)
+            if ours != theirs:
+                where, said = f"{file.path}: {name}", {True: "it", False: "none"}
+                expected = f"{said.get(theirs, theirs)} as in {first.path}"
+                raise ScoringError(where, said.get(ours, ours), expected)
 
 
 def require_scored(bad: Mapping[int, ScoringError], settings: Settings) -> None:

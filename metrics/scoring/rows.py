@@ -12,12 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measured.protocols import BY_NAME, ProtocolError
-from metrics.measured.reader import Images, MeasuredFile, open_images
+from metrics.measured.reader import Images, MeasuredFile, is_flat, open_images
 from metrics.measures.alignment import Alignment
 from metrics.measures.confidence import distance_from_edges
 from metrics.scoring.image_scores import (
     FirstView,
     ImageScores,
+    NonFinite,
     reference_of,
     score_prediction,
     true_relief,
@@ -31,8 +32,14 @@ from metrics.scoring.records import OBJECT_COLUMNS
 from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.scoring.truth_digests import RowDigests, view_digests
 from metrics.submissions.problems import PredictionError
-from metrics.submissions.reader import Identity, RoomPredictions, on_any_machine, open_predictions
-from metrics.submissions.truths import TrueView, read_true_view
+from metrics.submissions.reader import (
+    Identity,
+    PredictedView,
+    RoomPredictions,
+    on_any_machine,
+    open_predictions,
+)
+from metrics.submissions.truths import read_true_view
 from scenegen.common.cgroup import processors
 from scenegen.common.threads import one_thread
 from scenegen.files.pool import LostWorkerError
@@ -74,40 +81,22 @@ class ScoredRows:
 
 def score_rows(
     files: Sequence[RoomPredictions],
-    truth: RoomsFile,
-    rows: Array,
-    settings: Settings,
-    progress: Progress = lambda done: None,
-) -> ScoredRows:
-    """Score these M rows in each of R submissions, by the processes or cluster of the settings."""
-    scene, view = (truth.read(name, slice(None))[rows] for name in ("scene_index", "view_index"))
-    others = rows[other_scenes(scene, view)]
-    triples = np.stack([rows, others, first_views(truth)[rows]], axis=-1)
-    return _scored(files, truth, triples, (), settings, progress)
-
-
-def score_measured_rows(
-    files: Sequence[RoomPredictions],
-    truth: MeasuredFile,
-    rows: Array,
-    protocols: tuple[str, ...],
-    settings: Settings,
-    progress: Progress = lambda done: None,
-) -> ScoredRows:
-    """Score these M rows as `score_rows`; names of scores are `PROTOCOL SCORE`."""
-    return _scored(files, truth, rows, protocols, settings, progress)
-
-
-def _scored(
-    files: Sequence[RoomPredictions],
     truth: Images,
     rows: Array,
-    protocols: tuple[str, ...],
     settings: Settings,
-    progress: Progress,
+    progress: Progress = lambda done: None,
+    protocols: tuple[str, ...] = (),
 ) -> ScoredRows:
-    """Score rows, or triples of them, by the processes or cluster of the settings."""
-    chunks = [rows[i : i + CHUNK] for i in range(0, len(rows), CHUNK)]
+    """Score these M rows in each of R submissions, by the processes or cluster of the settings.
+
+    Names of scores of measured truth are `PROTOCOL SCORE`, for each of the protocols.
+    """
+    tasks = rows[:, None]
+    if isinstance(truth, RoomsFile):
+        scene, view = (truth.read(x, slice(None))[rows] for x in ("scene_index", "view_index"))
+        others = rows[other_scenes(scene, view)]
+        tasks = np.stack([rows, others, first_views(truth)[rows]], axis=-1)
+    chunks = [tasks[i : i + CHUNK] for i in range(0, len(tasks), CHUNK)]
     submissions = tuple((file.path.absolute(), file.identity) for file in files)
     job = submissions, truth.path.absolute(), protocols, settings.align
     processes = min(settings.processes or processors(), len(chunks))
@@ -173,170 +162,156 @@ def first_views(truth: RoomsFile) -> Array:
     return np.array([row_of.get(number, -1) for number in scene.tolist()])
 
 
-class RowScorer:
-    """Scores rows of open submissions against an open truth."""
+# What is read of a row once: its digests, scores of OF_TRUTH, and what scores a prediction, which
+# is told whether to penalise values that break a rule.
+Begun = tuple[RowDigests, dict[str, float], Callable[[PredictedView, bool], ImageScores]]
+NO_OBJECTS: dict[str, Array] = {
+    **dict.fromkeys(OBJECT_COLUMNS[1:], np.zeros(0, np.int64)),
+    **dict.fromkeys(OBJECT_SCORES, np.zeros(0)),
+}
 
-    def __init__(self, files: Sequence[RoomPredictions], truth: RoomsFile) -> None:
+
+class RowScorer:
+    """Scores rows of open submissions; `begin` reads the truth of one, as its kind has it."""
+
+    def __init__(self, files: Sequence[RoomPredictions], begin: Callable[..., Begun]) -> None:
         """Take files that stay open as long as rows are scored."""
-        self._files, self._truth, self._kept = files, truth, KeptBaselines()
+        self._files, self._begin = files, begin
         self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in files]
 
-    def score(self, triples: Array) -> ScoredRows:
-        """Return the scores of rows, (N, 3) with a row of another scene and the first view of each.
+    def score(self, rows: Array) -> ScoredRows:
+        """Return the scores of rows, (N, 1), of rooms with their `others`, (N, 3).
 
         Values that are not finite are penalised; the caller decides whether that shall count.
         """
         bad: dict[int, ScoringError] = {}
         digests: dict[int, RowDigests] = {}
         images, floors = [], []
-        for row, other, first in triples.tolist():
-            view = read_true_view(self._truth, row)
-            digests[row] = view_digests(view)
-            if view.lens.is_flat:
-                score, baselines = self._of_plane(view, digests[row], row, other, first)
-            else:
-                score = functools.partial(score_panorama, truth=view)
-                baselines = baselines_of(view)
-            scores = []
+        for row, *others in rows.tolist():
+            digests[row], of_truth, score = self._begin(row, *others)
+            runs = []
             for file, entries in zip(self._files, self._entries, strict=True):
                 predicted = file.view(entries[row])
                 try:
-                    scores.append(score(predicted))
+                    runs.append(score(predicted, False))
                 except PredictionError as error:
-                    bad[row] = ScoringError(*_placed(error, file, row))
-                    scores.append(score(predicted, non_finite="penalise"))
-            images.append(scores)
-            floors.append(baselines)
-        names = images[0][0].scores
-        counts = [len(scores[0].objects["object"]) for scores in images]
-        objects = {"row": np.repeat(triples[:, 0], counts)}
-        for name in images[0][0].objects:
-            columns = zip(*images, strict=True)
-            runs = [np.concatenate([run.objects[name] for run in column]) for column in columns]
-            objects[name] = np.stack(runs) if name in OBJECT_SCORES else runs[0]
+                    where = f"{file.path}: row {row}: {error.where}"
+                    bad[row] = ScoringError(where, error.found, error.expected, error.hint)
+                    runs.append(score(predicted, True))
+            images.append(runs)
+            floors.append(of_truth)
+        first = images[0][0]
+        counts = [len(runs[0].objects["object"]) for runs in images]
+        objects = {"row": np.repeat(rows[:, 0], counts)}
+        for name in first.objects:
+            columns = [[run.objects[name] for run in runs] for runs in zip(*images, strict=True)]
+            each = [np.concatenate(column) for column in columns]
+            objects[name] = np.stack(each) if name in OBJECT_SCORES else each[0]
         return ScoredRows(
             {
-                name: np.array([[run.scores[name] for run in row] for row in images]).T
-                for name in names
+                name: np.array([[run.scores[name] for run in runs] for runs in images]).T
+                for name in first.scores
             },
-            {name: np.array([row[name] for row in floors]) for name in floors[0]},
+            {name: np.array([of_truth[name] for of_truth in floors]) for name in floors[0]},
             objects,
             bad,
             digests,
         )
 
-    def _of_plane(
-        self, view: TrueView, digests: RowDigests, row: int, other: int, first: int
-    ) -> tuple[Callable[..., ImageScores], dict[str, float]]:
-        """Return what scores a prediction of an image, and the scores of its baselines."""
-        relief, first_view, edges = None, None, None
+
+def _of_rooms(truth: RoomsFile, confident: bool) -> Callable[[int, int, int], Begun]:
+    """Return what reads a row, with a row of another scene and its scene's first view."""
+    kept, read = KeptBaselines(), truth.read
+
+    def begin(row: int, other: int, first: int) -> Begun:
+        view, relief, first_view = read_true_view(truth, row), None, None
         if other != row:
-            names = ("depth", "camera/world_from_camera")
-            depth, pose = (self._truth.read(name, other) for name in names)
-            size = self._truth.room_size(other)
-            relief = true_relief(depth, pose, self._truth.lens(other), size)
+            depth, pose = (read(name, other) for name in ("depth", "camera/world_from_camera"))
+            relief = true_relief(depth, pose, truth.lens(other), truth.room_size(other))
         if first not in (row, -1):
-            maps = ("depth", "object_id", "camera/world_from_camera")
-            first_view = FirstView(*(self._truth.read(name, first) for name in maps))
+            seen = ("depth", "object_id", "camera/world_from_camera")
+            first_view = FirstView(*(read(name, first) for name in seen))
+        digests = view_digests(view)
         key = key_of(view, digests, first_view, row)
-        reference = reference_of(view, first_view, row, kept := self._kept.read(key))
-        if kept is None:
-            self._kept.write(key, reference.floors)
-        if any(file.has_confidence for file in self._files):
-            edges = distance_from_edges(self._truth.read("image", row))
-        about = {"reference": reference, "other_relief": relief, "edge_distance": edges}
-        return functools.partial(score_prediction, truth=view, **about), reference.floors
+        reference = reference_of(view, first_view, row, known := kept.read(key))
+        if known is None:
+            kept.write(key, reference.floors)
+        edges = distance_from_edges(read("image", row)) if confident else None
+
+        def score(predicted: PredictedView, penalise: bool) -> ImageScores:
+            non_finite: NonFinite = "penalise" if penalise else "error"
+            return score_prediction(predicted, view, reference, relief, non_finite, edges)
+
+        return digests, reference.floors, score
+
+    return begin
 
 
-class MeasuredScorer:
-    """Scores rows of open submissions against an open truth that was measured."""
+def _of_measured(
+    truth: MeasuredFile, confident: bool, protocols: tuple[str, ...]
+) -> Callable[[int], Begun]:
+    """Return what reads a row; names of its scores are `PROTOCOL SCORE`."""
+    chosen = [BY_NAME[name] for name in protocols]
 
-    def __init__(
-        self, files: Sequence[RoomPredictions], truth: MeasuredFile, protocols: tuple[str, ...]
-    ) -> None:
-        """Take files that stay open as long as rows are scored."""
-        self._files, self._truth = files, truth
-        self._protocols = [BY_NAME[name] for name in protocols]
-        self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in files]
+    def begin(row: int) -> Begun:
+        view = truth.view(row)
+        edges = distance_from_edges(truth.picture(row)) if confident else None
 
-    def score(self, rows: Array) -> ScoredRows:
-        """Return the scores of rows, (N,), as `RowScorer.score`."""
-        bad: dict[int, ScoringError] = {}
-        digests: dict[int, RowDigests] = {}
-        images = []
-        for row in rows.tolist():
-            view, runs = self._truth.view(row), []
-            edges = None
-            if any(file.has_confidence for file in self._files):
-                edges = distance_from_edges(self._truth.picture(row))
-            for file, entries in zip(self._files, self._entries, strict=True):
-                predicted = file.view(entries[row])
-                score = functools.partial(
-                    scores_of_view, predicted, view, self._protocols, self._truth.dense,
-                    row=row, edge_distance=edges,
-                )  # fmt: skip
-                try:
-                    runs.append(score())
-                except PredictionError as error:
-                    bad[row] = ScoringError(*_placed(error, file, row))
-                    runs.append(score(penalise=True))
-                except ProtocolError as error:
-                    raise error.inside(f"{self._truth.path}: row {row}") from error
-            images.append(runs)
-            digests[row] = view.digests
-        names = {f"{a} {b}": (a, b) for a, b in images[0][0]}
-        scores = {
-            name: np.array([[run[key] for run in runs] for runs in images]).T
-            for name, key in names.items()
-        }
-        return ScoredRows(scores, {}, {}, bad, digests)
+        def score(predicted: PredictedView, penalise: bool) -> ImageScores:
+            try:
+                found = scores_of_view(predicted, view, chosen, truth.dense, penalise, row, edges)
+            except ProtocolError as error:
+                raise error.inside(f"{truth.path}: row {row}") from error
+            return ImageScores({f"{a} {b}": value for (a, b), value in found.items()}, NO_OBJECTS)
+
+        return view.digests, {}, score
+
+    return begin
 
 
-class LayerScorer:
-    """Scores rows of open submissions of layers against an open truth that has layers."""
+def _of_layers(truth: RoomsFile) -> Callable[[int, int, int], Begun]:
+    """Return what reads a row and its layers."""
 
-    def __init__(self, files: Sequence[RoomPredictions], truth: RoomsFile) -> None:
-        """Take files that stay open as long as rows are scored."""
-        self._files, self._truth = files, truth
-        self._entries = [{row: i for i, row in enumerate(f.rows.tolist())} for f in files]
+    def begin(row: int, _other: int, _first: int) -> Begun:
+        view = read_true_view(truth, row)
+        layers = read_true_layers(truth, row, view)
 
-    def score(self, triples: Array) -> ScoredRows:
-        """Return the scores of rows, (N, 3), as `RowScorer.score`."""
-        bad: dict[int, ScoringError] = {}
-        digests: dict[int, RowDigests] = {}
-        images, floors = [], []
-        for row in triples[:, 0].tolist():
-            view = read_true_view(self._truth, row)
-            digests[row], runs = view_digests(view), []
-            layers = read_true_layers(self._truth, row, view)
-            for file, entries in zip(self._files, self._entries, strict=True):
-                predicted = file.view(entries[row])
-                try:
-                    runs.append(score_layers(predicted, layers))
-                except PredictionError as error:
-                    bad[row] = ScoringError(*_placed(error, file, row))
-                    runs.append(worst_of_layers(layers))
-            images.append(runs)
-            floors.append(layers.floors())
-        scores = {
-            name: np.array([[run[name] for run in runs] for runs in images]).T
-            for name in images[0][0]
-        }
-        none: dict[str, Array] = {name: np.zeros((len(self._files), 0)) for name in OBJECT_SCORES}
-        none |= dict.fromkeys(OBJECT_COLUMNS, np.zeros(0, np.int64))
-        of_truth = {name: np.array([row[name] for row in floors]) for name in floors[0]}
-        return ScoredRows(scores, of_truth, none, bad, digests)
+        def score(predicted: PredictedView, penalise: bool) -> ImageScores:
+            scores = worst_of_layers(layers) if penalise else score_layers(predicted, layers)
+            return ImageScores(scores, NO_OBJECTS)
+
+        return view_digests(view), layers.floors(), score
+
+    return begin
 
 
-Scorer = RowScorer | MeasuredScorer | LayerScorer
+def _of_panoramas(truth: RoomsFile) -> Callable[[int, int, int], Begun]:
+    """Return what reads a row that is a panorama."""
+
+    def begin(row: int, _other: int, _first: int) -> Begun:
+        view = read_true_view(truth, row)
+
+        def score(predicted: PredictedView, penalise: bool) -> ImageScores:
+            return ImageScores(score_panorama(predicted, view, penalise), NO_OBJECTS)
+
+        return view_digests(view), baselines_of(view), score
+
+    return begin
 
 
-def _placed(error: PredictionError, file: RoomPredictions, row: int) -> tuple[str, str, str, str]:
-    """Return an error's fields, with file and row before its place."""
-    return f"{file.path}: row {row}: {error.where}", error.found, error.expected, error.hint
+def _scorer(
+    files: Sequence[RoomPredictions], truth: Images, protocols: tuple[str, ...]
+) -> RowScorer:
+    confident = any(file.has_confidence for file in files)
+    if isinstance(truth, MeasuredFile):
+        return RowScorer(files, _of_measured(truth, confident, protocols))
+    if not is_flat(truth):
+        return RowScorer(files, _of_panoramas(truth))
+    layered = files[0].kind == "layers"
+    return RowScorer(files, _of_layers(truth) if layered else _of_rooms(truth, confident))
 
 
-def _scored_here(scorer: Scorer, chunks: Sequence[Array]) -> Iterator[ScoredRows]:
+def _scored_here(scorer: RowScorer, chunks: Sequence[Array]) -> Iterator[ScoredRows]:
     with one_thread():
         yield from map(scorer.score, chunks)
 
@@ -351,8 +326,7 @@ def _in_processes(job: Job, chunks: Sequence[Array], processes: int) -> Iterator
 
 
 def _told(rows: Array) -> str:
-    first, last = (int(np.ravel(row)[0]) for row in (rows[0], rows[-1]))  # of triples the first
-    return f"scores of rows {first} to {last}"
+    return f"scores of rows {rows[0][0]} to {rows[-1][0]}"
 
 
 def _told_of_several(chunks: Sequence[Array]) -> str:
@@ -368,13 +342,7 @@ def _on_cluster(job: Job, chunks: Sequence[Array], cluster: Cluster) -> Iterator
         yield from scored
 
 
-def _scorer(files: Sequence[RoomPredictions], truth: Images, protocols: tuple[str, ...]) -> Scorer:
-    if isinstance(truth, MeasuredFile):
-        return MeasuredScorer(files, truth, protocols)
-    return (LayerScorer if files[0].kind == "layers" else RowScorer)(files, truth)
-
-
-def _opened(job: Job, opening: ExitStack) -> Scorer:
+def _opened(job: Job, opening: ExitStack) -> RowScorer:
     """Open the files of a job, until the stack is closed."""
     truth = open_images(job[1])
     opening.enter_context(truth)
@@ -398,7 +366,7 @@ def _score_in_worker(job: Job, rows: Array) -> ScoredRows:
 
 
 @functools.cache
-def _scorer_of_this_process(job: Job) -> Scorer:
+def _scorer_of_this_process(job: Job) -> RowScorer:
     """Open the files of a job when its first chunk comes; a worker process has only one job."""
     opening = ExitStack()
     atexit.register(opening.close)

@@ -6,7 +6,7 @@ whole, pixels not at all.
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import h5py
@@ -235,8 +235,9 @@ def _with_cache(file: h5py.File, name: str) -> StoredArray:
 # ---- ids and answers ----
 
 
-def take_values(result: Inspection) -> None:
-    """Read and check the ids, and the answers where there are some."""
+def take_values(result: Inspection, known: Against | None = None) -> None:
+    """Read and check the ids, and the answers where there are some, against what is known."""
+    known = known or Against()
     name = layout.ID_NAMES[str(result.task)]
     values = _values(result, name, lambda array: array[()])
     if values is None:
@@ -246,29 +247,30 @@ def take_values(result: Inspection) -> None:
         result.problems.append(Problem(name, "range", "rows of the ground truth", found))
         return
     ids = values.astype(np.int64)
-    result.problems += value_problems(name, ids, ids)
+    result.problems += value_problems(name, ids, ids, known)
     fov = _values(result, "fov_y_degrees", lambda array: as_doubles(array[()]))
     if fov is not None:
         result.problems += value_problems("fov_y_degrees", fov, ids)
     if len(ids):
         result.ids = ids
-        _take_answers(result, ids)
+        _take_answers(result, ids, known)
 
 
-def _take_answers(result: Inspection, ids: Ids) -> None:
+def _take_answers(result: Inspection, ids: Ids, known: Against) -> None:
     """Read the answers, and those that follow from scores, which must agree."""
     before = len(result.problems)
     of_scores = _values(result, "scores", lambda scores: _answers(result, scores, ids))
     answers = _values(result, "answer", lambda array: array[()])
     if answers is not None:
         usable = of_scores if len(result.problems) == before else None
-        result.problems += value_problems("answer", answers, ids, Against(of_scores=usable))
+        against = replace(known, of_scores=usable)
+        result.problems += value_problems("answer", answers, ids, against)
     if len(result.problems) == before:
         result.answers = of_scores if answers is None else answers.astype(np.int64)
     for name in ("outcome", "rotated"):
         values = _values(result, name, lambda array: array[()])
         if values is not None:
-            against = Against(of_scores=result.answers)
+            against = replace(known, of_scores=result.answers)
             result.problems += value_problems(name, values, ids, against)
 
 

@@ -232,7 +232,7 @@ class RoomPredictions(Predictions):
 
     def _read(self, name: str, index: int) -> Array:
         if name not in self._arrays:
-            raise FileFormatError(f"{self.path}: {name}", "none")
+            raise FileFormatError(f"{self.path}: {name}", "the submission has none")
         with reading(f"{self.path}: {name}, row {self.rows[index]}"):
             return as_doubles(self._arrays[name][index])
 

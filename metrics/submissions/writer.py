@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 
 from metrics.measured.reader import Images, MeasuredFile, is_flat, open_images, padded_size, size_of
 from metrics.measures.alignment import Alignment
-from metrics.measures.answers import answers_from_scores
 from metrics.submissions import layout, rules
+from metrics.submissions.inspection import Inspection, take_values
 from metrics.submissions.problems import PredictionError, first_error, first_ids
 from scenegen.files.row_file import new_hdf5_file, writer_name
 from scenegen.files.rows import RowFile
@@ -220,7 +220,7 @@ class RoomPredictionWriter:
             expected = f"a row of {self._truth.path}, from 0 to {count - 1}"
             raise PredictionError(f"{self._path}: row", f"{row!r:.40}", expected)
         if self._written[row]:
-            raise PredictionError(f"{self._path}: row {row}", "it twice", "each row once")
+            raise PredictionError(f"{self._path}: row {row}", "the row twice", "each row once")
         return int(row)
 
     def _finish(self, file: h5py.File) -> None:
@@ -230,7 +230,7 @@ class RoomPredictionWriter:
             raise PredictionError(
                 f"{self._path}: row",
                 f"{len(missing)} of {len(self._written)} missing, such as {shown}",
-                "every one" if self._rows else "at least one",
+                "all rows" if self._rows else "at least one row",
                 "nothing was written",
             )
         assert self._table is not None, "a row was written"
@@ -296,18 +296,9 @@ def write_answers(
         if array is not None:
             many = None if column.name == "question" else len(ids)
             values[column.name] = _checked(column, array, str(path), many, {"answer": (offered,)})
-    problems = rules.value_problems("question", ids, ids, rules.Against(count))
-    if scores is not None and not problems:
-        problems = rules.value_problems("scores", values["scores"], ids)
-    if answer is not None and not problems:
-        of_scores = None if scores is None else answers_from_scores(values["scores"])
-        against = rules.Against(count, offered, of_scores)
-        problems = rules.value_problems("answer", np.asarray(answer), ids, against)
-    for name in ("outcome", "rotated"):
-        if name in values and not problems:
-            given = None if answer is None else np.asarray(answer)
-            against = rules.Against(count, offered, given)
-            problems = rules.value_problems(name, values[name], ids, against)
+    inspected = Inspection(task="iqtt", arrays=values)
+    take_values(inspected, rules.Against(count, offered))
+    problems = inspected.problems
     if problems:
         raise first_error(PredictionError, path, problems)
     with new_hdf5_file(path, overwrite) as file:

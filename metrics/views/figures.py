@@ -26,7 +26,7 @@ from metrics.scoring.records import Score, ScoreFile
 from metrics.submissions.reader import PredictedView, RoomPredictions, open_predictions
 from scenegen.common.errors import SceneGenError
 from scenegen.common.names import did_you_mean
-from scenegen.common.text_table import number, plain
+from scenegen.common.text_table import by_number, number, plain
 from scenegen.files.new_file import written_beside
 from scenegen.rooms.preview import srgb_bytes
 from scenegen.rooms.reader import radiance_of
@@ -120,7 +120,7 @@ def draw_groups(
     if not keys:
         place = f"{files[0].method}: {name} by {by}"
         raise FigureError(place, "no groups that all files have", "another --by or --metric")
-    keys.sort(key=_by_number)
+    keys = by_number(keys)
     floors = [_group_floor(files[0], by, key, name) for key in keys]
     with _figure(path, overwrite, width, 0.62 * width) as axes:
         for i, (group, label) in enumerate(zip(groups, labels_of(files), strict=True)):
@@ -344,11 +344,6 @@ def _words(by: str, task: str) -> str:
         what = {"kind": "shape" if task == "rooms" else "distractor type"}.get(by, "")
         what = what or "area in the image (percent)"
     return what
-
-
-def _by_number(key: str) -> tuple[float, str]:
-    first = key.split("-", maxsplit=1)[0]
-    return (float(first), key) if first.replace(".", "").isdigit() else (0.0, key)
 
 
 def load_matplotlib() -> Any:

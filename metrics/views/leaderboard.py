@@ -53,12 +53,12 @@ NOT_COMPARABLE = (
     " the file was scored without --truth"
 )
 BELOW = (
-    "methods below the baseline are not significantly better than it; they have no rank, and the"
-    " next column orders them"
+    "Methods below the baseline row are not significantly better than the baseline, so they have no"
+    " rank; the next column orders them."
 )
 SHARED = (
-    "methods share a rank if the 95% CI of their paired difference contains 0; bold: significantly"
-    " better than the next best method"
+    "Methods share a rank if the 95% CI of their paired difference contains 0. Bold scores are"
+    " significantly better than the next best."
 )
 VIEWS_SEEN = {
     "scored_view": "the scored view",
@@ -256,7 +256,8 @@ def _ranking(
     baselines = _baselines(first, [k for k in keys if not k.startswith(SKILL_OF)])
     baselines = {label: row for label, row in baselines.items() if row.keys() & set(keys)}
     skill = SKILL_OF + key.removeprefix(SKILL_OF)
-    line = next((label for label, row in baselines.items() if skill in row and not mute), "")
+    lines = (label for label, row in baselines.items() if skill in row or label == CHANCE)
+    line = "" if mute else next(lines, "")
     above = sum(map(bool, ranks))
     rows[above:above] = _unranked("baseline", [(line, baselines[line])] if line else [], keys)
     rows += _unranked("baseline", ((k, v) for k, v in baselines.items() if k != line), keys)
@@ -372,9 +373,15 @@ def _best(files: Sequence[ScoreFile], key: str) -> ScoreFile | None:
 
 
 def _beats_the_baseline(file: ScoreFile, key: str) -> bool:
-    """Return whether the interval of a score's skill lies above 0, or there is no baseline."""
-    skill = file.skills.get(key.removeprefix(SKILL_OF))
-    return skill is None or (skill.value if skill.low is None else skill.low) > 0.0
+    """Return whether the interval of a score's skill is above 0, or there is no baseline.
+
+    The baseline of questions is chance where no 2D-only baseline is known.
+    """
+    name, level = key.removeprefix(SKILL_OF), 0.0
+    score: Score | Skill | None = file.skills.get(name)
+    if score is None and name == "iqtt_accuracy":
+        score, level = file.metrics.get(name), 1.0 / file.meta.counts["answers"]
+    return score is None or (score.value if score.low is None else score.low) > level
 
 
 def _ranks(files: Sequence[ScoreFile], key: str) -> list[str]:
@@ -491,7 +498,7 @@ def _notes(files: Sequence[ScoreFile], key: str, below: Sequence[str]) -> Iterat
     skilled = next((file for file in files if file.skills), None)
     yield from () if skilled is None else skill_notes(skilled)
     yield f"[low, high]: {INTERVAL} over {first.unit}; ±: standard deviation over training runs"
-    yield "; ".join([SHARED, *below])
+    yield " ".join([SHARED, *below])
 
 
 def _same_request_notes(members: Sequence[ScoreFile], files: Sequence[ScoreFile]) -> Iterator[str]:

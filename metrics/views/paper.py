@@ -1,7 +1,14 @@
-"""The scores of the Pix2Shape paper, as printed and measured on the authors' data.
+"""The scores of the Pix2Shape paper, as printed and measured on the authors' data: `paper.csv`.
 
-They are Tables 1 to 4, the appendix's table with depth supervision and its figure on the weight of
-mutual information, whose points are those of the LaTeX source. Other tables have no scores.
+They are Tables 1 to 4, the appendix's table with depth supervision (9) and its figure on the weight
+of mutual information (17), whose points are those of the LaTeX source. Other tables have no scores.
+
+- Tables 1 and 2: distances on 2.5D surfels, MSE on depth maps. No Hausdorff distance of PTN is
+  printed in Table 2. Its text calls the multiple-shape scenes ShapeNet scenes.
+- Table 3: chance is 1/3. What ± stands for is not stated. People answered 20 questions each.
+- Table 4: the head names both losses L_ALI; the second is the reconstruction loss. All three losses
+  give 0.5526 and 0.7020, but 0.5519 and 0.7012 in Table 3.
+- Table 9: whence Hausdorff-F and -R go is not stated.
 
 Rajeswar, Mannan, Golemo, Parent-Lévesque, Vazquez, Nowrouzezahrai, Courville: Pix2Shape: Towards
 Unsupervised Learning of 3D Scenes from Images using a View-based Representation. IJCV 2020,
@@ -11,8 +18,11 @@ The authors' images and questions differ from those of any test set made here, a
 no unit of length, so no score made here ranks with these figures.
 """
 
+import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
 
 from metrics.scoring.records import ScoreFile
 from metrics.views.table import Cell, Table, make_table
@@ -48,105 +58,16 @@ class Figure:
     labels: int | None = None
 
 
-_SHAPES, _SHAPENET, _MULTIPLE = "Shape scenes", "ShapeNet scenes", "Multiple-shape scenes"
-_OTHERS = ("CNN", "Siamese CNN", "Human Evaluation", "Persp. Transf. Nets", "Rezende et al.")
-_ANGLES = (5, 35, 55, 80)
+def _read() -> Iterator[Figure]:
+    with Path(__file__).with_suffix(".csv").open(encoding="utf-8", newline="") as file:
+        for row in csv.DictReader(file):
+            told: dict[str, Any] = dict(row)
+            for name in ("table", "view_angle", "labels"):
+                told[name] = int(row[name]) if row[name] else None
+            yield Figure(**told)
 
 
-def _table_1() -> Iterator[Figure]:
-    """Yield scene reconstruction: distances on 2.5D surfels, MSE on depth maps."""
-    columns = [(method, data) for method in ("Pix2Shape", "PTN") for data in (_SHAPES, _SHAPENET)]
-    rows = {
-        "chamfer": "0.103 0.133 0.145 0.181",
-        "hausdorff": "0.191 0.215 0.229 0.254",
-        "mse_depth": "0.038 0.053 0.056 0.103",
-    }
-    for metric, texts in rows.items():
-        for (method, data), text in zip(columns, texts.split(), strict=True):
-            yield Figure(1, method, data, metric, text)
-
-
-def _table_2() -> Iterator[Figure]:
-    """Yield scene reconstruction for unseen views, by their angle from the original one.
-
-    No Hausdorff distance of PTN is printed. The text calls the multiple-shape scenes ShapeNet
-    scenes.
-    """
-    rows = (
-        ("Pix2Shape", "hausdorff", "0.156 0.191 0.189 0.202 0.308 0.355 0.329 0.316"),
-        ("Pix2Shape", "chamfer", "0.098 0.112 0.110 0.126 0.141 0.148 0.134 0.108"),
-        ("Pix2Shape", "mse_depth", "0.012 0.021 0.022 0.027 0.070 0.091 0.088 0.083"),
-        ("PTN", "chamfer", "0.143 0.189 0.219 0.202 0.174 0.293 0.334 0.387"),
-        ("PTN", "mse_depth", "0.066 0.112 0.142 0.157 0.083 0.1969 0.1982 0.190"),
-    )
-    columns = [(data, angle) for data in (_SHAPES, _MULTIPLE) for angle in _ANGLES]
-    for method, metric, texts in rows:
-        for (data, angle), text in zip(columns, texts.split(), strict=True):
-            yield Figure(2, method, data, metric, text, view_angle=angle)
-
-
-def _table_3() -> Iterator[Figure]:
-    """Yield 3D-IQTT. Chance is 1/3. What ± stands for is not stated. People answered 20 each."""
-    rows = {
-        0: "0.3385 0.3698 0.7329±0.148 0.5344 0.5202 0.5519±0.013",
-        200: "0.3350 0.3610 - 0.6011 0.6155 0.6312±0.031",
-        1000: "0.3392 0.3701 - 0.6645 0.7001 0.7012±0.021",
-    }
-    for labels, texts in rows.items():
-        for method, printed in zip((*_OTHERS, "Pix2Shape"), texts.split(), strict=True):
-            text, _, spread = printed.partition("±")
-            if text != "-":
-                yield Figure(3, method, "3D-IQTT", "iqtt_accuracy", text, spread, labels=labels)
-
-
-def _table_4() -> Iterator[Figure]:
-    """Yield the figures of five sets of losses.
-
-    Each set has Chamfer distances at four view angles on ShapeNet scenes, where the mutual
-    information loss plays no part, and accuracies without labels and with 1,000. The head names
-    both losses L_ALI; the second is the reconstruction loss. All three give 0.5526 and 0.7020 here,
-    0.5519 and 0.7012 in Table 3.
-    """
-    rows = (
-        ("adversarial loss", "1.927 2.341 2.350 2.281", "0.4024 0.4454"),
-        ("reconstruction loss", "0.1066 0.1935 0.201 0.1925", "0.3321 0.3789"),
-        ("adversarial and reconstruction loss", "0.1120 0.1522 0.1483 0.1433", "0.4224 0.4921"),
-        ("reconstruction and mutual information loss", "", "0.4943 0.6272"),
-        ("all three losses", "", "0.5526 0.7020"),
-    )
-    for losses, chamfers, accuracies in rows:
-        method = f"Pix2Shape, {losses}"
-        for angle, text in zip((0, *_ANGLES[1:]), chamfers.split(), strict=False):
-            yield Figure(4, method, _SHAPENET, "chamfer", text, view_angle=angle)
-        for labels, text in zip((0, 1000), accuracies.split(), strict=True):
-            yield Figure(4, method, "3D-IQTT", "iqtt_accuracy", text, labels=labels)
-
-
-def _table_9() -> Iterator[Figure]:
-    """Yield unseen views with depth supervision; whence Hausdorff-F and -R go is not stated."""
-    rows = {
-        "hausdorff_forward": "0.093 0.088 0.085 0.096 0.173 0.218 0.194 0.201",
-        "hausdorff_reverse": "0.081 0.100 0.108 0.112 0.221 0.243 0.238 0.254",
-        "mse_depth": "0.004 0.004 0.005 0.007 0.009 0.008 0.008 0.009",
-    }
-    columns = [(data, angle) for data in (_SHAPES, _MULTIPLE) for angle in _ANGLES]
-    for metric, texts in rows.items():
-        for (data, angle), text in zip(columns, texts.split(), strict=True):
-            yield Figure(9, "Pix2Shape, depth supervision", data, metric, text, view_angle=angle)
-
-
-def _figure_17() -> Iterator[Figure]:
-    """Yield the two lines on the weight of mutual information; that of 1.0 is Table 3's."""
-    rows = {0: "0.4075 0.4566 0.4853 0.5130 0.5519", 200: "0.4823 0.5427 0.5854 0.6001 0.6312"}
-    for labels, texts in rows.items():
-        for weight, text in zip(("0.1", "0.4", "0.6", "0.8", "1.0"), texts.split(), strict=True):
-            method = f"Pix2Shape, mutual information weighted {weight}"
-            yield Figure(17, method, "3D-IQTT", "iqtt_accuracy", text, labels=labels)
-
-
-FIGURES: tuple[Figure, ...] = (
-    *_table_1(), *_table_2(), *_table_3(), *_table_4(), *_table_9(), *_figure_17(),
-)  # fmt: skip
+FIGURES = tuple(_read())
 
 
 def figures_of(scores: ScoreFile) -> list[Figure]:

@@ -37,7 +37,6 @@ NO_BASELINE = (
     "no skill: no 2D-only baseline is known for these settings; measure it with `iqtt floors {}`,"
     " then score with --baselines floors.json"
 )
-OF_ROOMS = "no skill: docs/perspective.md has what 2D rules reach in questions about rooms"
 BY_KIND = "by distractor type"
 GROUP_TITLES = {
     "by_view_angle": "by angle to the first view of the scene, degrees",
@@ -357,8 +356,6 @@ def skill_notes(scores: ScoreFile, shown: Sequence[str] = ()) -> list[str]:
     if scores.task == "iqtt":
         if not scores.skills:
             known = bool(scores.by_distractor)
-            if {"moved", "swapped", "turned"} & scores.by_distractor.keys():
-                return [OF_ROOMS]
             missing = "no skill: the answer key has no settings, so no baseline is known"
             return [NO_BASELINE.format(plain(scores.meta.truth_path)) if known else missing]
         chance = f"chance is {1.0 / scores.meta.counts['answers']:.2f}"
@@ -409,7 +406,7 @@ def partner_sentences(scores: ScoreFile) -> list[str]:
     has_score, has_floor = (
         int(np.isfinite(scores.items[column]).sum()) for column in (name, OTHER_SCENE + name)
     )
-    why = "no other scene has the same view as the rest"
+    why = "no other scene has the view of the other images"
     text = f"skill of relief_iou covers {has_floor} of {has_score} images: {why}"
     return [text] * (has_floor < has_score)
 
@@ -423,7 +420,7 @@ def few_clusters(scores: ScoreFile) -> list[str]:
 
 def too_few_warning(count: int, units: str) -> list[str]:
     """Return a warning where a number of scenes or shapes is too small for intervals."""
-    text = f"{count} {units}: {CONFIDENCE:.0%} CIs under-cover below {FEW_CLUSTERS}"
+    text = f"{count} {units}: with fewer than {FEW_CLUSTERS}, {CONFIDENCE:.0%} CIs are too narrow"
     return [text] * (1 < count < FEW_CLUSTERS)
 
 

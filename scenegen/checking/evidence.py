@@ -100,13 +100,8 @@ def color_error(views: Sequence[View], pairs: Sequence[Pair]) -> float:
 
 def normal_error(views: Sequence[View]) -> float:
     """Return the median angle between normals and those of the depth, in degrees; NaN for none."""
-    return apart([normals_of_depth(view) for view in views])
-
-
-def apart(normals: Sequence[tuple[Array, Array]]) -> float:
-    """Return the median angle of pairs as from `normals_of_depth`, in degrees; NaN for none."""
     found = []
-    for given, expected in normals:
+    for given, expected in map(normals_of_depth, views):
         if len(expected) >= FEWEST:
             cosine = np.clip((given * expected).sum(axis=1), -1, 1)
             found.append(np.median(np.degrees(np.arccos(cosine))))

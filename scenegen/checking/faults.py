@@ -1,6 +1,6 @@
 """Known mistakes of folders: each is undone in turn, and named where that explains the evidence.
 
-A mistake explains a disagreement if at most BETTER of it remains once the mistake is undone. Data
+A mistake explains a disagreement if at most a share of it remains once the mistake is undone. Data
 that are right, noisy or of another quality do not get there. Several mistakes are found one after
 another.
 """
@@ -14,18 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.checking.evidence import (
-    Pair,
-    apart,
-    color_error,
-    normal_error,
-    normals_of_depth,
-)
 from scenegen.checking.views import View
 
 Array = NDArray[Any]
 Error = Callable[[Sequence[View]], float]
-Undo = Callable[[View], View]
 BETTER = 0.5  # share of a disagreement that may remain
 # The same of a principal point, between posed views: beside the steps in which depths are stored,
 # half a pixel of a large image is little.
@@ -40,11 +32,11 @@ UNITS = {
     1000.0: "millimetres for metres", 100.0: "centimetres for metres", 39.37: "inches for metres",
     3.2808: "feet for metres",
 }  # fmt: skip
-TURNS = [
+TURNS = np.array([
     np.eye(3)[list(order)] * np.array(signs)[:, None]
     for order in itertools.permutations(range(3))
     for signs in itertools.product((1.0, -1.0), repeat=3)
-]  # (48, 3, 3): permuted and flipped axes; the first changes nothing
+])  # (48, 3, 3): permuted and flipped axes; the first changes nothing  # fmt: skip
 PROPER = [turn for turn in TURNS if np.linalg.det(turn) > 0]
 NAMED = {
     "x -y -z": "y and z have the other sign (OpenGL's y up for OpenCV's y down, or the reverse)",
@@ -55,7 +47,7 @@ FLIPS = {  # by the axes of a map
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fault:
     """A mistake of a folder.
 
@@ -65,79 +57,110 @@ class Fault:
         size: factor of lengths or of the focal length, or pixels of the principal point; of
             distances how far they exceed the depth at most; () where it has none.
         text: in words.
+        undo: returns a view without the mistake.
+        better: share of the disagreement that may remain.
         before, after: the disagreement as given, and once the mistake is undone.
     """
 
     name: str
     size: tuple[float, ...]
     text: str
-    before: float
-    after: float
+    undo: Callable[[View], View]
+    better: float = BETTER
+    before: float = np.nan
+    after: float = np.nan
 
 
-@dataclass(frozen=True, eq=False)
-class _Guess:
-    name: str
-    size: tuple[float, ...]
-    text: str
-    undo: Undo
+Guesses = Callable[[Sequence[View], Error], Iterator[Fault]]
 
 
-def geometry_faults(
-    views: Sequence[View], error: Error, least: float
+def explained(
+    views: Sequence[View], error: Error, guesses: Guesses, least: float
 ) -> tuple[list[Fault], Sequence[View]]:
-    """Return the mistakes of depth and cameras that explain an error, and the views without.
+    """Return the mistakes that explain an error, and the views without them.
 
     An error of `least` or less is that of the steps in which values are stored.
     """
     found: list[Fault] = []
     while len(found) < MOST and (before := error(views)) > least:
-        tried = [
-            (guess, float(np.nan_to_num(error([guess.undo(v) for v in views]), nan=np.inf)))
-            for guess in _guesses(views, error)
-        ]
-        least = min(after for _, after in tried)
-        guess, after = next(one for one in tried if one[1] <= ALIKE * least)
-        is_shift = guess.name == "principal-point" and views[0].world_from_camera is not None
-        most = BETTER_SHIFT if is_shift else BETTER
-        if not after <= most * before or guess.name in {fault.name for fault in found}:
+        tried = []
+        for fault in guesses(views, error):
+            after = error([fault.undo(view) for view in views])
+            tried.append(
+                replace(fault, before=before, after=float(np.nan_to_num(after, nan=np.inf)))
+            )
+        lowest = min(fault.after for fault in tried)
+        best = next(fault for fault in tried if fault.after <= ALIKE * lowest)
+        if not best.after <= best.better * before or best.name in {f.name for f in found}:
             break
-        views = [guess.undo(view) for view in views]
-        found.append(Fault(guess.name, guess.size, guess.text, before, after))
+        views = [best.undo(view) for view in views]
+        found.append(best)
     return found, views
 
 
-def _guesses(views: Sequence[View], error: Error) -> Iterator[_Guess]:
+def of_geometry(views: Sequence[View], error: Error) -> Iterator[Fault]:
+    """Yield the mistakes that depth and cameras may have."""
     first = views[0]
     if first.depth is not None:
         far = float(first.stretch().max())
-        yield _Guess("distance", (far - 1,), "depth is the distance along the ray, up to"
-                     f" {far - 1:.1%} more than planar depth",
-                     lambda v: replace(v, depth=v.depth / v.stretch()))  # fmt: skip
-        yield _Guess("planar", (1 - 1 / far,), "depth is planar where distance along the ray is"
-                     " expected", lambda v: replace(v, depth=v.depth * v.stretch()))  # fmt: skip
+        yield Fault("distance", (far - 1,), "depth is the distance along the ray, up to"
+                    f" {far - 1:.1%} more than planar depth",
+                    lambda v: replace(v, depth=v.depth / v.stretch()))  # fmt: skip
+        yield Fault("planar", (1 - 1 / far,), "depth is planar where distance along the ray is"
+                    " expected", lambda v: replace(v, depth=v.depth * v.stretch()))  # fmt: skip
     for name, axis in (("mirrored", 1), ("upside-down", 0)):
-        yield _Guess(name, (), f"depth is {FLIPS[axis,]}", partial(_flipped, axis=axis))
-    if first.world_from_camera is not None:
-        for inverse in (False, True):
-            for turn in PROPER[not inverse :]:
-                text = f"poses are of cameras whose {_axes(turn)}"
-                if inverse:
-                    text = "poses are inverse (camera from world for world from camera, or reverse)"
-                undo = partial(_posed, turn=turn, inverse=inverse)
-                yield _Guess("poses", (), text, undo)
-        if factor := _factor(views, error, _in_unit, (1e-4, 1e4), 120):
-            unit = next((f", {text}" for f, text in UNITS.items()
-                         if abs(np.log(factor / f)) < 0.02), "")  # fmt: skip
-            text = f"depth has another unit than the poses: {factor:.4g} times theirs{unit}"
-            yield _Guess("unit", (factor,), text, partial(_in_unit, factor=1 / factor))
+        yield Fault(name, (), f"depth is {FLIPS[axis,]}", partial(_flipped, axis=axis))
+    posed = first.world_from_camera is not None
+    for inverse in (False, True) if posed else ():
+        for turn in PROPER[not inverse :]:
+            text = f"poses are of cameras whose {axes_text(turn)}"
+            if inverse:
+                text = "poses are inverse (camera from world for world from camera, or reverse)"
+            yield Fault("poses", (), text, partial(_posed, turn=turn, inverse=inverse))
+    if posed and (factor := _factor(views, error, _in_unit, (1e-4, 1e4), 120)):
+        unit = next((f", {text}" for f, text in UNITS.items()
+                     if abs(np.log(factor / f)) < 0.02), "")  # fmt: skip
+        text = f"depth has another unit than the poses: {factor:.4g} times theirs{unit}"
+        yield Fault("unit", (factor,), text, partial(_in_unit, factor=1 / factor))
     if factor := _factor(views, error, _focal, (0.4, 2.5), 40):
         text = f"the focal length is {factor:.4g} times that of the images"
-        yield _Guess("focal", (factor,), text, partial(_focal, factor=1 / factor))
+        yield Fault("focal", (factor,), text, partial(_focal, factor=1 / factor))
     x, y = _shift(views, error)
     if np.hypot(x, y) >= LEAST_SHIFT:
         text = f"the principal point is off by {x:+.2f}, {y:+.2f} pixels (right, down)"
-        yield _Guess("principal-point", (x, y), text, partial(_shifted, x=-x, y=-y))
+        better = BETTER_SHIFT if posed else BETTER
+        yield Fault("principal-point", (x, y), text, partial(_shifted, x=-x, y=-y), better)
+
+
+def of_normals(_views: Sequence[View], _error: Error) -> Iterator[Fault]:
+    """Yield the mistakes that normals may have."""
+    for axis in (1, 0):
+        for signs in (1, np.where(np.arange(3) == 1 - axis, -1, 1)):
+            undo = partial(_turned, turn=np.eye(3) * signs, axis=axis)
+            yield Fault("normals", (), f"normals are {FLIPS[axis,]}, and depth is not", undo)
+    for turn in TURNS:
+        text = f"normals are in another frame: {axes_text(turn)}"
+        yield Fault("normals", (), text, partial(_turned, turn=turn))
+        text = "normals are in the world frame, not in the camera's"
+        yield Fault("normals", (), text, partial(_turned, turn=turn, of_world=True))
+
+
+def of_images(_views: Sequence[View], _error: Error) -> Iterator[Fault]:
+    """Yield the mistakes that images may have."""
+    for axes, words in FLIPS.items():
+        text = f"images are {words}, and depth is not"
+        yield Fault("images", (), text, partial(_image_flipped, axes=axes), BETTER_COLORS)
+
+
+def axes_text(turn: Array) -> str:
+    """Return in words which axes of the right frame hold x, y and z."""
+    letters = axes_letters(turn)
+    return NAMED.get(letters, f"axes are {letters.replace(' ', ', ')}")
+
+
+def axes_letters(turn: Array) -> str:
+    """Return which axes hold x, y and z, and with which sign, such as "x -y -z"."""
+    return " ".join("-" * int(row.min() < 0) + "xyz"[int(np.abs(row).argmax())] for row in turn)
 
 
 def _flipped(view: View, axis: int) -> View:
@@ -156,12 +179,6 @@ def _posed(view: View, turn: Array, inverse: bool) -> View:
     return replace(view, world_from_camera=pose)
 
 
-def _axes(turn: Array) -> str:
-    """Return in words which axes of the right frame hold x, y and z."""
-    letters = " ".join("-" * int(row.min() < 0) + "xyz"[int(np.abs(row).argmax())] for row in turn)
-    return NAMED.get(letters, f"axes are {letters.replace(' ', ', ')}")
-
-
 def _in_unit(view: View, factor: float) -> View:
     """Return a view whose depth, or points, are so many times as large beside its pose."""
     pose = view.world_from_camera
@@ -177,6 +194,20 @@ def _focal(view: View, factor: float) -> View:
 
 def _shifted(view: View, x: float, y: float) -> View:
     return replace(view, matrix=view.matrix + np.array([[0, 0, x], [0, 0, y], [0, 0, 0]]))
+
+
+def _turned(view: View, turn: Array, axis: int | None = None, of_world: bool = False) -> View:
+    """Return a view with its normals in another frame, and flipped along an axis of the image."""
+    normal, pose = view.normal, view.world_from_camera
+    if normal is None or (of_world and pose is None):
+        return replace(view, normal=None)
+    if of_world and pose is not None:
+        turn = pose[:3, :3].T @ turn
+    return replace(view, normal=(normal if axis is None else np.flip(normal, axis)) @ turn.T)
+
+
+def _image_flipped(view: View, axes: tuple[int, ...]) -> View:
+    return view if view.image is None else replace(view, image=np.flip(view.image, axes))
 
 
 def _factor(
@@ -213,59 +244,3 @@ def _shift(views: Sequence[View], error: Error) -> tuple[float, float]:
             break
         x, y = best
     return -x, -y
-
-
-def normal_faults(views: Sequence[View]) -> tuple[list[Fault], float]:
-    """Return what is wrong with normals, and the error that remains; NaN without normals."""
-    before, tried = normal_error(views), dict[str, float]()
-    if not np.isfinite(before):
-        return [], before
-    for axis in (1, 0):
-        signs = np.where(np.arange(3) == 1 - axis, -1, 1)
-        flipped = _changed(views, "normal", partial(np.flip, axis=axis))
-        pairs = [normals_of_depth(view) for view in flipped]
-        errors = [apart([(n * s, expected) for n, expected in pairs]) for s in (signs, 1)]
-        tried[f"normals are {FLIPS[axis,]}, and depth is not"] = min(errors)
-    pairs = [normals_of_depth(view) for view in views]
-    poses = [view.world_from_camera for view in views]
-    for turn in TURNS:
-        turned = [(n @ turn.T, expected) for n, expected in pairs]
-        tried.setdefault(f"normals are in another frame: {_axes(turn)}", apart(turned))
-        turned = [
-            (n @ (pose[:3, :3].T @ turn).T, expected)
-            for (n, expected), pose in zip(pairs, poses, strict=True)
-            if pose is not None
-        ]
-        text = "normals are in the world frame, not in the camera's"
-        tried[text] = min(tried.get(text, np.inf), float(np.nan_to_num(apart(turned), nan=np.inf)))
-    return _best("normals", tried, before, BETTER)
-
-
-def _changed(views: Sequence[View], name: str, change: Callable[[Array], Array]) -> list[View]:
-    """Return views with another map of this name, where they have one."""
-    maps = [getattr(view, name) for view in views]
-    return [
-        view if values is None else replace(view, **{name: change(values)})
-        for view, values in zip(views, maps, strict=True)
-    ]
-
-
-def _best(
-    name: str, tried: dict[str, float], before: float, most: float
-) -> tuple[list[Fault], float]:
-    """Return the text whose error is the least, if that explains an error; and what remains."""
-    text, after = min(tried.items(), key=lambda one: one[1])
-    if not after <= most * before:
-        return [], before
-    return [Fault(name, (), text, before, after)], after
-
-
-def image_faults(views: Sequence[View], pairs: Sequence[Pair]) -> tuple[list[Fault], float]:
-    """Return what is wrong with images, and the error that remains; NaN for none."""
-    tried = {
-        f"images are {words}, and depth is not": color_error(
-            _changed(views, "image", partial(np.flip, axis=axes)), pairs
-        )
-        for axes, words in FLIPS.items()
-    }
-    return _best("images", tried, color_error(views, pairs), BETTER_COLORS)

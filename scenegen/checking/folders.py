@@ -3,13 +3,22 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from scenegen.checking.evidence import Pair, depth_error, normal_error, track_error
-from scenegen.checking.faults import Fault, geometry_faults, image_faults, normal_faults
+from scenegen.checking.evidence import Pair, color_error, depth_error, normal_error, track_error
+from scenegen.checking.faults import (
+    Error,
+    Fault,
+    Guesses,
+    explained,
+    of_geometry,
+    of_images,
+    of_normals,
+)
 from scenegen.checking.layouts import Scenes, reading, scenes_of
 from scenegen.checking.views import View
 from scenegen.common.errors import SpecError
@@ -18,26 +27,23 @@ from scenegen.files.verify import Check
 MOST_VIEWS = 24  # that are read, of scenes spread over the folder
 
 
-class _Kind(NamedTuple):
-    """A kind of evidence.
+class Evidence(NamedTuple):
+    """What is compared.
 
     Attributes:
         name, told: as the report has it, and how it tells a disagreement.
+        error: the disagreement of views; NaN where they have nothing to compare.
+        guesses: the mistakes that may explain it.
         least: disagreement that rounding explains.
         enough: disagreement that fails, whatever explains it.
     """
 
     name: str
     told: str
+    error: Error
+    guesses: Guesses
     least: float
     enough: float
-
-
-DEPTH = _Kind("depth of other views", "differs by {:.3%}", 0.0, 0.01)
-TRACKS = _Kind("observed points", "off by {:.2f} pixels", 0.05, 1.0)
-NORMALS = _Kind("normals and depth", "{:.1f} degrees apart", 0.5, 8.0)
-# Images may always differ, as surfaces shine.
-IMAGES = _Kind("images of other views", "1 - correlation of brightness is {:.2f}", 0.0, np.inf)
 
 
 @dataclass(frozen=True)
@@ -88,41 +94,50 @@ def check_views(
     views: Sequence[View], pairs: Sequence[Pair], where: str = "views"
 ) -> tuple[list[Fault], list[Check]]:
     """Cross-check views, of which pairs show the same scene. Raises SpecError as `check_folder`."""
+    faults: list[Fault] = []
+    checks: list[Check] = []
+    for kind in _evidence(views, pairs):
+        found, views = explained(views, kind.error, kind.guesses, kind.least)
+        rest, told = kind.error(views), kind.told.format
+        if not np.isfinite(rest) and checks:
+            continue
+        texts = [f"{f.text} ({told(f.before)}; undone, {told(f.after)})" for f in found]
+        if rest > kind.enough:
+            texts.append(f"{told(rest)}: no known fault, or views that hardly overlap")
+        checks.append(Check(kind.name, not texts, "; ".join(texts) or told(rest)))
+        faults += found
+    if not checks:
+        none = "neither two posed views of a scene with depth, nor normals, nor observed points"
+        raise SpecError(where, none, "something to compare")
+    return faults, checks
+
+
+def _evidence(views: Sequence[View], pairs: Sequence[Pair]) -> list[Evidence]:
+    """Return what can be compared in views; mistakes that an item finds are undone for the next."""
     posed = [
         v.depth is not None and np.isfinite(v.depth).any() and v.world_from_camera is not None
         for v in views
     ]
     pairs = [(i, j) for i, j in pairs if posed[i] and posed[j]]
-    has_normals = bool(np.isfinite(normal_error(views)))
-    faults: list[Fault] = []
+    normals = Evidence(
+        "normals and depth", "{:.1f} degrees apart", normal_error, of_normals, 0.5, 8
+    )
     if pairs:
-        kind, error = DEPTH, partial(depth_error, pairs=pairs)
-    elif all(view.points is not None for view in views):
-        kind, error = TRACKS, partial(track_error)
-    elif has_normals:
-        kind, error = NORMALS, partial(normal_error)
-        faults, rest = normal_faults(views)
-    else:
-        found = "neither two posed views of a scene with depth, nor normals, nor observed points"
-        raise SpecError(where, found, "something to compare")
-    if not faults:
-        faults, views = geometry_faults(views, error, kind.least)
-        rest = error(views)
-    checks = [_check(kind, faults, rest)]
-    if pairs and has_normals:
-        wrong, rest = normal_faults(views)
-        faults, checks = [*faults, *wrong], [*checks, _check(NORMALS, wrong, rest)]
-    if pairs:
-        wrong, rest = image_faults(views, pairs)
-        if np.isfinite(rest):
-            faults, checks = [*faults, *wrong], [*checks, _check(IMAGES, wrong, rest)]
-    return faults, checks
+        depth = partial(depth_error, pairs=pairs)
+        colors = partial(color_error, pairs=pairs)  # may always differ, as surfaces shine
+        told = "1 - correlation of brightness is {:.2f}"
+        return [
+            Evidence("depth of other views", "differs by {:.3%}", depth, of_geometry, 0.0, 0.01),
+            normals,
+            Evidence("images of other views", told, colors, of_images, 0.0, np.inf),
+        ]
+    if all(view.points is not None for view in views):
+        told = "off by {:.2f} pixels"
+        return [Evidence("observed points", told, track_error, of_geometry, 0.05, 1.0)]
+    if not np.isfinite(normal_error(views)):
+        return []
 
+    def all_of(views: Sequence[View], error: Error) -> chain[Fault]:
+        return chain(of_normals(views, error), of_geometry(views, error))
 
-def _check(kind: _Kind, faults: Sequence[Fault], rest: float) -> Check:
-    """Return the outcome of a kind of evidence; `rest` is the disagreement that remains."""
-    told = kind.told.format
-    texts = [f"{f.text} ({told(f.before)}; undone, {told(f.after)})" for f in faults]
-    if rest > kind.enough:
-        texts.append(f"{told(rest)}: no known fault, or views that hardly overlap")
-    return Check(kind.name, not texts, "; ".join(texts) or told(rest))
+    return [normals._replace(guesses=all_of)]

@@ -19,12 +19,12 @@ from scipy.spatial.transform import Rotation
 from scenegen.checking.views import Load, View
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.files.pictures import opened_picture, read_picture
+from scenegen.rooms.export.moge import log_depth
 
 Array = NDArray[Any]
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])  # from y up and z back to y down and z forward
 HALF = np.array([[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])  # from pixel centres at 0 to those at 0.5
 MOST_PIXELS = 2**26
-MOGE_STEPS, MOGE_INFINITE = 65533, 65535
 HYPERSIM_FOCAL = 886.81 / 1024  # of the width
 WRONG = (KeyError, TypeError, ValueError, IndexError)  # what readers of broken files meet
 Scenes = list[list[Load]]
@@ -192,13 +192,10 @@ def moge(paths: list[Path]) -> Scenes:
 
 def _of_moge(folder: Path) -> View:
     codes, about = _codes(folder / "depth.png")
-    near, far, codes = float(about["near"]), float(about["far"]), codes.astype(float)
-    depth = near * (far / near) ** ((codes - 1) / MOGE_STEPS)
-    known = (codes > 0) & (codes < MOGE_INFINITE)
     height, width = codes.shape
     return View(
         np.array(_json(folder / "meta.json")["intrinsics"]) * [[width], [height], [1]],
-        depth=np.where(known, depth, np.nan),
+        depth=log_depth(codes, about),
         normal=_normal(folder / "normal.png"),
         image=_image(folder / "image.jpg"),
     )

@@ -65,7 +65,7 @@ class PackageCommands(click.Group):
         """Refuse arguments that no file could hold, before anything is done with them."""
         for text in args:
             if re.search("[\0\ud800-\udfff]", text):
-                raise UserError(f"argument {text}: found bytes that are not UTF-8, expected text")
+                raise UserError(f"argument {text}: it holds bytes that are not UTF-8 text")
         return super().parse_args(ctx, args)
 
     def invoke(self, ctx: click.Context) -> Any:
@@ -121,7 +121,12 @@ def _one_line_errors() -> Iterator[None]:
         text = re.sub(r"Invalid value for '\{[^']*\}': ", "", text) + _spelled_alike(error)
         raise click.UsageError(UserError(text).message, error.ctx) from error
     except OSError as error:
+        from scenegen.files.sets.making import CompleteError
+
         where = f"{error.filename}: " if error.filename else ""
+        if isinstance(error, CompleteError):  # nothing is left to do, so the exit code is 0
+            print_line(f"{where}{error.strerror}")
+            return
         raise UserError(f"{where}{error.strerror or error}") from error
     except ImportError as error:
         if "map segment" not in str(error) and "allocate memory" not in str(error):

@@ -160,7 +160,7 @@ class Reflectance(Color):
 
 # fmt: off
 WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
-                       show_default="one a processor, up to 16",
+                       show_default="one per processor, up to 16",
                        help="Rendering processes. Each uses about 0.4 GiB of memory, or 1.3 GiB for"
                        " interiors.")
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS",

@@ -17,7 +17,7 @@ def check(ctx: click.Context, folder: str) -> None:
 
     Layouts are nerfstudio, COLMAP (text), BOP, MoGe and Hypersim. Known faults are named with their
     size: distance along the ray for planar depth, wrong focal length, principal point or unit,
-    inverse poses, wrong axes, mirrored maps. Exits with 1 if something disagrees.
+    inverse poses, wrong axes, mirrored maps. The exit code is 1 if there is a fault.
     """
     from scenegen.checking.folders import check_folder
 

@@ -57,8 +57,8 @@ def check_objects(
     """Read and clean every mesh of a folder, as `scenegen render` does.
 
     FOLDER is ShapeNetCore, or has one sub-folder per category. The command prints counts per
-    category and the reason why a mesh is refused. Exits with 1 if no mesh is usable, or if two
-    splits share an object.
+    category and the reason why a mesh is refused. The exit code is 1 if no mesh is usable, or if
+    two splits share an object.
     """
     from scenegen.files.new_file import check_writable, write_text
     from scenegen.objects.cache import default_cache_dir

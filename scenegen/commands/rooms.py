@@ -96,7 +96,7 @@ def verify(
 
     Images that are rendered again must agree bit for bit, or within a stated tolerance if other
     versions of Mitsuba, Dr.Jit or LLVM rendered the file. A file without ground truth is checked
-    for its content hashes only. Exits with 1 if a check fails.
+    for its content hashes only. The exit code is 1 if a check fails.
     """
     from scenegen.objects.sources import file_objects
     from scenegen.rendering.pictures.places import ASSETS as PLACES
@@ -125,7 +125,9 @@ def _check_images(path: Path, spec: "Request") -> None:
 
     if isinstance(spec, InteriorSpec):
         if spec.denoise and not has_denoiser():
-            raise BackendError(f"{path}: images", "denoised, and no denoiser here", hint=NEEDED)
+            raise BackendError(
+                f"{path}: images", "they are denoised, and no denoiser is installed", hint=NEEDED
+            )
         materials_of(spec)
         environment_of(spec)
 
@@ -171,7 +173,8 @@ def _check_images(path: Path, spec: "Request") -> None:
 @click.option(
     "--out",
     type=OutputFolder(),
-    help="Output folder [. for exr, png, ply and obj; else a new one, such as rooms-parquet].",
+    help="Output folder [the current folder for exr, png, ply and obj; else a new folder, such as"
+    " rooms-parquet].",
 )
 @click.option(
     "--rows-per-file",

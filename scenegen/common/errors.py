@@ -13,7 +13,7 @@ class SceneGenError(ValueError):
 
     Attributes:
         where: the file, row, setting or option that is wrong, such as `rooms.h5: depth, row 3`.
-        found: what was found; empty if `where` suffices.
+        found: what was found, or what happened; empty if `where` suffices.
         expected: what was expected instead.
         hint: what the user can do about it.
     """
@@ -27,8 +27,11 @@ class SceneGenError(ValueError):
         super().__init__(self.where, self.found, self.expected, self.hint)
 
     def __str__(self) -> str:
-        """Return `where: found ..., expected ...; hint` without the parts that are empty."""
-        found = f"found {self.found}" if self.found else ""
+        """Return `where: found ..., expected ...; hint` without the parts that are empty.
+
+        Where nothing is expected, `found` tells what happened, and stands alone.
+        """
+        found = f"found {self.found}" if self.found and self.expected else self.found
         expected = f"expected {self.expected}" if self.expected else ""
         what = ", ".join(part for part in (found, expected) if part)
         text = f"{self.where}: {what}" if what else self.where

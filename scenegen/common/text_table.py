@@ -8,6 +8,8 @@ import math
 import unicodedata
 from collections.abc import Iterable, Sequence
 
+from tabulate import tabulate
+
 NOTHING = 1e-9  # what is smaller comes from rounding
 DIGITS = 4  # significant digits of a score
 LONGEST = 60  # characters of a name
@@ -106,18 +108,8 @@ def with_interval(value: float, low: float | None, high: float | None) -> tuple[
 
 def aligned(rows: Rows) -> list[str]:
     """Return rows of equal length as lines whose columns are aligned in a terminal."""
-    widths = [max(map(_width, column)) for column in zip(*rows, strict=True)]
-    return [
-        "  ".join(
-            cell + " " * (width - _width(cell)) for cell, width in zip(row, widths, strict=True)
-        ).rstrip()
-        for row in rows
-    ]
-
-
-def _width(text: str) -> int:
-    wide = sum(unicodedata.east_asian_width(c) in "WF" for c in text)
-    return len(text) + wide - sum(unicodedata.combining(c) > 0 for c in text)
+    text = tabulate(rows, tablefmt="plain", disable_numparse=True, preserve_whitespace=True)
+    return [line.rstrip() for line in text.splitlines()]
 
 
 def piped(rows: Rows) -> list[str]:

@@ -51,8 +51,6 @@ class Interior:
         hour: of the day, 0 to 24, which gives the height of the sun.
         facing_degrees: where the sun stands at noon: 0 towards -z, 90 towards +x.
         lit: whether lamps and the ceiling light are on.
-        mirrored: whether the west wall has the surface of the east wall, and that the other one, as
-            in the mirror image of a room. It is left out of the JSON of other rooms.
     """
 
     size: Vector3
@@ -61,11 +59,8 @@ class Interior:
     hour: float
     facing_degrees: float
     lit: bool
-    mirrored: bool = False
 
     def __post_init__(self) -> None:
-        if not self.mirrored:
-            object.__delattr__(self, "mirrored")  # the class has it
         check(len(self.size) == 3 and min(self.size) > 0, "room size", self.size, "three lengths")
         count = len(self.stands_on)
         ok = all(0 <= on <= count and on != k for k, on in enumerate(self.stands_on, start=1))

@@ -38,7 +38,7 @@ def exr_channels(path: Path, most: int) -> dict[str, Array]:
         raise
     except Exception as error:  # the library raises what it meets
         reason = " ".join(str(error).split())
-        raise FileFormatError(path, f"a file that cannot be read ({reason:.120})") from error
+        raise FileFormatError(path, f"cannot be read ({reason:.120})") from error
 
 
 def layers_of(channels: Mapping[str, Array], names: Sequence[str]) -> dict[str, list[str]]:

@@ -59,7 +59,7 @@ def opened_picture(source: Path | IO[bytes], most: int) -> "Iterator[Image]":
         if isinstance(error, SceneGenError) or (isinstance(error, OSError) and error.filename):
             raise
         reason = " ".join(str(error).split())
-        raise FileFormatError(where, f"an unreadable image ({reason:.120})") from error
+        raise FileFormatError(where, f"cannot be read ({reason:.120})") from error
 
 
 def picture_size(path: Path, most: int) -> tuple[int, int]:

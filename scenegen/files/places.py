@@ -133,7 +133,7 @@ def upload(file: Path, place: Path) -> None:
         with file.open("rb") as ours, place.open("rb") as theirs:
             same = _digest(ours) == _digest(theirs)
     if not same:
-        raise OSError(errno.EIO, "the store gives other bytes back than it was sent", str(place))
+        raise OSError(errno.EIO, "the store returned other bytes than were uploaded", str(place))
 
 
 def _digest(file: Any) -> bytes:

@@ -222,24 +222,17 @@ def chosen_rows(index: Any, count: int) -> int | list[int]:
 
     Raises IndexError for a row beyond the file, and TypeError for what is no index.
     """
-    rows = range(count)
+    every = np.arange(count)
     if isinstance(index, slice):
-        return list(rows[index])
-    if isinstance(index, (list, tuple, np.ndarray)):
-        numbers = np.asarray(index if len(index) else np.empty(0, int))
-        if numbers.dtype == bool and numbers.shape == (count,):
-            numbers = np.flatnonzero(numbers)
-        if numbers.ndim == 1 and numbers.dtype.kind in "iu":
-            return [rows[number] for number in numbers.tolist()]
-        message = f"rows are chosen by whole numbers, not by an array of {numbers.dtype}"
-        raise IndexError(f"{message} with the shape {numbers.shape}")
-    if isinstance(index, bool | np.bool_) or not hasattr(index, "__index__"):
-        message = f"a row is a whole number, a slice or a list of them, not {type(index).__name__}"
-        raise TypeError(message)
-    row = operator.index(index)
-    if not -count <= row < count:
-        raise IndexError(f"row {row} of {count} rows")
-    return rows[row]
+        return list(range(count)[index])
+    if not isinstance(index, (list, tuple, np.ndarray)):
+        if isinstance(index, bool | np.bool_):
+            raise TypeError("a row is a whole number, a slice or a list of them, not a bool")
+        return int(every[operator.index(index)])
+    rows = every[np.asarray(index if len(index) else np.empty(0, int))]
+    if rows.ndim != 1:
+        raise IndexError(f"rows are chosen by a list of numbers, not of the shape {rows.shape}")
+    return [int(row) for row in rows]
 
 
 class RowBlock:

@@ -229,7 +229,12 @@ class RoomsFile(RowFile):
         if not self.has_truth and name in {c.name for c in columns(self.spec)} - {*WITHOUT_TRUTH}:
             beside = f"{self.path.stem}-truth{self.path.suffix}"
             hint = f"it is in the file with the ground truth, such as {beside}"
-            raise FileFormatError(f"{self.path}: {name}", "rooms without ground truth", "it", hint)
+            raise FileFormatError(
+                f"{self.path}: {name}",
+                "rooms without ground truth",
+                "a file with ground truth",
+                hint,
+            )
         super().check_field(name)
 
     def stereo(self, row: int) -> StereoPair:

@@ -13,7 +13,6 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from baselines.training.checkpoint import check_numbers
-from baselines.training.processes import BatchNorm1d, BatchNorm2d
 from scenegen.common.errors import SpecError
 from scenegen.common.names import check_choice
 from scenegen.common.records import check
@@ -126,7 +125,7 @@ class ConditionalNorm(nn.Module):
 
     def __init__(self, channels: int, condition: int, hidden: int = 64) -> None:
         super().__init__()
-        self.norm = BatchNorm2d(channels, affine=condition == 0)
+        self.norm = nn.BatchNorm2d(channels, affine=condition == 0)
         self.affine: nn.Module | None = None
         if condition:
             last = nn.Linear(hidden, 2 * channels)
@@ -173,7 +172,7 @@ class Encoder(nn.Module):
         self.layers = nn.ModuleList(nn.Conv2d(a, b, 4, 2, 1) for a, b in pairs)
         self.norms = nn.ModuleList(ConditionalNorm(b, spec.condition) for b in widths[:-1])
         self.last = nn.Conv2d(widths[-1], spec.z, 4)
-        self.standard = BatchNorm1d(spec.z, affine=False) if spec.standardised else nn.Identity()
+        self.standard = nn.BatchNorm1d(spec.z, affine=False) if spec.standardised else nn.Identity()
         self.activation = nn.LeakyReLU(SLOPE)
 
     def forward(self, image: Tensor, condition: Tensor, rays: Tensor | None = None) -> Tensor:

@@ -14,7 +14,6 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 from baselines.pix2shape.network.architecture import NetworkSpec, finished
-from baselines.training.processes import BatchNorm1d, BatchNorm2d
 
 CHANNELS = (256, 512, 1024)  # at an angle in 2, 4 and 8; multiplied by the width
 BRIGHT = 0.99  # a pixel of at least this radiance in all channels counts as background
@@ -56,7 +55,7 @@ class RoundConv(nn.Module):
     def __init__(self, before: int, after: int, stride: int) -> None:
         super().__init__()
         self.layer = nn.Conv2d(before, after, 4 if stride == 2 else 3, stride, (0, 1), bias=False)
-        self.norm = BatchNorm2d(after)
+        self.norm = nn.BatchNorm2d(after)
 
     def forward(self, values: Tensor) -> Tensor:
         """(B, before, A, R) -> (B, after, A / stride, R / stride), normalised."""
@@ -99,10 +98,10 @@ class PolarEncoder(nn.Module):
         )
         rings = widths[-1] * (3 * spec.size // 64)
         hidden = 2 * widths[-1]
-        self.hidden, self.norm = nn.Linear(rings, hidden), BatchNorm1d(hidden)
+        self.hidden, self.norm = nn.Linear(rings, hidden), nn.BatchNorm1d(hidden)
         self.last = nn.Linear(hidden, spec.z_scene)
         self.view = nn.Linear(rings * spec.size // 8, spec.z_view) if spec.z_view else None
-        self.standard = BatchNorm1d(spec.z, affine=False) if spec.standardised else nn.Identity()
+        self.standard = nn.BatchNorm1d(spec.z, affine=False) if spec.standardised else nn.Identity()
 
     def forward(self, image: Tensor, _condition: Tensor) -> Tensor:
         """(B, 3, S, S), (B, 0) -> (B, z)."""

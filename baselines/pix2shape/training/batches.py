@@ -1,6 +1,6 @@
 """The batches that training reads, each determined by its number alone.
 
-So training can go on where it was stopped, and every process can take its share of a batch.
+So training can go on where it was stopped.
 """
 
 import re
@@ -19,8 +19,8 @@ from baselines.pix2shape.images import Batch, QuestionImages, RoomImages
 from baselines.pix2shape.matching import matched_rows, relief_of_rows
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.training.data import Opened
+from baselines.training.fit import TrainingError
 from baselines.training.images import Draws
-from baselines.training.processes import LostProcessError, processes, share
 from baselines.training.rooms import read_rooms
 from baselines.training.streams import Block, Shown
 from iqtt import SplitSpec
@@ -93,7 +93,7 @@ def _collated(items: list[Any]) -> Any:
 
 @contextmanager
 def readers_kept() -> Iterator[None]:
-    """Raise LostProcessError where a process that reads data for the block ended, as if killed.
+    """Raise TrainingError where a process that reads data for the block ended, as if killed.
 
     torch tells of it in a signal handler, which may interrupt the block anywhere.
     """
@@ -105,7 +105,7 @@ def readers_kept() -> Iterator[None]:
             raise
         message = "that a data loading process exited, possibly out of memory"
         hint = "`--resume` continues from a checkpoint; `--workers 0` uses no such processes"
-        raise LostProcessError("training", message, hint=hint) from error
+        raise TrainingError("training", message, hint=hint) from error
 
 
 def image_batches(
@@ -113,16 +113,15 @@ def image_batches(
 ) -> Iterator[Batch]:
     """Yield batches of images without end, beginning with those of iteration `first`.
 
-    Where no loss is of them, they are for pictures, and every process gets them whole.
+    Where no loss is of them, they are for pictures.
     """
     source, size = sources.images, sources.batch_size(config)
-    rows = share(size) if config.uses_images else slice(None)
+    before = first * config.batches_per_iteration
     if sources.shown is not None:
-        before = first * config.batches_per_iteration
-        for streamed, items in _streamed(sources.shown, config, before, size, rows, workers):
+        for streamed, items in _streamed(sources.shown, config, before, size, workers):
             yield streamed.as_batch(items)
         return
-    draws = Draws(len(source), size, config.seed, first * config.batches_per_iteration, rows)
+    draws = Draws(len(source), size, config.seed, before)
     for items in _loaded(source, draws, workers):
         yield source.as_batch(items)
 
@@ -132,24 +131,20 @@ def question_batches(
 ) -> Iterator[tuple[Batch, Tensor]]:
     """Yield the questions whose codes are compared, and their answers, as `image_batches`.
 
-    The answer is -1 for a question without a label. Of each batch, labelled questions first, this
-    process gets its share, which may hold questions of one kind only.
+    The answer is -1 for a question without a label; labelled questions come first.
     """
     source, labelled = sources.images, sources.labelled
     with_label, without = sources.question_sizes(config)
-    rows = share(with_label + without)
     if sources.shown is not None and without:
-        for streamed, items in _streamed(sources.shown, config, first, without, rows, workers):
+        for streamed, items in _streamed(sources.shown, config, first, without, workers):
             yield streamed.as_batch(items), torch.full((len(items["image"]),), -1)
         return
-    answered = slice(min(rows.start, with_label), min(rows.stop, with_label))
-    others = slice(max(rows.start - with_label, 0), max(rows.stop - with_label, 0))
     streams = []
-    if labelled is not None and answered.start < answered.stop:
-        draws = Draws(sources.labels, with_label, config.seed, first, answered)
+    if labelled is not None and with_label:
+        draws = Draws(sources.labels, with_label, config.seed, first)
         streams.append(_loaded(labelled, draws, workers if config.labelled_batch else 0))
-    if others.start < others.stop:
-        draws = Draws(len(source), without, config.seed, first, others)
+    if without:
+        draws = Draws(len(source), without, config.seed, first)
         streams.append(
             {**items, "answer": torch.full((len(items["image"]),), -1)}
             for items in _loaded(source, draws, workers)
@@ -168,17 +163,15 @@ def streamed_source(block: Block, config: ModelConfig) -> RoomImages | QuestionI
 
 
 def _streamed(
-    shown: Shown, config: ModelConfig, before: int, size: int, rows: slice, workers: int
+    shown: Shown, config: ModelConfig, before: int, size: int, workers: int
 ) -> Iterator[tuple[RoomImages | QuestionImages, dict[str, Tensor]]]:
-    """Yield batch after batch of streams, and its source; `rows` of each are this process's.
+    """Yield batch after batch of streams, and its source.
 
     Args:
         before: batches that were shown before.
     """
-    count = shown.whole(len(range(size)[rows]))
-    alone = {} if rows.stop is not None else {"rank": 0, "world_size": 1}
-    before *= count if alone else count * processes()
-    for block in shown.blocks(before, count, workers, **alone):
+    count = shown.whole(size)
+    for block in shown.blocks(before * count, count, workers):
         source = streamed_source(block, config)
         if config.matching and isinstance(source, RoomImages):
             rooms = read_rooms([source.opened.file], config.networks.size)

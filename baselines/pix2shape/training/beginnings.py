@@ -52,8 +52,10 @@ def new_run(
     for name in chosen:
         value, needed = (functools.reduce(getattr, name.split("."), c) for c in (config, suited))
         if value != needed:
-            hint = f"leave it out: {data.where}, with {labels} labels, decides it or has no use"
-            raise SpecError(name, value, "nothing", hint)
+            hint = (
+                f"leave it out: {data.where}, with {labels} labels, decides it or does not use it"
+            )
+            raise SpecError(name, f"{value} has no effect here", hint=hint)
     sources = _sources(files, suited, labels, shown)
     card = Card(
         "pix2shape",
@@ -96,7 +98,7 @@ def _tables(
         more = NEIGHBOURS if config.matching and not data.hold_questions else {}
         shown = data.shown(config.networks.size, config.seed, **more)
         rows = shown.whole(FIRST)
-        block: Any = next(shown.blocks(0, rows, workers=0, rank=0, world_size=1))
+        block: Any = next(shown.blocks(0, rows, workers=0))
         return (block, block) if data.hold_questions else block, shown
     if not data.hold_questions:
         return only(data.rooms(), "pix2shape"), None

@@ -3,10 +3,6 @@
 Most are the paper's: Pix2Shape (IJCV 2020), sections "Bi-Directional Adversarial Training",
 "Unsupervised Training" and "Semi-supervised Training for Classification". Two are our own,
 `absolute_loss` and `contrast_loss`; docs/pix2shape.md says why.
-
-Where several processes share a batch, the average of what they return is the loss of the whole
-batch. Means over images are given each process's own images. `mutual_information`, `question_loss`
-and `contrast_loss` need the codes of the whole batch.
 """
 
 import math

@@ -4,9 +4,6 @@
 follow Pix2Shape (IJCV 2020), Algorithm 1 and equations "rec_loss" and "app-loss". A loss whose
 weight is 0 is neither computed nor reported.
 
-Where several processes share a batch, each calls a step with its own images, and the average of
-what they return, and of its gradients, is that of one process with all images.
-
 `Iterations` has the steps of each iteration, for questions those of Algorithm 1; docs/pix2shape.md
 lists the differences.
 """
@@ -18,7 +15,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor, nn
 
-from baselines.pix2shape.images import Batch, QuestionImages, turned
+from baselines.pix2shape.images import Batch, turned
 from baselines.pix2shape.network.architecture import CAMERA
 from baselines.pix2shape.network.config import ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape, shaded
@@ -26,10 +23,8 @@ from baselines.pix2shape.training import losses
 from baselines.pix2shape.training.batches import Sources, image_batches, question_batches
 from baselines.training.fit import Loss
 from baselines.training.images import mapped
-from baselines.training.processes import gathered, processes, share, summed
 from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_seed
-from scenegen.common.records import check
 
 Numbers = dict[str, Tensor]
 Questions = tuple[Batch, Tensor]  # images, and which answers are right
@@ -37,15 +32,15 @@ Questions = tuple[Batch, Tensor]  # images, and which answers are right
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """The random numbers of one step on B images, of which this process has B / N.
+    """The random numbers of one step on B images.
 
     Attributes:
-        code: standard normal, (B / N, z).
-        share: uniform in 0..1, (B / N,); where the gradient penalty is taken.
-        order: a permutation of the whole batch, (B,).
+        code: standard normal, (B, z).
+        share: uniform in 0..1, (B,); where the gradient penalty is taken.
+        order: a permutation of the batch, (B,).
         turn: of the compared questions' images, of which there are C, the angles by which they are
-            turned, radians, (C / N,).
-        mirror: which of them are mirrored first, (C / N,), all of a question or none.
+            turned, radians, (C,).
+        mirror: which of them are mirrored first, (C,), all of a question or none.
     """
 
     code: Tensor
@@ -60,22 +55,21 @@ class Noise:
 
 
 def draw(images: int, z: int, seed: int, questions: int = 0, each: int = 0) -> Noise:
-    """Return the noise of a seed, the same for every device and however many processes share it.
+    """Return the noise of a seed, the same for every device.
 
     Args:
-        images: how many images the whole batch has.
+        images: how many images the batch has.
         z: length of a code.
         seed: of all numbers.
-        questions, each: how many questions are compared in all, and images in each.
+        questions, each: how many questions are compared, and images in each.
     """
     source = torch.Generator().manual_seed(seed)
-    mine, compared = share(images), share(questions * each)
     return Noise(
-        torch.randn(images, z, generator=source)[mine],
-        torch.rand(images, generator=source)[mine],
+        torch.randn(images, z, generator=source),
+        torch.rand(images, generator=source),
         torch.randperm(images, generator=source),
-        2 * torch.pi * torch.rand(questions * each, generator=source)[compared],
-        (torch.rand(questions, generator=source) < 0.5).repeat_interleave(each)[compared],
+        2 * torch.pi * torch.rand(questions * each, generator=source),
+        (torch.rand(questions, generator=source) < 0.5).repeat_interleave(each),
     )
 
 
@@ -129,7 +123,7 @@ def generator_step(
         if config.depth and batch.depth is not None:
             surface = torch.isfinite(batch.depth)
             wrong = torch.where(surface, depth - torch.where(surface, batch.depth, 0), 0)
-            numbers["depth"] = summed((wrong**2).sum()) / summed(surface.sum()).clamp(min=1)
+            numbers["depth"] = (wrong**2).sum() / surface.sum().clamp(min=1)
     if config.adversarial or config.code_reconstruction:
         made = model.image(noise.code, views)
         if config.adversarial:
@@ -170,13 +164,13 @@ def _question_losses(model: Pix2Shape, images: Batch, answers: Tensor) -> Number
     """Return the losses that compare the images of questions, by name."""
     config, numbers = model.config, Numbers()
     code = model.encode(images.image, images.views)
-    scene, whole = gathered(code[:, : config.networks.z_scene]), gathered(answers)
-    codes, labelled = scene.view(len(whole), -1, scene.shape[1]), whole >= 0
+    scene = code[:, : config.networks.z_scene]
+    codes, labelled = scene.view(len(answers), -1, scene.shape[1]), answers >= 0
     if config.questions and labelled.any():
-        numbers["questions"] = losses.question_loss(codes[labelled], whole[labelled])
+        numbers["questions"] = losses.question_loss(codes[labelled], answers[labelled])
     if config.contrast:
         numbers["contrast"] = losses.contrast_loss(
-            codes, whole, config.temperature, config.hard_negatives, config.easy_negatives
+            codes, answers, config.temperature, config.hard_negatives, config.easy_negatives
         )
     return numbers
 
@@ -189,7 +183,7 @@ def _compared(config: ModelConfig, image: Tensor, again: Tensor) -> Tensor:
 
 def _information(model: Pix2Shape, code: Tensor, order: Tensor) -> Tensor:
     """Return the mutual information of z_scene and z_view in codes."""
-    code, end = gathered(code), model.config.networks.z_scene
+    end = model.config.networks.z_scene
     return losses.mutual_information(model.statistics, code[:, :end], code[:, end:], order)
 
 
@@ -225,18 +219,17 @@ class Iterations:
         model, config = self._model, self._model.config
         device = next(model.parameters()).device
         questions = next(self._questions, None)
-        count, each = 0, 0  # questions that all processes compare, and images in each
+        count, each = 0, 0  # questions that are compared, and images in each
         if questions is not None:
             images, answers = questions[0].to(device), questions[1].to(device)
             questions = images, answers
-            count, each = len(answers) * processes(), len(images.image) // len(answers)
+            count, each = len(answers), len(images.image) // len(answers)
         for turn in range(config.batches_per_iteration):
             batch = self.batch = next(self._images).to(device)
             seed = item_seed(
                 config.seed, number * config.batches_per_iteration + turn, Purpose.TRAINING
             )
-            whole = len(batch.image) * (processes() if config.uses_images else 1)
-            noise = draw(whole, config.networks.z, seed, count, each).to(device)
+            noise = draw(len(batch.image), config.networks.z, seed, count, each).to(device)
             compared = questions
             if config.turned and questions is not None:
                 compared = turned(questions[0], noise.turn, noise.mirror), questions[1]
@@ -249,19 +242,10 @@ class Iterations:
         yield Loss(total, numbers, "generator")
 
 
-def check_request(model: Pix2Shape, sources: Sources, count: int) -> None:
-    """Raise SpecError where a `count` of processes cannot train so.
-
-    No loss is switched on, or none that teaches what the model shall learn; or the processes cannot
-    share a batch evenly.
-    """
-    config, questions = model.config, isinstance(sources.images, QuestionImages)
+def check_request(model: Pix2Shape, sources: Sources) -> None:
+    """Raise SpecError where no loss is switched on that teaches what the model shall learn."""
+    config = model.config
     compared = sum(sources.question_sizes(config))
-    images = sources.batch_size(config) if config.uses_images else 0
-    for size in (images, compared):
-        items = "questions" if questions else "images"
-        expected = f"a number of processes that divides a batch of {size} {items}"
-        check(size % count == 0, "devices", count, expected)
     weights = (config.adversarial, config.reconstruction, config.code_reconstruction)
     if not any((*weights, config.depth, config.matching, compared)):
         raise SpecError("losses", "every weight at 0", "one above 0")

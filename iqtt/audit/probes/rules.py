@@ -25,6 +25,7 @@ the classifiers of cross-validation share most of their training questions, thei
 fifth more on noise than those of independent guesses.
 """
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
@@ -34,8 +35,10 @@ from numpy.typing import NDArray
 
 from iqtt.audit.features.outlines import nearest_outline
 from iqtt.audit.features.statistics import THUMBNAIL
+from iqtt.audit.probes.masks import RULES
 from iqtt.audit.probes.patterns import pattern_responses
 from iqtt.audit.probes.trees import FOLDS, among_others, choose, next_to_reference
+from iqtt.perspective.specs import ANGLE_BINS
 from scenegen.common.threads import one_thread
 
 Array = NDArray[Any]
@@ -47,7 +50,7 @@ ERROR_RATE = 0.01  # probability that some probe of a fair set of questions seem
 LEAST_QUESTIONS = 50  # a classifier learns nothing from fewer
 COMPONENTS = 24  # principal components of thumbnails that classifiers see
 PATCH = 8  # pixels of a thumbnail's patch
-FAR = 60.0  # degrees, from which on questions about rooms are probed apart, too
+SPANS = tuple(f"{low}-{high}" for low, high in itertools.pairwise(ANGLE_BINS))  # degrees
 PATTERN_QUESTIONS = 2_000  # whose pictures are searched for small patterns
 
 _LIGHT = {
@@ -116,8 +119,8 @@ class Evidence:
         frames: numbers that describe how the answers' shapes are stored next to the reference's,
             (N, K, D), as `frames.stored_frames` gives them; NaN where the file does not tell them.
         places: positions of the right answers of whole tables, in their order, (Q,) each.
-        of_rooms: whether questions are about rooms, whose light belongs to them: comparisons with
-            the reference may then beat chance.
+        masks: how options differ by `masks.RULES`, (N, K, R), of questions about rooms; None of
+            others. Light belongs to a room, so comparisons with the reference may beat chance.
         angles: between the views of reference and correct option, degrees, (N,).
     """
 
@@ -127,7 +130,7 @@ class Evidence:
     cubes: dict[str, Array]
     frames: Array
     places: Sequence[Array]
-    of_rooms: bool = False
+    masks: Array | None = None
     angles: Array | None = None
 
     @property
@@ -142,28 +145,30 @@ _Guess: TypeAlias = tuple[str, str, str, Array]
 
 def run_probes(evidence: Evidence) -> tuple[Probe, ...]:
     """Run all probes that the evidence allows; none without questions."""
-    statistics, right = evidence.statistics, evidence.right
-    guesses = [*_by_picture(statistics, right, evidence.of_rooms)]
+    statistics, right, masks = evidence.statistics, evidence.right, evidence.masks
+    guesses = [*_by_picture(statistics, right, masks is not None)]
     guesses += [*_by_shape(evidence), *_by_mirror(evidence)]
-    if evidence.of_rooms and evidence.angles is not None:
-        far = evidence.angles >= FAR
-        turned = [*_by_picture(statistics[far], right[far], True)]
-        turned += _by_patches(statistics[far], right[far])
-        named = [(f"{g[0]}, from {FAR:.0f} degrees", *g[1:]) for g in turned]
-        guesses += [*_by_patches(statistics, right), *(g for g in named if g[2] == OUTLINE)]
+    if masks is not None:
+        guesses += _of_rooms(statistics, right, masks)
+        if evidence.angles is not None:
+            guesses += _by_angle(guesses, evidence.angles)
     if len(right) >= LEAST_QUESTIONS:
         guesses += [*_learned(evidence), *_learned_outlines(statistics, right)]
     return _probes(guesses + _by_place(evidence.places, evidence.answers), evidence.answers)
 
 
-def run_floor_probes(statistics: Array, right: Array) -> tuple[Probe, ...]:
+def run_floor_probes(
+    statistics: Array, right: Array, masks: Array | None = None
+) -> tuple[Probe, ...]:
     """Run the probes that may beat chance: they hold pictures of answers against the reference.
 
     The arguments are those of `Evidence`, of at least LEAST_QUESTIONS questions.
     """
-    guesses = [guess for guess in _by_picture(statistics, right) if guess[2] == OUTLINE]
+    guesses = [*_by_picture(statistics, right, masks is not None)]
+    guesses += [] if masks is None else _of_rooms(statistics, right, masks)
     answers = statistics["area"].shape[1] - 1
-    return _probes([*guesses, *_learned_outlines(statistics, right)], answers)
+    seen = [guess for guess in guesses if guess[2] == OUTLINE]
+    return _probes([*seen, *_learned_outlines(statistics, right)], answers)
 
 
 def _probes(guesses: Sequence[_Guess], answers: int) -> tuple[Probe, ...]:
@@ -205,6 +210,25 @@ def _by_picture(statistics: Array, right: Array, of_rooms: bool = False) -> Iter
     yield from _by_distance("pixel distance", OUTLINE, statistics["pixel_distance"], right)
     apart = nearest_outline(statistics["outline_distance"])
     yield from _by_distance("silhouette, rotated or flipped", OUTLINE, apart, right)
+
+
+def _of_rooms(statistics: Array, right: Array, masks: Array) -> Iterator[_Guess]:
+    yield from _by_patches(statistics, right)
+    for number, name in enumerate(RULES):
+        yield from _by_cost(name, OUTLINE, _NEARNESS, masks[..., number], right)
+    if len(right) >= LEAST_QUESTIONS:
+        chosen = choose(among_others(masks), right)
+        yield ("rules on masks, by trees", "learned", OUTLINE, chosen == right)
+
+
+def _by_angle(guesses: Sequence[_Guess], angles: Array) -> list[_Guess]:
+    """Return guesses that compare with the reference, for each bin of angles."""
+    bins = np.digitize(angles, ANGLE_BINS[1:-1])
+    return [
+        (f"{statistic}, {rule}", span, OUTLINE, hits[bins == number])
+        for statistic, rule, sees, hits in guesses if sees == OUTLINE
+        for number, span in enumerate(SPANS)
+    ]  # fmt: skip
 
 
 def _by_patches(statistics: Array, right: Array) -> Iterator[_Guess]:

@@ -1,7 +1,7 @@
 """Proofs about furnished rooms, from the scenes that files tell; no code of the generator.
 
 A scene is compared by where each object is in the frame of the first one, so the motion of a camera
-or of a whole room makes no difference, but a mirror image does.
+or of a whole room makes no difference.
 """
 
 import itertools
@@ -35,7 +35,6 @@ LEAST_TURN = 60.0  # degrees between directions of a turned object
 SHOWN, SHARE, CHANGED = 0.005, 0.5, 0.005  # of an image's pixels; of an object's; of an image's
 TRACED = 16  # questions whose images are traced again
 NEAR, MOST_OFF = 8, 0.01  # difference of a value of 255, and the share that may differ by more
-FLIP = np.diag([-1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +167,7 @@ def _same_room(spec: PerspectiveSpec, q: Question) -> str:
     scenes, allowed = q.truth.scenes, spec.interior()
     names = {tuple((x.shape, x.scale, x.mesh) for x in scene.objects) for scene in scenes}
     inside = [s.interior for s in scenes if s.interior]
-    lights = {(one.size, round(abs(one.hour - 12), 9), one.lit) for one in inside}
+    lights = {(one.size, one.hour, one.lit) for one in inside}
     if len(scenes) != 1 + spec.answers or len(names) != 1 or len(lights) != 1:
         return "scenes of other rooms or objects"
     if any(len(s.cameras) != 1 or s.interior is None or s.index != scenes[0].index for s in scenes):
@@ -194,96 +193,48 @@ def _one_right(_spec: PerspectiveSpec, q: Question) -> str:
 def _labels(_spec: PerspectiveSpec, q: Question) -> str:
     assert q.truth
     options, kind = q.truth.scenes[1:], question_kind(q.kinds)
-    numbers = [n - 1 for n in q.truth.in_play]
-    count = len(options[0].objects)
-    if not numbers or max(numbers) >= count or len(set(numbers)) < len(numbers):
-        return f"objects in play {q.truth.in_play} of {count}"
+    number, count = q.truth.in_play - 1, len(options[0].objects)
+    if not 0 <= number < count:
+        return f"object in play {q.truth.in_play} of {count}"
     poses = np.stack([_poses(scene) for scene in options])
-    if kind == "mirror-pair-2":
-        return _mirrored(options, poses)
     assert options[0].interior
-    rides = set(numbers)
-    for n in range(count):  # what stands on something has a larger number
-        if options[0].interior.stands_on[n] - 1 in rides:
-            rides.add(n)
-    rest = [n for n in range(count + 1) if n not in rides]
+    rides = with_carried(options[0].interior.stands_on, q.truth.in_play)
+    rest = [n for n in range(count + 1) if n + 1 not in rides]
     if np.ptp(poses[:, rest], axis=0).max() > SAME or len({_shell(s) for s in options}) > 1:
         return "what is not in play differs"
-    below = {s.interior.stands_on[numbers[0]] for s in options if s.interior}
+    below = {s.interior.stands_on[number] for s in options if s.interior}
     floor = all(on == 0 or options[0].objects[on - 1].name == "rug" for on in below)
     test, least = _IN_PLAY.get(kind), ON_FLOOR if floor else ON_TOP
-    return test(poses[:, numbers], least) if test else f"kind {kind}"
+    return test(poses[:, number], least) if test else f"kind {kind}"
+
+
+def with_carried(stands_on: Sequence[int], number: int) -> set[int]:
+    """Return an object and what stands on it, which has larger numbers."""
+    found = {number}
+    for n, on in enumerate(stands_on, start=1):
+        if on in found:
+            found.add(n)
+    return found
 
 
 def _moved(poses: Array, least: float) -> str:
-    places = poses[:, 0, :, 3]
-    near = min(math.dist(a, b) for a, b in itertools.combinations(places[:, [0, 2]], 2))
-    if len(poses[0]) != 1 or np.ptp(poses[:, 0, :, :3], axis=0).max() > SAME:
-        return "more than one object moved, or turned, too"
+    places = poses[:, [0, 2], 3]
+    near = min(math.dist(a, b) for a, b in itertools.combinations(places, 2))
+    if np.ptp(poses[..., :3], axis=0).max() > SAME:
+        return "the object turned, too"
     return f"places {near:.3f} m apart" if near < least - SAME else ""
 
 
-def _swapped(poses: Array, least: float) -> str:
-    if poses.shape[:2] != (3, 3):
-        return "not three objects at three places"
-    ground = poses[..., [0, 2], 3]
-    turned = any(
-        np.abs(ground[i] - np.roll(ground[0], -shift, axis=0)).max() > SAME
-        for i, shift in _cyclic(ground)
-    )
-    still = np.ptp(poses[..., :3], axis=0).max() <= SAME
-    near = min(math.dist(a, b) for a, b in itertools.combinations(ground[0], 2))
-    return "" if still and not turned and near >= least - SAME else "not three cyclic orders"
-
-
-def _cyclic(ground: Array) -> list[tuple[int, int]]:
-    """Return for each answer by how many places its objects are shifted; 1 and 2, in any order."""
-    first = 1 if np.abs(ground[1] - np.roll(ground[0], -1, axis=0)).max() <= SAME else 2
-    return [(1, first), (2, 3 - first)]
-
-
 def _turned(poses: Array, _least: float) -> str:
-    if len(poses[0]) != 1 or np.ptp(poses[:, 0, [0, 2], 3], axis=0).max() > SAME:
+    if np.ptp(poses[:, [0, 2], 3], axis=0).max() > SAME:
         return "an object that is moved, too"
-    fronts = poses[:, 0, :, 2]
+    fronts = poses[..., 2]
     cosines = [a @ b for a, b in itertools.combinations(fronts, 2)]
     angle = math.degrees(math.acos(min(1.0, max(cosines))))
     return "" if angle >= LEAST_TURN - 1e-3 else f"directions {angle:.1f} degrees apart"
 
 
-_IN_PLAY = {"moved": _moved, "swapped": _swapped, "turned": _turned}
-
-
-def _mirrored(options: Sequence[SceneSpec], poses: Array) -> str:
-    """Return what is wrong with the mirror image of a room, in which no object is mirrored."""
-    first, second = (scene.interior for scene in options)
-    assert first
-    assert second
-    places = poses[0, :-1, :, 3] @ FLIP + [first.size[0], 0, 0]
-    turns = FLIP @ poses[0, :-1, :, :3] @ FLIP
-    if (
-        max(np.abs(places - poses[1, :-1, :, 3]).max(), np.abs(turns - poses[1, :-1, :, :3]).max())
-        > SAME
-    ):
-        return "objects are not where the mirror image has them"
-    sides = {"west": "east", "east": "west"}
-    expected = {
-        (h.kind, sides.get(h.wall, h.wall), h.bottom, h.top)
-        + (
-            (h.left, h.right)
-            if h.wall in sides
-            else (first.size[0] - h.right, first.size[0] - h.left)
-        )
-        for h in first.openings
-    }
-    found = {(h.kind, h.wall, h.bottom, h.top, h.left, h.right) for h in second.openings}
-    turned = min((first.facing_degrees + second.facing_degrees) % 360, 1) < SAME
-    turned &= abs(first.hour + second.hour - 24) < SAME and first.mirrored != second.mirrored
-    return (
-        ""
-        if expected == found and turned
-        else "openings or the sun are not where the mirror image has them"
-    )
+_IN_PLAY = {"moved": _moved, "turned": _turned}
 
 
 def _views(spec: PerspectiveSpec, q: Question) -> str:
@@ -299,16 +250,12 @@ def _views(spec: PerspectiveSpec, q: Question) -> str:
     angle, told = math.degrees(math.acos(np.clip(cosine, -1, 1))), q.truth.angle_degrees
     if abs(angle - told) > 1e-3 or not spec.angle[0] <= told <= spec.angle[1]:
         return f"{angle:.3f} degrees, told {told:.3f}"
-    width = q.truth.scenes[0].interior.size[0] if q.truth.scenes[0].interior else 0.0
-    for camera in options:
-        flipped = (width - camera.position[0], *camera.position[1:])
-        if min(math.dist(seen.position, camera.position), math.dist(seen.position, flipped)) > SAME:
-            return "answers are seen from two places"
-    return ""
+    apart = max(math.dist(seen.position, camera.position) for camera in options)
+    return "answers are seen from two places" if apart > SAME else ""
 
 
 def _apart(tables: Sequence[AuditTable], questions: Sequence[Sequence[Question]]) -> Proof:
-    """Prove that no room is in two questions, and so in no two splits; mirror images are one."""
+    """Prove that no room is in two questions, and so in no two splits."""
     seen: dict[str, tuple[int, int]] = {}
     wrong, found = [np.zeros(len(table), bool) for table in tables], {}
     for t, rows in enumerate(questions):
@@ -317,7 +264,7 @@ def _apart(tables: Sequence[AuditTable], questions: Sequence[Sequence[Question]]
             if inside is None:
                 continue
             spans = sorted((h.kind, h.right - h.left, h.bottom, h.top) for h in inside.openings)
-            key = json.dumps([inside.size, round(abs(inside.hour - 12), 9), inside.lit, spans])
+            key = json.dumps([inside.size, inside.hour, inside.lit, spans])
             if key in seen:
                 wrong[t][row] = True
                 other = seen[key]
@@ -338,12 +285,11 @@ def _cast_again(table: AuditTable, q: Question) -> str:
     for a, b in itertools.combinations(ids[1:], 2):
         if (a != b).mean() < CHANGED:
             return f"answers differ in {(a != b).mean():.3%} of the pixels"
-    numbers = np.array(q.truth.in_play)
-    if not len(numbers) or numbers.max() > spec.objects[1]:
-        return "no objects in play"
-    shown = np.stack([np.count_nonzero(ids == n, axis=(1, 2)) for n in numbers], axis=1)
-    image, slot = (x.ravel() for x in np.meshgrid(np.arange(len(ids)), numbers - 1, indexing="ij"))
-    whole = whole_pixels(batch, image, slot).reshape(shown.shape)
+    number = q.truth.in_play
+    if not 0 < number <= spec.objects[1]:
+        return "no object in play"
+    shown = np.count_nonzero(ids == number, axis=(1, 2))
+    whole = whole_pixels(batch, np.arange(len(ids)), np.full(len(ids), number - 1))
     for name, mine, stored in (
         ("visible", shown, q.truth.visible_pixels), ("whole", whole, q.truth.whole_pixels)
     ):  # fmt: skip

@@ -4,21 +4,15 @@ There are 48 ways to permute and flip three axes. Each is a matrix whose rows sa
 with which sign, holds x, y and z.
 """
 
-import itertools
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from scenegen.checking.faults import TURNS, axes_letters
 
-AXES = np.array(
-    [
-        np.eye(3)[list(order)] * np.array(signs)[:, None]
-        for order in itertools.permutations(range(3))
-        for signs in itertools.product((1.0, -1.0), repeat=3)
-    ]
-)  # (48, 3, 3); the first one changes nothing
+Array = NDArray[Any]
+AXES = TURNS  # (48, 3, 3); the first one changes nothing
 _NAMED = {
     "-x -y -z": "all axes flipped, as if facing away from the viewer",
     "x -y -z": "y down and z forward (OpenCV): both axes flipped",
@@ -35,9 +29,7 @@ _NAMED = {
 
 def axes_text(matrix: Array) -> str:
     """Return in words what a matrix of AXES undoes: which axes hold x, y and z."""
-    letters = " ".join(
-        ("-" if row.min() < 0.0 else "") + "xyz"[int(np.abs(row).argmax())] for row in matrix
-    )
+    letters = axes_letters(matrix)
     return _NAMED.get(letters, f"x, y and z in the axes {letters.replace(' ', ', ')}")
 
 

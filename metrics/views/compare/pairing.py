@@ -37,9 +37,11 @@ def require_same_test(
     for file in files:
         require_truth(file, first.truth, first.place, first.protocol)
         if not file.comparable and not allow_incomparable:
-            why = "; ".join(file.warnings) or "not comparable"
+            why = "; ".join(file.warnings) or "see its warnings"
             raise ComparisonError(
-                file.place, f"scores that are {why}", hint="or use --allow-incomparable"
+                file.place,
+                f"its scores are not comparable: {why}",
+                hint="or use --allow-incomparable",
             )
 
     def shown() -> list[str]:  # a test set of single views, say, has nothing behind
@@ -79,7 +81,7 @@ def common_rows(files: Sequence[ScoreFile]) -> list[NDArray[np.int64]]:
             )
         common = np.intersect1d(common, file.ids)
     if not len(common):
-        raise ComparisonError("comparison", f"no {what} that all of the files score", "some")
+        raise ComparisonError("comparison", f"no {what} that all files score", "at least one")
     orders = []
     for file in files:
         rising = np.argsort(file.ids)

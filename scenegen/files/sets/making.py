@@ -6,6 +6,7 @@ same request keeps it if that is right. When all parts are there they get their 
 that readers open get theirs last. A file holds the same bytes whoever makes it.
 """
 
+import errno
 import json
 import platform
 import re
@@ -18,13 +19,14 @@ from typing import Any, Protocol
 from scenegen.common.cgroup import processors
 from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.files.content import file_sha256
+from scenegen.files.input_file import HDF5_ERRORS
 from scenegen.files.new_file import check_writable, write_text
 from scenegen.files.places import check_store, is_remote, listing, move, remove_folder, scratch
 from scenegen.files.pool import LostWorkerError
 from scenegen.files.sets.cluster import Cluster, threads_of_worker
 from scenegen.files.sets.plan import Block, Piece
 from scenegen.files.sets.sets import Packed, Progress, write_piece, write_view
-from scenegen.files.sets.shards import name_of_set
+from scenegen.files.sets.shards import name_of_set, opened
 from scenegen.files.sets.workers import in_order, in_threads
 from scenegen.files.sets.workspace import run_lock, workspace
 
@@ -34,6 +36,10 @@ PART = re.compile(r".+\.[0-9a-f]{16}", re.DOTALL)  # the name of a part, and of 
 IN_FOLDER = "%2F"  # stands for "/" there
 MOVED_AT_ONCE = 16  # files that a store renames, which copies them
 Note = Callable[[Any], Any]
+
+
+class CompleteError(FileExistsError):
+    """The files of a request are there: an earlier run of the same request made them."""
 
 
 class Work(Protocol):
@@ -81,7 +87,8 @@ def make_set(
             nothing speaks against the request.
 
     Raises SpecError where parts there answer another request, SceneGenError while another run makes
-    this set, FileExistsError where files have these names, LostWorkerError where a block ended two
+    this set, CompleteError where files of the same request are there, FileExistsError where other
+    files have these names, LostWorkerError where a block ended two
     processes, and OSError as the disk does.
     """
     cuts = [whole.cut(shard_size) for whole in wholes]
@@ -103,7 +110,11 @@ def make_set(
         if (home / COMPLETE).exists():
             progress(sum(piece.rows for piece in pieces))
         else:
-            for path in _there(folder, files).values():
+            there = _there(folder, files)
+            if there and not overwrite and _is_complete(folder, wholes, request):
+                text = "complete. The same command has made it before; --overwrite makes it again"
+                raise CompleteError(errno.EEXIST, text, str(first))
+            for path in there.values():
                 check_writable(path, overwrite)
             with _kept(home, request):
                 parts = complete_parts(home, check=True)
@@ -120,6 +131,27 @@ def make_set(
                             write_view(paths, whole, cut, parts, work.compression)
                 write_text(home / COMPLETE, "")
         _publish(home, folder, files, {name for piece in pieces for name in piece.files}, overwrite)
+
+
+def _is_complete(folder: Path, wholes: Sequence[Piece], request: Mapping[str, Any]) -> bool:
+    """Return whether the files of a request are there, by their attributes and numbers of rows.
+
+    Files with a secret seed do not tell which seed made them.
+    """
+    if is_remote(folder) or request.get("secret-seed") == "yes":
+        return False
+    for whole in wholes:
+        sheets = [(block.rows, sheet) for block in whole.blocks for sheet in block.part.sheets]
+        for number, (name, attributes) in enumerate(whole.files.items()):
+            rows = {path: n for n, sheet in sheets if sheet.file == number for path in sheet.paths}
+            try:
+                with opened(folder / name) as file:
+                    same = all(file.attrs[key] == value for key, value in attributes.items())
+                    if not same or any(len(file[path]) != n for path, n in rows.items()):
+                        return False
+            except HDF5_ERRORS:
+                return False
+    return True
 
 
 def parts_folder(first: Path) -> Path:

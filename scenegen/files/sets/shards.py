@@ -170,7 +170,7 @@ class OpenFile:
         """Return a data set, to be read. Raises FileFormatError where there is none."""
         dataset = self.file.get(name)
         if not isinstance(dataset, h5py.Dataset):
-            raise FileFormatError(f"{self.path}: {name}", "no dataset of this name", "one")
+            raise FileFormatError(f"{self.path}: {name}", "no dataset", "a dataset of this name")
         return JoinedArray(self, dataset) if is_virtual(dataset) else StoredArray(dataset)
 
     def numbers(self, dataset: h5py.Dataset) -> list[int]:

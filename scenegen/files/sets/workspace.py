@@ -86,7 +86,7 @@ def _remove_leftover(folder: Path) -> None:
         files = [path for path in folder.rglob("*") if not path.is_dir()]
         size = f"({sum(path.lstat().st_size for path in files) / 1e6:.1f} MB)"
         if not folder.name.startswith(_prefix()):
-            text = "seems to be left by a run on another machine, or from before a restart"
+            text = "a run on another machine, or before a restart, probably left it"
             warnings.warn(
                 f"{folder}: {text} {size}; remove it if no run writes there", stacklevel=2
             )
@@ -94,7 +94,7 @@ def _remove_leftover(folder: Path) -> None:
         shutil.rmtree(folder)
         if files:
             warnings.warn(
-                f"removed what an earlier run left unfinished: {folder} {size}", stacklevel=2
+                f"removed files of an earlier, interrupted run: {folder} {size}", stacklevel=2
             )
     finally:
         os.close(lock)

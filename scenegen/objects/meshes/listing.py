@@ -114,7 +114,7 @@ def make_listing(
         raise _no_models(root, split, others)
     if check_splits and split != "all":
         for first, second in shared_by_splits(splits):
-            found = f"the same object in two splits, {first} and {second}"
+            found = f"the same object is in two splits, {first} and {second}"
             raise MeshFolderError(root, found, hint="remove one of these equal files")
     told = splits if check_splits else {}
     return ModelFolder(kind, up, tuple(models), models, tuple(unused), (), told)

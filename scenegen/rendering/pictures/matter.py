@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.random.seeding import Purpose, item_rng
-from scenegen.common.records import from_json
 from scenegen.common.rotations import product
-from scenegen.description.interiors import WALLS, Interior
+from scenegen.description.interiors import WALLS
 from scenegen.objects.furniture.furnishing import Furnishing, Texture
 from scenegen.objects.furniture.room_shell import PARTS, shell_name, shell_of
 from scenegen.rendering.materials.folders import MapFiles
@@ -148,9 +147,6 @@ def gather_matter(batch: SceneBatch, b: int, lit: bool, folder: Folder = None) -
     room = shell_of(shell_name(batch.interior[b]))
     flat = np.repeat(room.normals[:, None], 3, axis=1)
     rows = collected.of_room()
-    if from_json(Interior, batch.interior[b], "interior").mirrored:
-        sides = [PARTS.index(wall) for wall in ("west", "east")]
-        rows[sides] = rows[sides[::-1]]
     shines = (room.part == PARTS.index(GLOW)) & lit
     collected.add(*(x[~shines] for x in (room.corners, flat, room.uv, rows[room.part])))
     if shines.any():

@@ -6,7 +6,7 @@ up, +y, and column 0 is -z, going on towards +x.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
@@ -55,12 +55,7 @@ def directions(rows: int, columns: int) -> Array:
 
 
 def outside(interior: Interior) -> Outside:
-    """Return sky, ground and sun of a room's hour; those of a mirrored room are mirrored."""
-    if interior.mirrored:
-        hour, facing = 24 - interior.hour, -interior.facing_degrees % 360
-        seen = outside(replace(interior, hour=hour, facing_degrees=facing, mirrored=False))
-        sun = seen.toward_sun * (-1, 1, 1)
-        return Outside(np.ascontiguousarray(seen.radiance[:, ::-1]), sun, seen.sunlight)
+    """Return sky, ground and sun of a room's hour."""
     height = sun_height(interior.hour)
     azimuth = sun_azimuth(interior)
     sun, sunlight = sunlight_of(interior)

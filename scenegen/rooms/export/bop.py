@@ -22,6 +22,7 @@ from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.scene_mesh import welded, world_from_object
 from scenegen.rendering.amodal import wide_masks
 from scenegen.rendering.packing import pack
+from scenegen.rooms.export.coco import box
 from scenegen.rooms.export.colmap import FLIP
 from scenegen.rooms.export.encoding import write_json, write_png
 from scenegen.rooms.export.nerfstudio import Z_UP
@@ -164,9 +165,8 @@ def _box(mask: Array, origin: tuple[int, int] = (0, 0)) -> list[int]:
 
     The width is the last column minus the first one. `origin` is the pixel (0, 0), x and y.
     """
-    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-    x, y = int(columns[0]), int(rows[0])
-    return [x - origin[0], y - origin[1], int(columns[-1]) - x, int(rows[-1]) - y]
+    x, y, width, height = box(mask)
+    return [x - origin[0], y - origin[1], width - 1, height - 1]
 
 
 def _write_models(folder: Path, models: dict[tuple[str, float], int], objects: Objects) -> None:

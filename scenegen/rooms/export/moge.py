@@ -7,6 +7,7 @@ where a ray hits nothing, depth is infinite.
 """
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -73,6 +74,17 @@ def write_log_depth(path: Path, depth: NDArray[Any]) -> None:
     texts.add_text("near", repr(near))
     texts.add_text("far", repr(far))
     Image.fromarray(codes).save(path, "PNG", pnginfo=texts)
+
+
+def log_depth(codes: NDArray[Any], texts: Mapping[Any, Any]) -> NDArray[np.float64]:
+    """Return the depth of such a file from its pixels and texts, NaN where there is none.
+
+    Raises KeyError and ValueError where the texts are not those.
+    """
+    near, far = float(texts["near"]), float(texts["far"])
+    unit = float(texts.get("unit", 1.0))  # of older files, metres
+    depth = unit * near * (far / near) ** ((codes.astype(np.float64) - 1.0) / STEPS)
+    return np.where((codes > 0) & (codes < INFINITE), depth, np.nan)
 
 
 def _write_segmentation(path: Path, room: Room) -> None:

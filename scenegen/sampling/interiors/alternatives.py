@@ -8,29 +8,26 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
 from scenegen.common.random.seeding import Purpose
 from scenegen.description.specs import InteriorSpec
 from scenegen.objects.catalogue import Objects
 from scenegen.objects.furniture.shapes import Piece
-from scenegen.sampling.interiors.arranging import Arranger, suits
+from scenegen.sampling.interiors.arranging import Arranger
 from scenegen.sampling.interiors.draws import Draws
 from scenegen.sampling.interiors.scenes import Drawn, furnished, item_room
-from scenegen.sampling.interiors.small_things import ON_TOP
 from scenegen.sampling.interiors.spaces import (
     ON,
     Box,
     Placed,
     Space,
-    apart,
     box_at,
-    clear_of,
     stepped_turn,
 )
 from scenegen.sampling.interiors.viewpoints import Place, draw_cameras
 
-DIFFERENCES = ("moved", "swapped", "turned", "mirror-pair")
+DIFFERENCES = ("moved", "turned")
 STANDING = (
     "chair",
     "armchair",
@@ -43,19 +40,16 @@ STANDING = (
     "coffee_table",
     "nightstand",
 )  # families that may stand anywhere on the floor
-SWAPPED = ("stool", "box", "bag", "basket", "tall_plant", "armchair", "chair", "nightstand")
 FRONTED = ("chair", "armchair", "nightstand", "screen")  # families whose front can be seen
 TOPS = ("table", "coffee_table", "desk", "cabinet", "nightstand")  # families that carry things
 HIGHEST_TOP = 1.1  # metres
-SETS = 4  # sets of places that are drawn for a group
-GROUPS = 6  # objects or groups of objects that are tried in a room
+SETS = 4  # sets of places that are drawn for an object
+OBJECTS = 6  # that are tried in a room
 FREE = 60  # places on the floor, near a free one of which cameras look
 REACH = 2.0  # metres about what cameras look at, within which places are tried
-PIECES = 20  # groups of families that are tried for objects that change places
-TRIES = 1000  # places that are tried for a group
+TRIES = 1000  # places that are tried for an object
 APART, APART_ON_TOP = 0.5, 0.2  # metres between two places, on the floor and on a top
 LEAST_TURN = 1 / 6  # full turns between two directions
-LIKE = 1.5  # largest ratio of the sizes of objects that change places
 NEAREST = 1.0  # metres from a camera to an object in play
 INSIDE = 0.85  # share of half the image within which the middle of an object in play appears
 LEAST_SIDE = 0.02  # square metres of a small object, seen from the side
@@ -65,16 +59,8 @@ Support: TypeAlias = tuple[int, float, tuple[float, ...]]
 FLOOR: Support = (0, 0.0, ())
 
 
-class Group(NamedTuple):
-    """Objects in play: what they stand on, their numbers, and their pieces of furniture."""
-
-    support: Support
-    numbers: tuple[int, ...]
-    pieces: tuple[Piece, ...]
-
-
 Spot: TypeAlias = list[tuple[Box, int]]
-"""For each object and direction that is to fit a place, its box and what it stands on."""
+"""For each direction of an object, its box at a place and what it stands on."""
 
 
 @dataclass(frozen=True)
@@ -82,18 +68,18 @@ class Alternatives:
     """Rooms that differ in one thing.
 
     Attributes:
-        rooms: two or three, each with the positions of both cameras.
-        in_play: numbers of the objects in which they differ; empty for mirror images.
+        rooms: three, each with the positions of both cameras.
+        in_play: number of the object in which they differ.
     """
 
     rooms: tuple[Drawn, ...]
-    in_play: tuple[int, ...]
+    in_play: int
 
 
 def draw_alternatives(
     spec: InteriorSpec, index: int, difference: str, degrees: float, objects: Objects
 ) -> Iterator[Alternatives]:
-    """Draw the rooms of an item, at most GROUPS times; nothing where it has no place for them.
+    """Draw the rooms of an item, at most OBJECTS * SETS times; nothing where no place is free.
 
     Args:
         difference: one of DIFFERENCES.
@@ -106,43 +92,18 @@ def draw_alternatives(
     draws = Draws(spec.seed, index, Purpose.PERSPECTIVE)
     arranger = replace(arranger, draws=draws)
     fov = item_room(spec, index)[2]
-    if difference == "mirror-pair":
-        found = _cameras(spec, arranger.space, draws, fov, degrees)
-        if found is not None:
-            drawn: Drawn = (arranger.room, arranger.space.placed, *found)
-            other = _mirrored(drawn)
-            if _holds(other[1]):
-                yield Alternatives(tuple(draws.shuffled((drawn, other))), ())
-        return
-    for group in itertools.islice(_groups(arranger, difference), GROUPS):
-        yield from _varied(spec, arranger, difference, group, degrees, fov)
+    for number, support in itertools.islice(_movable(arranger, difference), OBJECTS):
+        yield from _varied(spec, arranger, difference, number, support, degrees, fov)
 
 
-def _groups(arranger: Arranger, difference: str) -> Iterator[Group]:
-    """Yield objects that can be in play together, in random order.
-
-    Objects that change places are new ones, of about one size and three families. They take the
-    numbers of objects that carry nothing, which are left out.
-    """
-    placed, draws = arranger.space.placed, arranger.draws
-    supports = [_support(placed, thing) for thing in placed]
-    if difference != "swapped":
-        for number in draws.shuffled(range(1, len(placed) + 1)):
-            piece, support = placed[number - 1].piece, supports[number - 1]
-            if support and (difference != "turned" or piece.family in FRONTED):
-                yield Group(support, (number,), (piece,))
-        return
-    carrying = {thing.stands_on for thing in placed}
-    carrying |= {n for n, thing in enumerate(placed, start=1) if thing.piece.family == "curtain"}
-    tops = draws.shuffled(sorted({s for s in supports if s} - {FLOOR}))
-    for support in (FLOOR, *tops):
-        leaves = [n for n in range(1, len(placed) + 1) if n not in carrying and n != support[0]]
-        leaves = draws.shuffled(leaves)
-        if support[0]:  # those there first
-            leaves.sort(key=lambda n, on=support[0]: placed[n - 1].stands_on != on)  # type: ignore[misc]
-        pieces = _alike(arranger, support) if len(leaves) >= 3 else ()
-        if pieces:
-            yield Group(support, tuple(leaves[:3]), pieces)
+def _movable(arranger: Arranger, difference: str) -> Iterator[tuple[int, Support]]:
+    """Yield the numbers of objects that can be in play, and what they stand on, in random order."""
+    placed = arranger.space.placed
+    for number in arranger.draws.shuffled(range(1, len(placed) + 1)):
+        thing = placed[number - 1]
+        support = _support(placed, thing)
+        if support and (difference != "turned" or thing.piece.family in FRONTED):
+            yield number, support
 
 
 def _support(placed: Sequence[Placed], thing: Placed) -> Support | None:
@@ -152,7 +113,7 @@ def _support(placed: Sequence[Placed], thing: Placed) -> Support | None:
         return FLOOR if thing.piece.family in STANDING and thing.box.bottom < 0.1 else None
     if parent.piece.family not in TOPS or parent.piece.height > HIGHEST_TOP:
         return None
-    if not _is_large(thing.piece):
+    if math.fsum(thing.piece.half) * thing.piece.height < LEAST_SIDE:
         return None
     for y, *sides in parent.piece.surfaces:
         if abs(thing.box.bottom - parent.box.bottom - y - ON) < 1e-6:
@@ -160,47 +121,25 @@ def _support(placed: Sequence[Placed], thing: Placed) -> Support | None:
     return None
 
 
-def _alike(arranger: Arranger, support: Support) -> tuple[Piece, ...]:
-    """Draw three objects of about one size and different families; none where none are found."""
-    below = arranger.space.placed[support[0] - 1].piece if support[0] else None
-    families = SWAPPED if below is None else tuple(ON_TOP[below.family])
-    for _ in range(PIECES):
-        found = [arranger.member(x) for x in arranger.draws.shuffled(families)[:3]]
-        pieces = tuple(piece for piece in found if piece is not None)
-        sizes = [4 * piece.half[0] * piece.half[1] * piece.height for piece in pieces]
-        alike = len(pieces) == 3 and max(sizes) <= LIKE**3 * min(sizes)
-        if alike and (below is None or all(_is_large(p) and suits(p, below) for p in pieces)):
-            return pieces
-    return ()
-
-
-def _is_large(piece: Piece) -> bool:
-    return math.fsum(piece.half) * piece.height >= LEAST_SIDE
-
-
 def _varied(
     spec: InteriorSpec,
     arranger: Arranger,
     difference: str,
-    group: Group,
+    number: int,
+    support: Support,
     degrees: float,
     fov: float,
 ) -> Iterator[Alternatives]:
-    """Yield three rooms in which the objects of a group stand otherwise, seen by two cameras."""
-    placed, draws = arranger.space.placed, arranger.draws
-    support, numbers, pieces = group
-    moving = _carried(placed, numbers)
+    """Yield three rooms in which an object stands otherwise, seen by two cameras."""
+    placed, draws, turned = arranger.space.placed, arranger.draws, difference == "turned"
+    piece, box = placed[number - 1].piece, placed[number - 1].box
+    moving = _carried(placed, number)
     kept = [n for n in range(1, len(placed) + 1) if n not in moving]
     space = replace(arranger.space, placed=[placed[n - 1] for n in kept])
     empty = replace(arranger, space=space)
     parent = kept.index(support[0]) + 1 if support[0] else 0
-    turns = [placed[n - 1].box.turns for n in numbers]
-    if difference == "swapped":
-        turns = [stepped_turn(draws.unit()) for _ in numbers]
-    fitting = list(zip(pieces, turns, strict=True))
-    if difference == "turned":
-        fitting = [(pieces[0], turn) for turn in _directions(draws)]
-    focuses = [placed[support[0] - 1].box] if parent else _free(empty, *fitting[0])
+    turns = _directions(draws) if turned else [box.turns]
+    focuses = [placed[support[0] - 1].box] if parent else _free(empty, piece, turns[0])
     cameras = _cameras(spec, space, draws, fov, degrees, focuses) if focuses else None
     if cameras is None:
         return
@@ -208,16 +147,14 @@ def _varied(
     views = _Views(*cameras, math.tan(math.radians(fov_y) / 2), spec.width / spec.height)
     surface = (parent, *support[1:])
     for _ in range(SETS):
-        spots = _spots(empty, surface, fitting, 1 if difference == "turned" else 3, views)
+        spots = _spots(empty, surface, piece, turns, 1 if turned else 3, views)
         rooms = [
-            _furnished(placed, group, kept, space, choice)
-            for choice in ([spots[(i + j) % 3][i] for i in range(3)] if difference == "swapped"
-                           else [spots[0][j] if difference == "turned" else spots[j][0]]
-                           for j in range(3) if spots)
-        ]  # fmt: skip
+            _furnished(placed, number, kept, space, *choice)
+            for choice in (spots[0] if turned and spots else [spot[0] for spot in spots])
+        ]
         things = [found for found in rooms if found is not None]
         if len(things) == 3:
-            yield Alternatives(tuple((arranger.room, x, *cameras) for x in things), numbers)
+            yield Alternatives(tuple((arranger.room, x, *cameras) for x in things), number)
 
 
 def _cameras(
@@ -226,7 +163,7 @@ def _cameras(
     draws: Draws,
     fov: float,
     degrees: float,
-    focuses: Sequence[Box] = (),
+    focuses: Sequence[Box],
 ) -> tuple[list[Place], Place] | None:
     """Draw the positions of both cameras, and the point that both look at; None for none."""
     found = draw_cameras(spec, space, draws, fov, (0.0, degrees), focuses)
@@ -237,35 +174,30 @@ def _cameras(
 
 
 def _furnished(
-    placed: Sequence[Placed],
-    group: Group,
-    kept: Sequence[int],
-    space: Space,
-    choice: Sequence[tuple[Box, int]],
+    placed: Sequence[Placed], number: int, kept: Sequence[int], space: Space, box: Box, on: int
 ) -> list[Placed] | None:
-    """Return the objects of a room, those of a group in these places; None where some collide.
+    """Return the objects of a room, one of them in this place; None where some collide.
 
     Args:
         kept: numbers of the objects in `space`, which does not move.
-        choice: for each object of the group its box, and the number of what carries it in `space`.
+        on: number of what carries the object in `space`.
     """
     things = list(placed)
-    for number, piece, (box, on) in zip(group.numbers, group.pieces, choice, strict=True):
-        things[number - 1] = Placed(piece, box, kept[on - 1] if on else 0)
-        for n in sorted(_carried(placed, (number,)) - {number}):
-            moved = _along(placed[n - 1].box, placed[number - 1].box, box)
-            if not space.free(moved):
-                return None
-            things[n - 1] = replace(placed[n - 1], box=moved)
+    things[number - 1] = replace(placed[number - 1], box=box, stands_on=kept[on - 1] if on else 0)
+    for n in sorted(_carried(placed, number) - {number}):
+        moved = _along(placed[n - 1].box, placed[number - 1].box, box)
+        if not space.free(moved):
+            return None
+        things[n - 1] = replace(placed[n - 1], box=moved)
     return things
 
 
-def _carried(placed: Sequence[Placed], numbers: Sequence[int]) -> set[int]:
-    """Return objects and all that stands on them; a number is larger than that of what carries."""
-    found = set(numbers)
-    for number, thing in enumerate(placed, start=1):
+def _carried(placed: Sequence[Placed], number: int) -> set[int]:
+    """Return an object and all that stands on it; a number is larger than that of what carries."""
+    found = {number}
+    for n, thing in enumerate(placed, start=1):
         if thing.stands_on in found:
-            found.add(number)
+            found.add(n)
     return found
 
 
@@ -335,14 +267,12 @@ class _Views:
 def _spots(
     arranger: Arranger,
     support: Support,
-    pieces: Sequence[tuple[Piece, float]],
+    piece: Piece,
+    directions: Sequence[float],
     count: int,
     views: _Views,
 ) -> list[Spot]:
-    """Draw places at each of which all pieces fit, with their turns; none where there are too few.
-
-    In any two of the places, two pieces can stand at the same time.
-    """
+    """Draw places at each of which a piece fits in all directions; none where there are too few."""
     space, draws = arranger.space, arranger.draws
     parent, y, sides = support
     spots: list[Spot] = []
@@ -356,7 +286,7 @@ def _spots(
         if any(math.dist(at, (spot[0][0].x, spot[0][0].z)) < least for spot in spots):
             continue
         spot: Spot = []
-        for piece, turns in pieces:
+        for turns in directions:
             box = box_at(piece, *at, below.bottom + y + ON if parent else 0.0, turns)
             if not views.show(box):
                 break
@@ -369,57 +299,7 @@ def _spots(
                 break
             spot.append(found)
         else:
-            pairs = [(a[0], b[0]) for other in spots for a in spot for b in other]
-            if len(pieces) == 1 or all(apart(*pair) for pair in pairs):
-                spots.append(spot)
+            spots.append(spot)
         if len(spots) == count:
             return draws.shuffled(spots)
     return []
-
-
-def _mirrored(drawn: Drawn) -> Drawn:
-    """Return the mirror image of a room and its cameras; the objects in it are not mirrored."""
-    room, things, places, target = drawn
-    width = room.size[0]
-    walls = {"west": "east", "east": "west"}
-    openings = tuple(
-        replace(hole, wall=walls[hole.wall])
-        if hole.wall in walls
-        else replace(hole, left=width - hole.right, right=width - hole.left)
-        for hole in room.openings
-    )
-    # The sun is as high so many hours before noon as after.
-    other = replace(
-        room,
-        openings=openings,
-        hour=24 - room.hour,
-        facing_degrees=-room.facing_degrees % 360,
-        mirrored=True,
-    )
-    boxes = [replace(t.box, x=width - t.box.x, turns=-t.box.turns) for t in things]
-    moved = [replace(t, box=box) for t, box in zip(things, boxes, strict=True)]
-    seen_from = [(width - x, y, z) for x, y, z in places]
-    return other, moved, seen_from, (width - target[0], *target[1:])
-
-
-def _holds(things: Sequence[Placed]) -> bool:
-    """Return whether all objects are apart, and stand on surfaces of what carries them.
-
-    The mirror image of a room need not, as objects may have one hand, such as a desk's drawers.
-    """
-    for number, thing in enumerate(things, start=1):
-        for other in things[: number - 1]:
-            below = thing.stands_on and other is things[thing.stands_on - 1]
-            if apart(thing.box, other.box):
-                continue
-            if not below or not clear_of(other.piece, other.box, thing.box):
-                return False
-        parent = things[thing.stands_on - 1] if thing.stands_on else None
-        if parent is not None and parent.piece.family != "rug":
-            height = thing.box.bottom - parent.box.bottom - ON
-            if not any(
-                abs(y - height) < 1e-6 and Arranger.stands(thing.box, parent.box, sides)
-                for y, *sides in parent.piece.surfaces
-            ):
-                return False
-    return True

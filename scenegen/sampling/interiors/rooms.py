@@ -25,7 +25,6 @@ class Room:
     facing_degrees: float
     lit: bool
     kind: str
-    mirrored: bool = False
 
 
 def stepped(length: float) -> float:

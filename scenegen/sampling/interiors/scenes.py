@@ -125,7 +125,7 @@ def scene_arrays(
         fov[row] = spec.fov_y(degrees) if spec.projection == "perspective" else 180.0
         told = Interior(
             room.size, room.openings, tuple(thing.stands_on for thing in things),
-            room.hour, room.facing_degrees, room.lit, room.mirrored,
+            room.hour, room.facing_degrees, room.lit,
         )  # fmt: skip
         interior[row] = to_json(told)
     used = shape >= 0

@@ -69,7 +69,6 @@ MISTAKES = [
     (f"predict {ROOMS} --weights rooms.h5", ("'rooms.h5'", ".safetensors")),
     (f"predict {ROOMS} --weights text.safetensors", ("text.safetensors",)),
     (f"predict {WITH} --data damaged.h5", ("damaged.h5", "image, row 5")),
-    (f"train {LARGE} --device cpu --devices 3", ("--devices", "32 images")),
     (f"sample {WITH} --class mug", ("class", "'mug'")),
     ("sample --weights classes.safetensors --class sofa", ("'sofa'", "mug, bowl")),
     ("sample --weights questions.safetensors", ("weights",)),

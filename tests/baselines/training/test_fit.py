@@ -21,9 +21,8 @@ from baselines.training.checkpoint import (
     moments_of,
     new_state,
 )
-from baselines.training.fit import Loss, falling_late, fit
+from baselines.training.fit import Loss, TrainingError, falling_late, fit
 from baselines.training.machine import Machine
-from baselines.training.processes import TrainingError
 from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
 
@@ -263,7 +262,6 @@ def test_a_limit_that_is_over_before_training_is_refused(tmp_path):
 
 
 def test_losses_are_fetched_from_a_gpu_once_in_a_while(tmp_path, monkeypatch):
-    """Those that are not finite end the run then, and name their own iteration."""
     expected = run(tmp_path / "cpu", begun())
     monkeypatch.setattr(module, "fetch_interval", lambda device: 3)
     found = run(tmp_path / "gpu", begun(), machine=Machine(every=5))
@@ -273,8 +271,8 @@ def test_losses_are_fetched_from_a_gpu_once_in_a_while(tmp_path, monkeypatch):
     def spoil(number: int, weight: Any, loss: Any) -> Any:
         return loss * torch.nan if number == 1 else loss
 
-    with refused(TrainingError, "iteration 1"):
-        run(tmp_path / "spoilt", begun(), spoil)
+    with refused(TrainingError, "iteration 2"):  # when they are fetched
+        run(tmp_path / "spoilt", begun(), spoil, machine=Machine(every=5))
     assert not list((tmp_path / "spoilt").iterdir())
 
 

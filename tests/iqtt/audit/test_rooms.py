@@ -112,7 +112,7 @@ def test_an_object_that_is_not_in_play_moves_in_one_answer(failing):
         (lambda file: file["truth/visible_pixels"].write_direct(
             file["truth/visible_pixels"][()] + 9), "visibility"),
         (lambda file: file["truth/in_play"].write_direct(
-            np.array([[1, 0, 0]] * 2, np.int8)), "labels"),
+            np.array([1] * 2, np.int8)), "labels"),
         (edit_scene(1, lambda s: s["interior"].update(hour=1.0)), "rooms"),
         (edit_scene(1, lambda s: s["cameras"][0]["position"].__setitem__(1, 1.0)), "views"),
         (edit_scene(1, lambda s: s.clear()), "rooms"),

@@ -1,7 +1,6 @@
 """The bench commands as a user types them, and one line for every mistake."""
 
 import json
-import os
 import shutil
 
 import numpy as np
@@ -95,26 +94,6 @@ def test_pictures_of_another_split_are_left_out(truths, folder):
     assert "data:image/webp" not in (folder / "p.html").read_text()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        ("score nothing.h5", ("nothing.h5", "no such file")),
-        ("score . ", (".",)),
-        ("validate nothing.h5", ("nothing.h5", "no such file")),
-        ("compare a.json", ("a.json",)),
-        ("compare broken.json broken.json", ("broken.json",)),
-        ("leaderboard broken.json", ("broken.json",)),
-        ("baseline oracle --data nothing.h5", ("nothing.h5",)),
-        ("baseline chance --data nothing.h5", ("nothing.h5",)),
-    ],
-)
-def test_a_mistake_is_one_line(arguments, words, folder, check_refusal):
-    (folder / "broken.json").write_text('{"format": ')
-    result = bench(*arguments.split())
-    check_refusal(result.exit_code, result.stdout, result.stderr, words)
-    assert sorted(os.listdir(folder)) == ["broken.json"]
-
-
 @pytest.mark.parametrize("option", ["--json", "--csv", "--html"])
 def test_scores_never_replace_the_truth_that_a_submission_names(
     truths, folder, check_refusal, option
@@ -162,8 +141,6 @@ def test_a_folder_is_imported_and_scored(home, truths):
     out = home / "p.h5"
     done = bench("import", "--depth", home / "mine", "--data", truths.rooms, "--out", out)
     assert done.exit_code == 0, done.output
-    assert "8 files" in done.stdout
-    assert done.stdout.splitlines()[-1] == f"now: bench score {out} --truth {truths.rooms}"
     with open_predictions(out) as found:
         assert found.method == "mine"
     assert bench("score", out, "--truth", truths.rooms).exit_code == 0
@@ -194,7 +171,6 @@ def test_a_model_is_run(truths, tmp_path, capfd):
     out = tmp_path / "p.h5"
     done = bench("run", tmp_path / "wall.py", "--data", truths.rooms, "--out", out)
     assert done.exit_code == 0, done.output
-    assert done.stdout.splitlines()[-1] == f"now: bench score {out} --truth {truths.rooms}"
     assert "looking" in capfd.readouterr().err  # of its process, which has no other output
     assert "looking" not in done.stdout
     with open_predictions(out) as found:
@@ -215,34 +191,26 @@ def test_an_error_of_the_model_is_one_line_unless_all_is_asked_for(truths, tmp_p
 @pytest.mark.parametrize(
     ("line", "word"),
     [
-        ("import", "--depth"),
-        ("import --depth mine --responses mine", "--depth"),
-        ("import --depth mine --unit mm --scale 2", "--unit"),
-        ("import --depth mine --scale 1/0", "1/0"),
-        ("import --depth mine --alignment scale --kind disparity --scale -1", "-1"),
-        ("import --depth mine/*.png", "mine/*.png"),
-        ("import --depth mine/0.npy mine/1.npy", "mine/1.npy"),
-        ("import --depth none", "none"),
-        ("import --depth mine/[0-6].npy", "7"),
-        ("import --depth mine --normals mine", "normal"),
-        ("import --depth mine --kind points", "points"),
-        ("import --depth mine --data IQTT", "iqtt"),
-        ("run none.py", "none.py"),
-        ("run mine", "mine"),
-        ("run wall.py --key depth", "--key"),
-        ("run wall.py --key depth_affine_invariant", "depth_affine_invariant"),
-        ("run wall.py --device cuda", "--device"),
-        ("run wall.py --batch 4", "--batch"),
-        ("run wall.py --intrinsics", "--intrinsics"),
-        ("run wall.py --data wall.py", "wall.py"),
+        ("score nothing.h5", "nothing.h5"),
+        ("compare a.py", "a.py"),
+        ("leaderboard wall.py", "wall.py"),
+        ("baseline oracle --data nothing.h5 --out p.h5", "nothing.h5"),
+        ("import --data ROOMS --out p.h5", "--depth"),
+        ("import --depth mine --responses mine --data ROOMS --out p.h5", "--depth"),
+        ("import --depth mine --unit mm --scale 2 --data ROOMS --out p.h5", "--unit"),
+        ("import --depth mine --scale 1/0 --data ROOMS --out p.h5", "1/0"),
+        ("import --depth mine/0.npy mine/1.npy --data ROOMS --out p.h5", "mine/1.npy"),
+        ("import --depth mine/[0-6].npy --data ROOMS --out p.h5", "7"),
+        ("run mine --data ROOMS --out p.h5", "mine"),
+        ("run wall.py --key depth --data ROOMS --out p.h5", "--key"),
+        ("run wall.py --intrinsics --data ROOMS --out p.h5", "--intrinsics"),
     ],
 )
 def test_a_mistake_is_one_line_and_leaves_nothing(line, word, home, truths, monkeypatch):
+    """What the library refuses is tested with it: here is what only a command can meet."""
     monkeypatch.chdir(home)
     (home / "wall.py").write_text(MODEL)
-    words = line.replace("IQTT", str(truths.iqtt)).split()
-    data = [] if "--data" in words else ["--data", truths.rooms]
-    done = bench(*words, *data, "--out", "p.h5")
-    assert done.exit_code == 2, done.output
+    done = bench(*line.replace("ROOMS", str(truths.rooms)).split())
+    assert (done.exit_code, done.stdout) == (2, ""), done.output
     assert word in done.stderr.splitlines()[-1]
     assert {path.name for path in home.iterdir()} <= {"mine", "wall.py", "__pycache__"}

@@ -21,17 +21,14 @@ from tiny_depth_models import MODELS, save  # noqa: E402
 
 from metrics.intake.doors import driver_version, load, provenance_of  # noqa: E402
 
-NEEDS_TORCHVISION = ("zoedepth", "depth-pro")
-CLASSES = [
-    pytest.param(
-        name,
-        marks=pytest.mark.skipif(
-            name in NEEDS_TORCHVISION and importlib.util.find_spec("torchvision") is None,
-            reason="its processor needs torchvision",
-        ),
-    )
-    for name in MODELS
-]
+TORCHVISION = pytest.mark.skipif(
+    importlib.util.find_spec("torchvision") is None, reason="its processor needs torchvision"
+)
+MARKS = {"zoedepth": TORCHVISION, "depth-pro": TORCHVISION}
+MARKS |= dict.fromkeys(
+    ("depth-anything-metric", "prompt-depth-anything", "dpt-dinov2", "tipsv2"), pytest.mark.slow
+)
+CLASSES = [pytest.param(name, marks=MARKS.get(name, ())) for name in MODELS]
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,6 @@ from measured_scenes import scene
 from PIL import Image
 
 import cli
-from metrics.intake.outputs import KEYS
 from metrics.measured.reader import MeasuredFile
 from metrics.score_file import read_scores
 from metrics.scoring.metric_names import OBJECT_SCORES
@@ -228,10 +227,6 @@ def test_depth_of_a_picture_that_is_turned(here):
     found = made(*MM, "--overwrite")
     assert found.exit_code == 2
     assert "EXIF" in found.stderr
-
-
-def test_the_help_names_all_keys_that_models_return():
-    assert all(key in bench("run", "--help").output for key in KEYS)
 
 
 def linked(path):

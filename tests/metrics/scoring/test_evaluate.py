@@ -4,8 +4,8 @@ import hashlib
 import json
 import os
 import shutil
-import signal
 import warnings
+from unittest.mock import Mock
 
 import h5py
 import numpy as np
@@ -29,6 +29,7 @@ from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from scenegen.camera import Camera
 from scenegen.common.errors import FileFormatError
+from scenegen.files.pool import LostWorkerError
 from scenegen.layout import SCORED, TRUTH_DIGEST
 from scenegen.rooms.reader import RoomsFile
 
@@ -153,7 +154,9 @@ def test_missing_rows_are_refused_or_stamped(folder, tmp_path):
     assert "3 of 8" in found.warnings[0]
 
 
-@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf, 9e99, -4e38])
+@pytest.mark.parametrize(
+    "bad", [np.nan, -4e38, *(pytest.param(x, marks=pytest.mark.slow) for x in (np.inf, 9e99))]
+)
 def test_what_is_not_finite_is_refused_with_its_rows_or_penalised(folder, tmp_path, bad):
     path = tmp_path / "bad.h5"
     shutil.copy(folder / "oracle.h5", path)
@@ -385,22 +388,14 @@ def test_how_values_are_packed_does_not_matter(truth):
     assert score([truth.with_name("predictions.h5")], truth).meta.truth_digest == before
 
 
-def killed(job, chunk):
-    signal.raise_signal(signal.SIGKILL)
-
-
-@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="sends signals")
-def test_a_killed_worker_is_an_error_and_no_traceback(tmp_path, rooms_path, monkeypatch):
-    """As Linux does where memory is short."""
-    write_room_baseline("oracle", rooms_path, tmp_path / "oracle.h5")
-    monkeypatch.setattr(module, "_score_in_worker", killed)
+def test_a_killed_worker_is_an_error_of_the_submission(folder, monkeypatch):
+    """As Linux does where memory is short; how that is found out is in `test_workers`."""
+    lost = LostWorkerError("rows 0 to 7", "signal 9, SIGKILL", hint="with --workers 1")
+    monkeypatch.setattr(module, "in_processes", Mock(side_effect=lost))
     monkeypatch.setattr(module, "CHUNK", 2)
-    with (
-        open_predictions(tmp_path / "oracle.h5") as file,
-        RoomsFile(rooms_path) as rooms,
-        refused(ScoringError, str(tmp_path / "oracle.h5"), hint="--processes"),
-    ):
-        module.score_rows([file], rooms, np.arange(8), Settings(processes=2))
+    path = folder / "oracle.h5"
+    with refused(ScoringError, str(path), found="SIGKILL", hint="--processes 1"):
+        score([path], folder / "rooms.h5", Settings(processes=2))
 
 
 def threads():

@@ -36,7 +36,10 @@ def test_rooms_of_another_file_get_no_hint(hints, make_rooms, tmp_path):
         assert hints(file["depth"][()], file["normal"][()], truth=truth) == []
 
 
-@pytest.mark.parametrize("odd", [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e-300])
+@pytest.mark.parametrize(
+    "odd",
+    [np.nan, np.inf, -1e300, *(pytest.param(x, marks=pytest.mark.slow) for x in (-np.inf, 1e-300))],
+)
 @pytest.mark.parametrize("share", [0.01, 1.0])
 def test_odd_values_are_passed_over(hints, room_arrays, odd, share):
     depth, normal, _, _ = room_arrays
@@ -166,7 +169,7 @@ SCALES = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("alignment", ["none", "scale_shift"])
+@pytest.mark.parametrize("alignment", ["scale_shift", pytest.param("none", marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", MISTAKES)
 def test_mistakes_whatever_may_be_aligned(hints, room_arrays, kind, alignment):
     depth, _, _, stretch = room_arrays
@@ -212,7 +215,11 @@ NORMALS = {
 }
 
 
-@pytest.mark.parametrize("kind", NORMALS)
+SLOW = ("OpenCV", "y", "z", "xz", "from 0 to 1")  # others are like them
+KINDS = [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in NORMALS]
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_mistakes_in_normals(hints, room_arrays, kind):
     depth, normal, rotation, _ = room_arrays
     mistake, words = NORMALS[kind]

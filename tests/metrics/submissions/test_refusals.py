@@ -57,6 +57,8 @@ def test_a_broken_submission(case, truths, tmp_path, monkeypatch, check_refusal)
             open_predictions(path)
         if case.words[0] in NAMES and case.names_truth:
             assert caught.value.where == f"{path}: {case.words[0]}"
+        if case.task == "rooms":  # what opening refuses, scoring does: it opens, too
+            return
     else:
         open_predictions(path).close()
     options = [] if truth is None else ["--truth", str(truth)]

@@ -184,14 +184,6 @@ def test_only_a_truth_of_a_strangers_choice_is_tried_in_another_process(
     assert tried == places == [truths.rooms, truths.iqtt.with_name("iqtt-test-answers.h5")]
 
 
-def test_truth_as_given(truths, tmp_path):
-    with open_predictions(good_rooms(tmp_path, truths.rooms)) as found:
-        assert find_truth(found) == FoundTruth(truths.rooms, "submission")
-        assert find_truth(found, truths.iqtt) == FoundTruth(truths.iqtt, "given")
-        with refused(FileFormatError, ": truth", found=str(tmp_path)):
-            find_truth(found, tmp_path)
-
-
 def test_answers_beside_the_test_file_are_the_truth(truths, tmp_path):
     with open_predictions(good_answers(tmp_path, truths.iqtt)) as found:
         expected = truths.iqtt.with_name("iqtt-test-answers.h5")
@@ -212,14 +204,14 @@ def test_nothing_but_a_regular_file_is_a_truth(truths, tmp_path, path):
 
 FOV, CAMERA = "camera/fov_y_degrees", "camera/world_from_camera"
 SPOILED = [
-    *(("depth", put("depth", (ROW, 0, 0), v)) for v in (np.inf, -np.inf, np.nan, 0.0, -1.0)),
+    *(("depth", put("depth", (ROW, 0, 0), v)) for v in (np.inf, np.nan, 0.0)),
     ("depth", put("object_id", (ROW, 0, 0), -1)),
     ("depth", damaged_chunk("depth", ROW)),
-    *(("normal", put("normal", (ROW, 0, 0), v)) for v in (np.nan, np.inf, 3e38, 0.0, (0, 0, 1.01))),
+    *(("normal", put("normal", (ROW, 0, 0), v)) for v in (np.nan, 3e38, (0, 0, 1.01))),
     ("object_id", in_all(put("depth", ROW, np.nan), put("object_id", ROW, -1))),
-    *((FOV, put(FOV, ROW, v)) for v in (0.0, -20.0, 180.0, np.nan, np.inf)),
-    *((CAMERA, put(CAMERA, (ROW, 0, 3), v)) for v in (np.nan, np.inf)),
-    *((CAMERA, put(CAMERA, (ROW, 0, 0), v)) for v in (np.nan, 1e300, 0.0)),
+    *((FOV, put(FOV, ROW, v)) for v in (0.0, 180.0, np.nan)),
+    (CAMERA, put(CAMERA, (ROW, 0, 3), np.nan)),
+    (CAMERA, put(CAMERA, (ROW, 0, 0), 1e300)),
     (CAMERA, put(CAMERA, (ROW, 3, 3), 2.0)),
     (CAMERA, values(CAMERA, lambda v: v * np.diag([1.001, 1.001, 1.001, 1.0]).sum(0))),
     (CAMERA, values(CAMERA, lambda v: v * np.array([-1, 1, 1, 1]))),  # turns space inside out
@@ -240,14 +232,3 @@ def test_a_truth_that_is_none_is_refused_with_its_place(name, spoil, truths, tmp
     (problem,) = validate(good_rooms(tmp_path, truths.rooms), truth)
     assert problem.dataset == "truth"
     assert f"{truth}: {name}, row " in problem.found
-
-
-def test_pixels_without_a_surface_are_not_scored(truths, tmp_path):
-    truth = tmp_path / "truth.h5"
-    shutil.copy(truths.rooms, truth)
-    with h5py.File(truth, "r+") as file:
-        in_all(put("depth", (ROW, 0), np.nan), put("object_id", (ROW, 0), -1))(file)
-    with RoomsFile(truth) as rooms:
-        mask = read_true_view(rooms, ROW).mask
-    assert not mask[0].any()
-    assert mask[1:].all()

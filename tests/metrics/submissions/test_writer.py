@@ -8,7 +8,6 @@ import h5py
 import numpy as np
 import pytest
 import torch
-from h5_edits import attribute
 from refusals import refused
 
 from iqtt.files.reader import AnswersFile
@@ -16,7 +15,7 @@ from metrics.prediction_writer import PredictionError, RoomPredictionWriter, wri
 from metrics.scoring.evaluate import score
 from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
-from scenegen.common.errors import FileFormatError, SceneGenError
+from scenegen.common.errors import SceneGenError
 from scenegen.rooms.reader import RoomsFile
 
 SIZE = (32, 32)
@@ -88,34 +87,50 @@ def spoiled(value, at=(3, 4), base=DEPTH):
     return array
 
 
-# What is added after a good row 0; then the place of the error, and words of what was found there.
+POINTS = np.dstack([np.zeros(SIZE), np.zeros(SIZE), np.full(SIZE, -2.0)])
+# Alignment, rows that are added, the place of the error, and words of what was found there.
+ROW_0 = (0, DEPTH, GOOD_NORMAL)
 REFUSED = {
-    "row beyond": ((8, DEPTH), "row", "8"),
-    "row is a float": ((1.0, DEPTH), "row", "1.0"),
-    "row given": ((0, DEPTH), "row 0", "twice"),
-    "shape": ((1, noise(0, 16, 16)), "row 1: depth", "16, 16)"),
-    "whole numbers": ((1, np.ones(SIZE, "u2")), "row 1: depth", "uint16"),
-    "ragged": ((1, [[1.0, 2.0], [3.0]]), "row 1: depth", "no array"),
-    "NaN": ((1, spoiled(np.nan)), "row 1: depth", "1 pixels, the first at (3, 4)"),
-    "masked": ((1, np.ma.masked_array(DEPTH, DEPTH[3, 4] == DEPTH)), "row 1: depth", "(3, 4)"),
-    "beyond float32": ((1, spoiled(1e39)), "row 1: depth", "(3, 4)"),
-    "negative z": ((1, -DEPTH), "row 1: depth", "at or below 0"),
-    "zeros": ((1, 0.0 * DEPTH), "row 1: depth", "at or below 0"),
-    "normal NaN": ((1, DEPTH, spoiled(np.nan, (5, 6, 0), GOOD_NORMAL)), "row 1: normal", "(5, 6)"),
-    "normal zero": ((1, DEPTH, spoiled(0.0, (5, 6), GOOD_NORMAL)), "row 1: normal", "length 0"),
-    "no normal": ((1, DEPTH, None), "row 1: normal", "none"),
-    "normal after none": ((1, DEPTH), "row 1: normal", "one"),
+    "row beyond": (None, [ROW_0, (8, DEPTH, GOOD_NORMAL)], "row", "8"),
+    "row is a float": (None, [ROW_0, (1.0, DEPTH, GOOD_NORMAL)], "row", "1.0"),
+    "row given": (None, [ROW_0, ROW_0], "row 0", "twice"),
+    "no normal": (None, [ROW_0, (1, DEPTH)], "row 1: normal", "none"),
+    "normal after none": (None, [(0, DEPTH), (1, DEPTH, GOOD_NORMAL)], "row 1: normal", "one"),
+    "shape": (None, [(0, noise(0, 16, 16))], "row 0: depth", "16, 16)"),
+    "whole numbers": (None, [(0, np.ones(SIZE, "u2"))], "row 0: depth", "uint16"),
+    "ragged": (None, [(0, [[1.0, 2.0], [3.0]])], "row 0: depth", "no array"),
+    "NaN": (None, [(0, spoiled(np.nan))], "row 0: depth", "1 pixels, the first at (3, 4)"),
+    "masked": (None, [(0, np.ma.masked_array(DEPTH, DEPTH[3, 4] == DEPTH))], "row 0: depth", "(3,"),
+    "beyond float32": (None, [(0, spoiled(1e39))], "row 0: depth", "(3, 4)"),
+    "negative z": (None, [(0, -DEPTH)], "row 0: depth", "at or below 0"),
+    "zeros": (None, [(0, 0.0 * DEPTH)], "row 0: depth", "at or below 0"),
+    "normal NaN": (None, [(0, DEPTH, spoiled(np.nan, (5, 6, 0), GOOD_NORMAL))], "row 0: normal",
+                   "(5, 6)"),
+    "normal zero": (None, [(0, DEPTH, spoiled(0.0, (5, 6), GOOD_NORMAL))], "row 0: normal",
+                    "length 0"),
+    "nothing": ("none", [(0,)], "row 0: geometry", "none"),
+    "two kinds": ("none", [{"depth": DEPTH, "points": POINTS}], "row 0: geometry", "depth and"),
+    "another kind": ("none", [{"depth": DEPTH}, {"points": POINTS}], "row 1: depth", "none"),
+    "disparity in metres": ("scale", [{"disparity": DEPTH}], "row 0: alignment", "scale"),
+    "points by medians": ("median_scale", [{"points": POINTS}], "row 0: alignment", "median"),
+    "points behind": ("none", [{"points": -POINTS}], "row 0: points", "at or below 0"),
+    "disparity NaN": (None, [{"disparity": spoiled(np.nan)}], "row 0: disparity", "(3, 4)"),
+    "a lens of 180": ("none", [{"depth": DEPTH, "fov_y_degrees": 180.0}], "row 0: fov_y_degrees",
+                      "180"),
+    "a lens once": ("none", [{"depth": DEPTH, "fov_y_degrees": 4.0}, {"depth": DEPTH}],
+                    "row 1: fov_y_degrees", "none"),
 }  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", REFUSED)
 def test_refused_at_write_time(writer, tmp_path, kind):
-    arguments, where, found = REFUSED[kind]
-    before = () if kind == "normal after none" else (GOOD_NORMAL,)
-    if len(arguments) == 2:
-        arguments = (*arguments, GOOD_NORMAL)
-    with refused(PredictionError, f"{tmp_path / 'predictions.h5'}: {where}", found=found):
-        fill(writer(), (0, DEPTH, *before), arguments)
+    alignment, rows, where, found = REFUSED[kind]
+    with (
+        refused(PredictionError, f"{tmp_path / 'predictions.h5'}: {where}", found=found),
+        writer(alignment=alignment) as out,
+    ):
+        for number, row in enumerate(rows):
+            out.add(number, **row) if isinstance(row, dict) else out.add(*row)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -326,60 +341,6 @@ def test_a_kind_comes_back_and_is_scored_as_what_it_is(kind, truths, tmp_path):
     scores = score([path], truths.rooms).metrics
     assert scores["chamfer"].value < 1e-5
     assert scores["relief_iou"].value > 0.999
-
-
-POINTS = np.dstack([np.zeros((32, 32)), np.zeros((32, 32)), np.full((32, 32), -2.0)])
-FLAT = np.full((32, 32), 2.0)
-
-
-@pytest.mark.parametrize(
-    ("alignment", "rows", "where"),
-    [
-        ("none", [{}], "row 0: geometry"),
-        ("none", [{"depth": FLAT, "points": POINTS}], "row 0: geometry"),
-        ("none", [{"depth": FLAT}, {"points": POINTS}], "row 1: depth"),
-        ("scale", [{"disparity": FLAT}], "row 0: alignment"),
-        ("median_scale", [{"points": POINTS}], "row 0: alignment"),
-        ("none", [{"points": -POINTS}], "row 0: points"),
-        (None, [{"disparity": np.where(np.eye(32), np.nan, FLAT)}], "row 0: disparity"),
-        ("none", [{"depth": FLAT, "fov_y_degrees": 180.0}], "row 0: fov_y_degrees"),
-        ("none", [{"depth": FLAT, "fov_y_degrees": 4.0}, {"depth": FLAT}], "1: fov_y_degrees"),
-    ],
-)
-def test_the_writer_refuses(alignment, rows, where, truths, tmp_path):
-    with (
-        refused(PredictionError, where),
-        RoomPredictionWriter(tmp_path / "p.h5", truths.rooms, method="m", alignment=alignment) as o,
-    ):
-        for row, values in enumerate(rows):
-            o.add(row, **values)
-    assert list(tmp_path.iterdir()) == []
-
-
-def beside(file):
-    file["disparity"] = file["depth"][()]
-
-
-def far_view(file):
-    file["fov_y_degrees"][2] = 200.0
-
-
-@pytest.mark.parametrize(
-    ("kind", "edit", "dataset", "rule"),
-    [
-        ("depth", beside, "disparity", "unique"),
-        ("depth", far_view, "fov_y_degrees", "range"),
-        ("disparity", attribute("alignment", "scale"), "alignment", "value"),
-    ],
-)
-def test_the_reader_refuses(kind, edit, dataset, rule, truths, tmp_path):
-    path = written(kind, truths.rooms, tmp_path / "p.h5")
-    with h5py.File(path, "r+") as file:
-        edit(file)
-    problem = validate(path, truths.rooms)[0]
-    assert (problem.dataset, problem.rule) == (dataset, rule)
-    with refused(FileFormatError, dataset):
-        open_predictions(path)
 
 
 @pytest.mark.parametrize("dtype", [torch.float32, torch.bfloat16, torch.float16])

@@ -51,6 +51,10 @@ def test_ranks_and_best_cells():
     (table,) = leaderboard(files, paper=False)
     assert best(table) == [[True, True], [False, False], [False, False]]
     assert ranks(table) == [("1", "high"), ("", f"baseline: {CHANCE}"), ("", "low")]
+    files = [iqtt_scores(name, right) for name, right in rights.items()]  # no baseline is known
+    assert ranks(leaderboard(files, paper=False)[0]) == [
+        ("1", "high"), ("", "baseline: chance"), ("", "low")
+    ]  # fmt: skip
 
 
 def test_what_is_not_comparable_is_never_ranked_nor_best():

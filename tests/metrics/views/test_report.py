@@ -6,8 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from made_scores import iqtt_scores, make_score, rooms_scores, simple_rooms, stated
 from pages import Page, cells_of
 from refusals import refused
@@ -26,7 +24,6 @@ from metrics.views.score_tables import (
     group_tables,
     main_table,
     side_by_side,
-    text_report,
     unit_warning,
     warnings_of,
     write_csv,
@@ -34,12 +31,10 @@ from metrics.views.score_tables import (
 from metrics.views.table import (
     Cell,
     Table,
-    latex,
     make_row,
     make_table,
     to_latex,
     to_markdown,
-    to_text,
 )
 from scenegen.common.text_table import printable, with_interval
 from scenegen.rooms.reader import RoomsFile
@@ -99,50 +94,6 @@ def test_latex_has_balanced_braces_and_all_its_cells(hostile):
     assert {len(re.findall(r"(?<!\\)&", row)) for row in ends} == {2}
     assert len(ends) == 1 + len(hostile.rows)
     assert tabular.count(r"\midrule") == 2, "one below the head, one before the baseline"
-
-
-def test_text_stays_within_its_lines(hostile):
-    lines = to_text(HOSTILE[2], [hostile], HOSTILE).splitlines()
-    assert all(line.isprintable() for line in lines)
-    assert len(lines) == 1 + 1 + 2 + len(hostile.rows) + len(HOSTILE), "each note once"
-    starts = {line.index("the room") for line in lines if "the room" in line}
-    starts |= {line.index(printable(HOSTILE[0])) for line in lines[4:] if line.startswith("  0 ")}
-    assert len(starts) == 1, "columns are aligned"
-
-
-SPECIAL = {
-    r"\textbackslash{}": "\\",
-    r"\textasciitilde{}": "~",
-    r"\textasciicircum{}": "^",
-    r"\textless{}": "<",
-    r"\textgreater{}": ">",
-    r"\textbar{}": "|",
-    r"{\char34}": '"',
-    r"\textasciigrave{}": "`",
-    r"\textquotesingle{}": "'",
-}
-
-
-@given(st.text(st.sampled_from("\\{}%#$&_^~<>|\"'`-[]ab é"), max_size=12))
-def test_latex_is_read_back_by_its_own_rules(text):
-    """A small reader of the few commands that are written, which knows no others."""
-    characters, rest = "", latex(text)
-    while rest:
-        for command, character in SPECIAL.items():
-            if rest.startswith(command):
-                characters, rest = characters + character, rest.removeprefix(command)
-                break
-        else:
-            if rest[0] == "\\":
-                assert rest[1] in "&%$#_{}", rest
-                characters, rest = characters + rest[1], rest[2:]
-            elif rest.startswith("{}"):
-                rest = rest[2:]
-            else:
-                assert rest[0] not in "{}%#$&_^~\"'`<>|", rest
-                characters, rest = characters + rest[0], rest[1:]
-    assert characters == text
-    assert "--" not in latex(text)
 
 
 CONTROLS = "\x1b[2J\x9b\u202e\u2066\x07"
@@ -263,14 +214,6 @@ def test_examples_of_questions_say_what_is_right(truths, tmp_path):
     for count, how in ((right, "correct"), (6 - right, "wrong")):
         assert f"{count} of {count} {how} responses" in page.text
     assert len(page.pictures) == 6 * 4
-
-
-def test_groups_stand_in_the_order_of_their_numbers():
-    spans = ["120-150", "150-180", "30-60", "60-90", "90-120"]
-    group = {"iqtt_accuracy": make_score("iqtt_accuracy", 0.5)}
-    scores = iqtt_scores("a", [1, 0], by_rotation_angle=dict.fromkeys(spans, group))
-    shown = re.findall(r"\b(?:\d+)-(?:\d+)\b", text_report(scores, whole=True))
-    assert shown == ["30-60", "60-90", "90-120", "120-150", "150-180"]
 
 
 @pytest.mark.parametrize(("factor", "shown"), [(1.0, True), (1000.0, False), (0.4, False)])

@@ -134,9 +134,9 @@ NAMES = [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in FA
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_mistake_is_named_with_its_size(name, spoilt):
-    """Every other mistake is made in shapes, the others in interiors."""
+    """Some mistakes are made in shapes, the others in interiors, which have fewer images."""
     change, expected, size = FAULTS[name]
-    report = spoilt(KINDS[list(FAULTS).index(name) % 2], "nerfstudio", change)
+    report = spoilt(KINDS[list(FAULTS).index(name) % 4 > 0], "nerfstudio", change)
     names = [fault.name for fault in report.faults]
     assert names[: len(expected)] == expected or sorted(names) == sorted(expected)
     assert not all(check.ok for check in report.checks)
@@ -207,7 +207,6 @@ OTHERS = [
     ("colmap", inverse_colmap, "poses"),
     ("bop", in_json("test/*/scene_camera.json", inverse_bop), "poses"),
     ("bop", in_json("test/*/scene_camera.json", lambda c: c.update(depth_scale=1.0)), "unit"),
-    ("moge", distances_moge, "distance"),
 ]
 
 
@@ -252,7 +251,7 @@ def fov_of_hypersim():
 
 
 def test_the_command_names_what_is_wrong(out, run, tmp_path):
-    assert run("check", out("shapes") / "bop").exit_code == 0
+    assert run("check", out("shapes") / "moge").exit_code == 0
     shutil.copytree(out("shapes") / "moge", tmp_path / "moge")
     distances_moge(tmp_path / "moge")
     result = run("check", tmp_path / "moge")

@@ -5,14 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from scenegen.description.interiors import Interior
 from scenegen.description.presets import preset_spec
 from scenegen.objects.catalogue import objects_of
-from scenegen.rendering.backend import select_variant
 from scenegen.sampling.interiors.alternatives import (
     APART_ON_TOP,
     DIFFERENCES,
-    LIKE,
     draw_alternatives,
 )
 from scenegen.sampling.interiors.spaces import Space, apart, clear_of
@@ -34,11 +31,11 @@ def drawn():
     return found
 
 
-def boxes(room, numbers):
-    return [room[1][n - 1].box for n in numbers]
+def boxes(found):
+    return [things[found.in_play - 1].box for _, things, *_ in found.rooms]
 
 
-@pytest.mark.parametrize("difference", DIFFERENCES[:3])
+@pytest.mark.parametrize("difference", DIFFERENCES)
 def test_only_what_is_in_play_and_what_it_carries_differs(drawn, difference):
     found = drawn[difference]
     assert len(found.rooms) == 3
@@ -51,8 +48,8 @@ def test_only_what_is_in_play_and_what_it_carries_differs(drawn, difference):
             for n, (a, b) in enumerate(zip(first[1], room[1], strict=True), start=1)
             if (a.box, a.piece.name) != (b.box, b.piece.name)
         }
-        assert set(found.in_play) <= moved
-        assert all(n in found.in_play or first[1][n - 1].stands_on in moved for n in moved)
+        assert found.in_play in moved
+        assert all(n == found.in_play or first[1][n - 1].stands_on in moved for n in moved)
 
 
 @pytest.mark.parametrize("difference", DIFFERENCES)
@@ -60,7 +57,7 @@ def test_objects_are_apart_and_those_in_play_inside_the_room(drawn, difference):
     for room, things, _, _ in drawn[difference].rooms:
         space = Space(room.size, 99)
         for number, thing in enumerate(things):
-            assert space.within(thing.box) or number + 1 not in drawn[difference].in_play
+            assert space.within(thing.box) or number + 1 != drawn[difference].in_play
             for other in things[:number]:
                 below = thing.stands_on and things[thing.stands_on - 1] is other
                 good = below and clear_of(other.piece, other.box, thing.box)
@@ -68,65 +65,16 @@ def test_objects_are_apart_and_those_in_play_inside_the_room(drawn, difference):
 
 
 def test_moved_objects_are_far_enough_from_each_other_place(drawn):
-    places = [
-        (b.x, b.z) for room in drawn["moved"].rooms for b in boxes(room, drawn["moved"].in_play)
-    ]
+    places = [(b.x, b.z) for b in boxes(drawn["moved"])]
     assert all(math.dist(a, b) >= APART_ON_TOP for i, a in enumerate(places) for b in places[:i])
 
 
-def test_swapped_objects_stand_at_the_same_three_places_in_cyclic_orders(drawn):
-    found = drawn["swapped"]
-    orders = [[(b.x, b.z) for b in boxes(room, found.in_play)] for room in found.rooms]
-    assert len(set(orders[0])) == 3
-    assert orders[1] == orders[0][1:] + orders[0][:1]
-    assert orders[2] == orders[0][2:] + orders[0][:2]
-    pieces = [found.rooms[0][1][n - 1].piece for n in found.in_play]
-    assert len({piece.family for piece in pieces}) == 3
-    sizes = [math.prod(piece.half) * piece.height for piece in pieces]
-    assert max(sizes) <= LIKE**3 * min(sizes)
-
-
 def test_turned_objects_keep_their_place_and_face_elsewhere(drawn):
-    found = drawn["turned"]
-    seen = [box for room in found.rooms for box in boxes(room, found.in_play)]
+    seen = boxes(drawn["turned"])
     assert len({(box.x, box.z, box.bottom) for box in seen}) == 1
     for i in range(3):
         apart_by = abs(seen[i].turns - seen[i - 1].turns) % 1
         assert 1 / 6 <= apart_by <= 5 / 6
-
-
-def test_mirror_images_have_all_places_mirrored_but_no_object(drawn):
-    (room, things, places, target), (other, mirrored, seen_from, at) = drawn["mirror-pair"].rooms
-    width = room.size[0]
-    assert other.size == room.size
-    assert [t.piece for t in things] == [t.piece for t in mirrored]
-    np.testing.assert_allclose([t.box.x for t in mirrored], [width - t.box.x for t in things])
-    assert [t.box.z for t in mirrored] == [t.box.z for t in things]
-    np.testing.assert_allclose([p[0] for p in seen_from], [width - p[0] for p in places])
-    np.testing.assert_allclose(at[0], width - target[0])
-    spans = {(h.wall, h.right - h.left) for h in room.openings}
-    swapped = {"west": "east", "east": "west"}
-    assert {(swapped.get(w, w), s) for w, s in spans} == {
-        (h.wall, h.right - h.left) for h in other.openings
-    }
-
-
-def test_the_light_of_mirror_images_is_mirrored(drawn):
-    variant = select_variant("cpu")
-    import mitsuba  # after LLVM is found
-
-    mitsuba.set_variant(variant)
-    from scenegen.rendering.pictures.sky import outside
-
-    (room, things, *_), (other, *_) = drawn["mirror-pair"].rooms
-    first, second = (
-        outside(Interior(r.size, r.openings, (0,) * len(things), r.hour, r.facing_degrees, r.lit,
-                         r.mirrored))
-        for r in (room, other)
-    )  # fmt: skip
-    assert room.mirrored != other.mirrored
-    np.testing.assert_allclose(first.toward_sun * (-1, 1, 1), second.toward_sun, atol=1e-12)
-    np.testing.assert_allclose(first.radiance[:, ::-1], second.radiance, rtol=1e-5)
 
 
 @pytest.mark.parametrize("difference", DIFFERENCES)

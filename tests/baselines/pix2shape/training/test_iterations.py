@@ -51,7 +51,7 @@ def run(
     """Train, all iterations or some, and return the losses."""
     sources = sources if isinstance(sources, Sources) else Sources(sources)
     begun, reported = state.card.iteration, []
-    check_request(state.network, sources, 1)
+    check_request(state.network, sources)
     losses = Iterations(state.network, sources, begun, workers)
 
     def progress(done: int, total: int, numbers: Any) -> None:
@@ -103,14 +103,13 @@ def test_a_stop_in_the_middle_changes_nothing(case, rooms_path, train_questions,
         ({"material": True, "reconstruction": 0.0, "depth": 1.0}, "material"),
         ({"lights": 3, "reconstruction": 0.0, "depth": 1.0}, "lights"),
         ({"reconstruction": 0.0}, "losses"),
-        ({"batch": 5}, "devices"),
     ],
 )
 def test_requests_that_teach_nothing_are_refused(change, where, rooms_path):
     config = replace(PLAIN, **change)
     source = room_source(rooms_path, config)
     with refused(SpecError, where):
-        check_request(state_of(config).network, Sources(source), 2)
+        check_request(state_of(config).network, Sources(source))
 
 
 def test_the_generators_step_leaves_the_critic_alone(rooms_path, tmp_path, monkeypatch):

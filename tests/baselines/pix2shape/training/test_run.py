@@ -23,8 +23,8 @@ from baselines.pix2shape.training import run as module
 from baselines.pix2shape.weights import METHOD
 from baselines.training.checkpoint import load_checkpoint, load_weights
 from baselines.training.data import TrainingFiles
+from baselines.training.fit import TrainingError
 from baselines.training.machine import Machine
-from baselines.training.processes import LostProcessError
 from scenegen.common.errors import SceneGenError, SpecError
 
 HERE = Machine("cpu", workers=0, every=2)
@@ -62,13 +62,13 @@ def same(one: Path, other: Path) -> bool:
     return all(torch.equal(found[name], expected[name]) for name in found)
 
 
-def test_a_killed_reader_ends_the_run_as_a_lost_process(rooms_path, folder):
+def test_a_killed_reader_ends_the_run(rooms_path, folder):
     def kill(*_: Any) -> None:
         for child in multiprocessing.active_children():
             child.kill()
             child.join()
 
-    with pytest.raises(LostProcessError):
+    with pytest.raises(TrainingError):
         train_run(folder, rooms_path, CONFIG, replace(HERE, workers=1), progress=kill)
 
 
@@ -186,25 +186,6 @@ def test_each_class_has_the_mean_of_its_codes():
         torch.testing.assert_close(one[::2].mean(dim=0), torch.full((4,), 5.0), atol=0.1, rtol=0)
         torch.testing.assert_close(one[1::2].T.cov(), torch.eye(4), atol=0.15, rtol=0)
     torch.testing.assert_close(prior.mean[2], codes.mean(dim=0))
-
-
-@pytest.mark.parametrize("config", [CONFIG, None], ids=["new", "resumed"])
-def test_a_run_that_ended_meanwhile_is_kept(config, rooms_path, folder, monkeypatch):
-    """It trained in the folder between the first look at it and the lock."""
-    if config is None:
-        with pytest.raises(Killed):
-            train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(2))
-    launched = module.launched
-
-    def meanwhile(*given: Any) -> Any:
-        monkeypatch.setattr(module, "launched", launched)
-        train_run(folder, rooms_path, config, HERE)
-        return launched(*given)
-
-    monkeypatch.setattr(module, "launched", meanwhile)
-    with refused(SceneGenError, str(folder), hint="--resume"):
-        train_run(folder, rooms_path, config, HERE)
-    assert load_checkpoint(folder, METHOD).card.iteration == 4
 
 
 OFF = dict.fromkeys(LOSSES, 0.0)

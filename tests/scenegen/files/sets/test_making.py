@@ -15,7 +15,7 @@ from made_sets import SEED, contents, everything, questions, rooms, same_values
 
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.files.pool import LostWorkerError
-from scenegen.files.sets.making import complete_parts, parts_folder
+from scenegen.files.sets.making import CompleteError, complete_parts, parts_folder
 from scenegen.files.sets.shards import ROW_DIGESTS
 from scenegen.rooms.render import RoomsWork
 
@@ -139,7 +139,7 @@ def test_a_run_goes_on_where_it_stopped(made, tmp_path, share):
     assert {name: (folder / name).stat().st_mtime_ns for name in before} == before
     assert contents(folder) == contents(made[1])
     assert hidden(folder) == []
-    with pytest.raises(FileExistsError):
+    with pytest.raises(CompleteError):
         task.shards(folder)
 
 
@@ -179,8 +179,9 @@ def test_files_are_replaced_only_when_told(task, tmp_path):
     task.shards(folder)
     before = contents(folder)
     for make in (task.make, task.shards):
-        with pytest.raises(FileExistsError):
+        with pytest.raises(FileExistsError) as error:
             make(folder, seed=9)
+        assert not isinstance(error.value, CompleteError)
     with pytest.raises(StopError):
         task.shards(folder, overwrite=True, seed=9, progress=stopping(task.rows - 1))
     assert contents(folder) == before
@@ -308,7 +309,7 @@ except scenegen.SceneGenError as error:
 
 
 @pytest.mark.parametrize("made", ["views"], indirect=True)
-@pytest.mark.parametrize("shards", [2, 1])
+@pytest.mark.parametrize("shards", [pytest.param(2, marks=pytest.mark.slow), 1])
 def test_what_is_held_to_the_end_does_not_crash_hdf5(copied, shards):
     """Python's own end does not free what a traceback or a cache holds; nor with a lost shard."""
     task, folder = copied

@@ -1,1 +1,0 @@
-"""Minimal examples of faults in libraries, for reports to their authors."""
