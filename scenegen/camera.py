@@ -34,7 +34,7 @@ class Camera:
     Attributes:
         position: centre of projection, world, scene units.
         target: the point it looks at, world; not straight above or below `position`.
-        fov_y_degrees: vertical field of view; 180 for panoramas.
+        fov_y_degrees: vertical field of view; of panoramas, of the view ahead.
     """
 
     position: Vector3
@@ -42,7 +42,7 @@ class Camera:
     fov_y_degrees: float
 
     def __post_init__(self) -> None:
-        check(0 < self.fov_y_degrees <= 180, "fov_y_degrees", self.fov_y_degrees, "0 to 180")
+        check(0 < self.fov_y_degrees < 180, "fov_y_degrees", self.fov_y_degrees, "0 to 180")
         check(self.position != self.target, "camera", self.position, "a target elsewhere")
 
     @staticmethod

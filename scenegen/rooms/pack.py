@@ -85,7 +85,10 @@ def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
     classes = [spec.shapes.index(name.partition("/")[0]) for name in batch.names]
     shape, view = batch.shape[images], batch.view[images]
     more = _interior(batch, images) if batch.interior is not None else {}
-    if batch.lens(0).is_flat and not batch.lens(0).is_centred:
+    fov = batch.fov_y_degrees[images]
+    if spec.projection != "perspective":
+        fov = np.full(len(images), 180.0)
+    elif not batch.lens(0).is_centred:
         size = spec.height, spec.width
         matrices = [intrinsics(*size, batch.lens(i), pixel_centers="half") for i in images]
         more["camera/intrinsics"] = np.array(matrices)
@@ -95,7 +98,7 @@ def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
         "view_index": view,
         "view_angle_degrees": np.array(spec.view_angles)[view],
         "camera/world_from_camera": batch.world_from_camera[images],
-        "camera/fov_y_degrees": batch.fov_y_degrees[images],
+        "camera/fov_y_degrees": fov,
         "light/count": batch.light_count[images],
         "light/position": batch.light_position[images],
         "light/color": batch.light_color[images],

@@ -122,7 +122,7 @@ def scene_arrays(
             rotation[row, k] = cosine, 0.0, sine, 0.0
         camera[row], target[row] = places, at
         degrees = item_room(spec, int(index[row]))[2]
-        fov[row] = spec.fov_y(degrees) if spec.projection == "perspective" else 180.0
+        fov[row] = spec.fov_y(degrees)
         told = Interior(
             room.size, room.openings, tuple(thing.stands_on for thing in things),
             room.hour, room.facing_degrees, room.lit,

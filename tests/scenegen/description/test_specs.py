@@ -102,6 +102,7 @@ OUT_OF_RANGE: dict[str, list[Any]] = {
     "fov_degrees": [0.9, 121.0, NAN],
     "principal_point": [(0.5, -1.6), (2.6, 0.5), (0.5,), (NAN, 0.5)],
     "pixel_aspect": [0.2, 4.1, NAN],
+    "projection": ["fisheye", "equirectangular"],
     "stereo": [-0.1, 0.26, NAN],
     "fov_spread_degrees": [-1.0, 92.5, NAN],
     "camera_radius": [1.0, 10.1, NAN],
