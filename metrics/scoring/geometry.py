@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from metrics.measures.alignment import Alignment, align, align_points, depth_of_disparity
 from metrics.submissions.reader import PredictedView
-from scenegen.camera import Lens, pixel_directions
+from scenegen.camera import Lens, as_lens, pixel_directions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -33,7 +33,7 @@ class Geometry:
 
 
 def fitted_geometry(
-    predicted: PredictedView, true_depth: Array, lens: Lens, mask: Mask
+    predicted: PredictedView, true_depth: Array, lens: Lens | float, mask: Mask
 ) -> Geometry:
     """Return a prediction after its declared alignment to the true depth (H, W) of the mask.
 
@@ -61,17 +61,17 @@ def fitted_geometry(
     return Geometry(depth, rays * values[:, None], True)
 
 
-def _depth_of(points: Array, lens: Lens) -> Array:
-    away = -points[..., 2] if lens.is_flat else np.sqrt(np.square(points).sum(axis=-1))
+def _depth_of(points: Array, lens: Lens | float) -> Array:
+    away = -points[..., 2] if as_lens(lens).is_flat else np.sqrt(np.square(points).sum(axis=-1))
     return np.asarray(away)
 
 
-def depth_as_scored(predicted: PredictedView, true_depth: Array, lens: Lens) -> Array:
+def depth_as_scored(predicted: PredictedView, true_depth: Array, lens: Lens | float) -> Array:
     """Return depth (H, W) as scores see it, for pictures; no value needs to be finite."""
     return _depth_of(points_as_scored(predicted, true_depth, lens), lens)
 
 
-def points_as_scored(predicted: PredictedView, true_depth: Array, lens: Lens) -> Array:
+def points_as_scored(predicted: PredictedView, true_depth: Array, lens: Lens | float) -> Array:
     """Return points (H, W, 3) as scores see them, NaN where one of both is not finite."""
     known = np.isfinite(true_depth)
     if predicted.kind == "layers":
