@@ -5,11 +5,11 @@ Heavy imports happen inside the commands, so that `--help` is quick and works wi
 
 import json
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -17,7 +17,6 @@ from baselines.pix2shape.commands import (
     ALLOW_TEST_SET,
     DEVICE,
     MINUTES,
-    STREAM,
     SUBMISSION,
     WEIGHTS_PATH,
     Setting,
@@ -37,72 +36,73 @@ from scenegen.command_line.paths import InputPath, OutputFolder
 if TYPE_CHECKING:
     from baselines.training.baseline import Baseline
 
-UNTRAINED = {
-    "constant": "rooms: a constant depth, the mean over the images of --train",
-    "mean-depth": "rooms: the mean depth of --train at each pixel",
-    "empty-room": "rooms: ground-truth walls and ground, no objects",
-    "cut-out": "rooms: ground-truth masks, flat, at the true distance of each object",
-    "picture-outline": "rooms: a foreground mask from the image, at a constant height",
-    "balls": "rooms: a sphere for each component of the picture-outline mask in the first view",
-    "outline-regression": "rooms: the picture-outline mask, heights by a regression on --train",
-    "outline-relief": "rooms: the picture-outline mask, heights by trees trained on --train",
-    "nearest": "rooms: the heights of the most similar image of --train",
-    "oracle": "the ground truth, which scores perfectly",
-    "chance": "questions: random options",
-    "oracle-warp": "questions: true depth of rooms, warped into the other camera",
-    "cubes": "questions: images decoded to 3D cubes; nothing is learned",
-    "outline": "questions: the most similar silhouette, without labels or 3D",
-    "features": "questions: features of a frozen encoder, given by --features",
-    "outline-trees": "questions: trees on silhouette features, learned from --train",
-    "pix2shape": "rooms and questions: Pix2Shape, trained with the losses of the paper",
-    "pix2shape-compact": "rooms and questions: Pix2Shape, trained with other losses",
-    "pix2shape-rays": "rooms: Pix2Shape, given the walls, trained on several views",
-    "pix2shape-views": "questions: Pix2Shape with a separate encoder",
-}
-OF_SHAPES = (
-    "cubes",
-    "depth-match",
-    "ptn",
-    "rezende",
-    "pix2shape",
-    "pix2shape-compact",
-    "pix2shape-views",
-)  # which know the camera of shapes, and no rooms
-REFERENCE = ("pix2shape", "pix2shape-compact", "pix2shape-rays", "pix2shape-views")
-# Baselines that are trained with `bench train NAME`: the modules of their `BASELINE`, and what they
-# are. A new one is a line here.
-HOMES = {
-    "cnn": ("resnets.cnn", "questions: ResNets and a softmax over the options"),
-    "depth-completed": (
-        "relief.depth_completed",
-        "rooms: a network that completes the depth of the first view",
-    ),
-    "depth-match": (
-        "depth_match.training",
-        "questions: depth from a network, rotated until two views agree",
-    ),
-    "depth-supervised": (
-        "relief.depth_supervised",
-        "rooms: a network trained with ground-truth depth",
-    ),
-    "ptn": ("ptn.training", "rooms and questions: voxels, trained with silhouettes"),
-    "rezende": (
-        "rezende.training",
-        "questions: meshes, trained through a non-differentiable renderer",
-    ),
-    "siamese": ("resnets.siamese", "questions: the option with the most similar features"),
-    "view-pairs": (
-        "relief.view_pairs",
-        "rooms: a network trained with pairs of images, without depth",
-    ),
-}
-TRAINED = {name: text for name, (_, text) in HOMES.items()}
-ALL = {**UNTRAINED, **TRAINED}
+
+class Named(NamedTuple):
+    """A baseline of `bench baseline NAME`: its task, what it is, and the options that it has.
+
+    Attributes:
+        home: of one with weights, the module of its `BASELINE`; "pix2shape" for the reference.
+        needs, takes: options that it cannot do without, and further ones, besides --weights.
+    """
+
+    task: str
+    text: str
+    home: str = ""
+    needs: tuple[str, ...] = ()
+    takes: tuple[str, ...] = ()
 
 
-def _listed(baselines: Mapping[str, str]) -> str:
-    wide = max(map(len, baselines))
-    lines = (f"  {name:{wide}}  {text}" for name, text in baselines.items())
+ROOMS, QUESTIONS = "rooms", "questions"
+CUBES = f"{QUESTIONS} about cubes"
+BOTH, TRAIN, LABELS = f"{ROOMS} and {CUBES}", ("train",), ("train", "labels")
+# fmt: off
+ALL = {
+    "constant": Named(ROOMS, "a constant depth, the mean over the images of --train", needs=TRAIN),
+    "mean-depth": Named(ROOMS, "the mean depth of --train at each pixel", needs=TRAIN),
+    "empty-room": Named(ROOMS, "ground-truth walls and ground, no objects"),
+    "cut-out": Named(ROOMS, "ground-truth masks, flat, at the true distance of each object"),
+    "picture-outline": Named(ROOMS, "a foreground mask from the image, at a constant height"),
+    "balls": Named(ROOMS, "a sphere for each component of the outline mask in the first view"),
+    "outline-regression": Named(ROOMS, "the outline mask, heights by a regression", needs=TRAIN),
+    "outline-relief": Named(ROOMS, "the outline mask, heights by trees", needs=TRAIN),
+    "nearest": Named(ROOMS, "the heights of the most similar image of --train", needs=TRAIN),
+    "oracle": Named(ROOMS, "the ground truth, which scores perfectly"),
+    "chance": Named(QUESTIONS, "random options"),
+    "oracle-warp": Named(QUESTIONS, "true depth of rooms, warped into the other camera"),
+    "cubes": Named(CUBES, "images decoded to 3D cubes; nothing is learned"),
+    "outline": Named(QUESTIONS, "the most similar silhouette, without labels or 3D"),
+    "features": Named(QUESTIONS, "features of a frozen encoder, given by --features",
+                      needs=("features",), takes=("train_features", *LABELS)),
+    "outline-trees": Named(QUESTIONS, "trees on silhouette features", needs=TRAIN, takes=LABELS),
+    "pix2shape": Named(BOTH, "Pix2Shape, trained with the losses of the paper", "pix2shape"),
+    "pix2shape-compact": Named(BOTH, "Pix2Shape, trained with other losses", "pix2shape"),
+    "pix2shape-rays": Named(ROOMS, "Pix2Shape, given the walls, trained on several views",
+                            "pix2shape"),
+    "pix2shape-views": Named(CUBES, "Pix2Shape with a separate encoder", "pix2shape"),
+    "cnn": Named(QUESTIONS, "ResNets and a softmax over the options", "resnets.cnn"),
+    "depth-completed": Named(ROOMS, "a network that completes the depth of the first view",
+                             "relief.depth_completed"),
+    "depth-match": Named(CUBES, "depth from a network, rotated until two views agree",
+                         "depth_match.training"),
+    "depth-supervised": Named(ROOMS, "a network trained with ground-truth depth",
+                              "relief.depth_supervised"),
+    "ptn": Named(BOTH, "voxels, trained with silhouettes", "ptn.training"),
+    "rezende": Named(CUBES, "meshes, trained through a non-differentiable renderer",
+                     "rezende.training"),
+    "siamese": Named(QUESTIONS, "the option with the most similar features", "resnets.siamese"),
+    "solid-supervised": Named(ROOMS, "layers from the ground-truth masks and depth, learned",
+                              "relief.solid_supervised"),
+    "view-pairs": Named(ROOMS, "a network trained with pairs of images, without depth",
+                        "relief.view_pairs"),
+}
+# fmt: on
+REFERENCE = "pix2shape"
+HOMES = {name: it.home for name, it in ALL.items() if it.home not in ("", REFERENCE)}
+
+
+def _listed(names: Iterable[str]) -> str:
+    wide = max(map(len, names))
+    lines = (f"  {name:{wide}}  {ALL[name].task}: {ALL[name].text}" for name in names)
     return "\n".join(("\b", "Baselines:", *lines, "", ""))
 
 
@@ -172,11 +172,10 @@ def baseline(
         with OpenFile(train, "rooms or question file") as opened:
             refuse_test_set(opened)
     _check_task(name, data)
-    _check_options(name, weights, train, labels, features)
-    if train_features is not None and name != "features":
-        raise click.UsageError(f"--train-features: {name} takes none")
+    given = {"weights": weights, "train": train, "labels": labels, "features": features}
+    _check_options(name, {**given, "train_features": train_features})
     method = name
-    if name in REFERENCE:
+    if ALL[name].home == REFERENCE:
         used = predict_to(out, weights, data, method=name, overwrite=overwrite)
         method += f", weights {used}"
     elif name == "chance":
@@ -186,7 +185,7 @@ def baseline(
     else:
         with shown_rows() as show:
             how: dict[str, Any] = {"overwrite": overwrite, "progress": show}
-            if name in TRAINED:
+            if name in HOMES:
                 from baselines.training.baseline import write_submission
 
                 write_submission(_baseline(name), data, out, weights, **how)
@@ -216,23 +215,16 @@ def baseline(
     print_line(how_to_score(out, data))
 
 
-def _check_options(
-    name: str, weights: str | None, train: str | None, labels: int | None, features: str | None
-) -> None:
+def _check_options(name: str, given: Mapping[str, Any]) -> None:
     """Raise UsageError for an option that a baseline does not have, or lacks."""
-    if weights is not None and name not in (*REFERENCE, *TRAINED):
-        raise click.UsageError(f"--weights: {name} has none")
-    if train is not None and name in (*REFERENCE, *TRAINED):
-        command = "pix2shape train" if name in REFERENCE else f"bench train {name}"
-        raise click.UsageError(f"--train: {name} takes trained weights; train with {command}")
-    if name in ("outline", "outline-trees") and (train is None) == (name == "outline-trees"):
-        wants = "needs" if train is None else "uses no"
-        raise click.UsageError(f"--train: {name} {wants} labelled questions")
-    if labels is not None and name not in ("outline-trees", "features"):
-        raise click.UsageError(f"--labels: {name} uses no labels")
-    if (features is None) == (name == "features"):
-        how = "needs features of the images" if features is None else "takes none"
-        raise click.UsageError(f"--features: {name} {how}")
+    named = ALL[name]
+    has = (*named.needs, *named.takes, *["weights"] * bool(named.home))
+    for option, value in given.items():
+        flag = f"--{option.replace('_', '-')}"
+        if value is not None and option not in has:
+            raise click.UsageError(f"{flag}: {name} takes none")
+        if value is None and option in named.needs:
+            raise click.UsageError(f"{flag}: {name} needs it")
 
 
 def _check_task(name: str, data: str) -> None:
@@ -244,24 +236,26 @@ def _check_task(name: str, data: str) -> None:
 
     if not Path(data).is_file():
         return  # its reader says so, after what is missing otherwise
-    task = ALL[name].partition(":")[0]
     with OpenFile(data, "file of rooms or questions") as opened:
-        stored = DATA_FORMATS.get(read_text(opened.file, "format", data) or "", task)
-        of_rooms = stored == "questions" and MARK in str(opened.file.attrs.get("spec", ""))
-    if of_rooms and name in OF_SHAPES:
-        expected = "try oracle-warp, outline, features, cnn or siamese"
-        why = f"{name} does not answer questions about rooms, such as those of {data}"
-        raise click.UsageError(f"{why}; {expected}")
-    if task in ("rooms", "questions") and task != stored:
-        others = ", ".join(other for other in ALL if ALL[other].startswith(f"{stored}:"))
-        raise click.UsageError(f"{name} predicts {task}, and {data} holds {stored}; try {others}")
+        stored = DATA_FORMATS.get(read_text(opened.file, "format", data) or "", ALL[name].task)
+        of_rooms = stored == QUESTIONS and MARK in str(opened.file.attrs.get("spec", ""))
+    able = [
+        other
+        for other, it in ALL.items()
+        if stored in it.task and not (of_rooms and CUBES in it.task)
+    ]
+    if name not in able:
+        about = "questions about rooms" if of_rooms else stored
+        raise click.UsageError(
+            f"{name} does not predict {about}, as {data} holds; try {', '.join(able)}"
+        )
 
 
 @click.command(
     name="train",
-    epilog=f"{_listed(TRAINED)}{EXAMPLE}bench train cnn --data iqtt-split/iqtt-train.h5 --out run",
+    epilog=f"{_listed(HOMES)}{EXAMPLE}bench train cnn --data iqtt-split/iqtt-train.h5 --out run",
 )
-@click.argument("name", type=click.Choice(list(TRAINED)), metavar="NAME")
+@click.argument("name", type=click.Choice(list(HOMES)), metavar="NAME")
 @click.argument("more", type=InputPath(), nargs=-1, metavar="")
 @click.option(
     "--data",
@@ -270,7 +264,6 @@ def _check_task(name: str, data: str) -> None:
     metavar="FILE...",
     help="Training files of rooms or questions. Depth networks take several files.",
 )
-@STREAM
 @click.option("--out", type=OutputFolder(), required=True, help="Output folder of the run.")
 @click.option(
     "--labels",
@@ -299,7 +292,6 @@ def train_baseline(
     name: str,
     more: tuple[str, ...],
     data: tuple[str, ...],
-    stream: str | None,
     out: str,
     labels: int | None,
     seed: int | None,
@@ -319,8 +311,6 @@ def train_baseline(
     if minutes is not None and iterations is not None:
         raise click.UsageError("--minutes sets --iterations: leave one of them out")
     home = _baseline(name)
-    if stream is not None and home.streamed is None:
-        raise click.UsageError(f"--stream: {name} trains on files only: give --data")
     from baselines.training.baseline import train
     from baselines.training.machine import Machine
     from scenegen.common.records import check, from_json
@@ -339,7 +329,7 @@ def train_baseline(
     how = {key: chosen.pop(key) for key in arguments & chosen.keys()}
     made = from_json(home.settings, json.dumps(chosen), "settings")
     text = ""
-    opened = training_data((*data, *more), stream, allow_test_set)
+    opened = training_data((*data, *more), allow_test_set)
     with opened as files, shown_training(out, machine.every) as show:
 
         def remember(done: int, total: int, numbers: Mapping[str, float]) -> None:
@@ -357,7 +347,7 @@ def train_baseline(
 def _baseline(name: str) -> "Baseline":
     """Return a trained baseline. Raises UserError where torch is missing."""
     needs_torch(name, ("torch", "safetensors"))
-    home: Baseline = import_module(f"baselines.{HOMES[name][0]}").BASELINE
+    home: Baseline = import_module(f"baselines.{HOMES[name]}").BASELINE
     return home
 
 

@@ -5,6 +5,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+from scipy.ndimage import convolve1d
+
+from scenegen.common.rotations import rotation_matrix
 
 Array = NDArray[Any]
 ROTATIONS = 24_000  # of the first grid
@@ -94,22 +97,14 @@ def likely_poses(outlines: Array, most: int, rng: np.random.Generator) -> list[A
     return poses
 
 
-def _rotations(q: Array) -> Array:
-    w, x, y, z = (q / np.linalg.norm(q, axis=1, keepdims=True)).T
-    rows = (
-        (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
-        (2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)),
-        (2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)),
-    )
-    return np.ascontiguousarray(np.moveaxis(np.array(rows), 2, 0))
+def _rotations(quaternions: Array) -> Array:
+    lengths = np.linalg.norm(quaternions, axis=1, keepdims=True)
+    return np.ascontiguousarray(rotation_matrix((quaternions / lengths).T))
 
 
 def _smooth(image: Array) -> Array:
     for axis in (0, 1):
-        wide = np.pad(image, [(2, 2) if a == axis else (0, 0) for a in (0, 1)])
-        n = image.shape[axis]
-        parts = [w * wide.take(range(k, k + n), axis=axis) for k, w in enumerate(KERNEL)]
-        image = np.sum(parts, axis=0)
+        image = convolve1d(image, KERNEL, axis, mode="constant")
     return image
 
 

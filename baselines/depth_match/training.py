@@ -6,8 +6,8 @@ right, is not read.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 import torch
@@ -22,12 +22,9 @@ from baselines.training.data import requests
 from baselines.training.fit import Loss
 from baselines.training.images import Array, Draws, check_reducible
 from baselines.training.questions import UNLABELED, check_truth, question_images
-from baselines.training.streams import TrainingStreams
-from iqtt import QuestionsFile, SplitSpec
+from iqtt import QuestionsFile
 from scenegen.common.errors import SpecError
 from scenegen.common.random.seeding import Purpose, item_rng
-
-STREAMED = {"with_depth": True}  # settings of the questions of streams
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,28 +36,15 @@ class Pictures:
 
 
 def lesson(run: Run) -> Lesson:
-    """Return what a run learns: the unlabelled questions of files with depth, or of streams.
+    """Return what a run learns: the unlabelled questions of files with depth.
 
     The loss is the mean absolute error of height, plus `shape_loss` of each whole shape. Pictures
     are shown turned and mirrored.
     """
-    settings, rows = run.settings, 0
-    if isinstance(run.data, TrainingStreams):
-        shown = run.data.shown(settings.size, settings.seed, **STREAMED)
-        rows = -(-settings.batch // (1 + SplitSpec.answers))  # questions
-        told = shown.card()
-    else:
-        files = run.data.questions(UNLABELED)
-        pictures = read_pictures(files, settings.size)
-        told = requests(files)
-
-    def batches(first: int) -> Iterator[Pictures]:
-        if rows == 0:
-            return batches_of(pictures, settings, first)
-        blocks = shown.blocks(first * rows, rows, run.machine.workers)
-        return (read_pictures([cast(QuestionsFile, b)], settings.size) for b in blocks)
-
-    return Lesson(Card("depth-match", settings, **told), batches, _loss, learning_rate, rows=rows)
+    files = run.data.questions(UNLABELED)
+    pictures = read_pictures(files, run.settings.size)
+    card = Card("depth-match", run.settings, **requests(files))
+    return Lesson(card, partial(batches_of, pictures, run.settings), _loss, learning_rate)
 
 
 def _loss(state: State[Card, UNet], batch: Pictures, number: int) -> Loss:
@@ -117,5 +101,4 @@ BASELINE = Baseline(
     Path(__file__).with_name("files"),
     lesson,
     answers=answers_of,
-    streamed=STREAMED,
 )

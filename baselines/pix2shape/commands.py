@@ -5,7 +5,7 @@ Heavy imports happen inside the commands, so that `--help` is quick and works wi
 
 import shlex
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, nullcontext
+from contextlib import contextmanager
 from typing import Any
 
 import click
@@ -40,12 +40,6 @@ MINUTES = click.option(
     "--minutes",
     type=click.FloatRange(0, 1e6, min_open=True),
     help="Duration of training in minutes. The schedule gets as many iterations as fit.",
-)
-STREAM = click.option(
-    "--stream",
-    metavar="NAME,...",
-    help="Presets of rooms, or distractor types of questions, to render during training instead of"
-    " reading --data.",
 )
 ALLOW_TEST_SET = click.option(
     "--allow-test-set", is_flag=True, help="Allow training on a named benchmark or its scenes."
@@ -93,8 +87,9 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
 
 @click.command(epilog=f"{EXAMPLE}pix2shape train --data rooms.h5 --out run")
 @ALLOW_TEST_SET
-@click.option("--data", type=InputPath(), help="Training file: rooms, or iqtt-train.h5.")
-@STREAM
+@click.option(
+    "--data", type=InputPath(), required=True, help="Training file: rooms, or iqtt-train.h5."
+)
 @click.option("--out", type=OutputFolder(), required=True, help="Output folder of the run.")
 @click.option(
     "--config",
@@ -138,8 +133,7 @@ def named_once(settings: tuple[tuple[str, Any], ...], **options: Any) -> dict[st
     " of the run].",
 )
 def train(
-    data: str | None,
-    stream: str | None,
+    data: str,
     out: str,
     config: str | None,
     settings: tuple[tuple[str, Any], ...],
@@ -169,8 +163,8 @@ def train(
         options = "--config, --set, --seed, --labels, --conditional and --start"
         raise click.UsageError(f"--resume uses the {options} of the run: leave them out")
     machine = Machine(device, workers, every, minutes)
-    given = training_data(() if data is None else (data,), stream, allow_test_set)
-    with given as files, shown_training(out, every) as show:
+    opened = training_data((data,), allow_test_set)
+    with opened as files, shown_training(out, every) as show:
         name = config or ("views" if files.hold_questions else "rays")
         weights = train_run(
             out,
@@ -188,24 +182,17 @@ def train(
     print_line(f"now: pix2shape predict --weights {shlex.quote(str(weights))} --data ...")
 
 
-def training_data(paths: tuple[str, ...], stream: str | None, allow_test_set: bool) -> Any:
-    """Return a context manager of open files, or of streams, to learn from.
-
-    Raises UsageError unless one of --data and --stream is given, SpecError for a named test set.
-    """
+@contextmanager
+def training_data(paths: tuple[str, ...], allow_test_set: bool) -> Iterator[Any]:
+    """Open files to learn from. Raises UsageError without any, SpecError for a named test set."""
     from baselines.training.data import TrainingFiles, refuse_test_set
-    from baselines.training.streams import TrainingStreams
 
-    if (stream is None) == (not paths):
-        raise click.UsageError("give one of --data and --stream to train on")
-    if stream is not None:
-        return nullcontext(TrainingStreams(stream, allow_test_set))
-    with ExitStack() as stack:
-        files = stack.enter_context(TrainingFiles(*paths))
+    if not paths:
+        raise click.UsageError("give --data to train on")
+    with TrainingFiles(*paths) as files:
         for opened in () if allow_test_set else files.opened:
             refuse_test_set(opened)
-        stack.pop_all()
-    return files
+        yield files
 
 
 @contextmanager

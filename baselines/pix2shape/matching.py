@@ -9,8 +9,8 @@ If the depth is right, and the point not hidden from the other camera, both imag
 colour there: matte surfaces under fixed lights look the same from everywhere. That is what learning
 depth from several views rests on (Zhou et al. 2017; Godard et al. 2019).
 
-The relief of whole files lies in the folder of a run, a file for each block of scenes, so that a
-run that was stopped need not find it again.
+The relief of a whole file lies in the folder of a run, so that a run that was stopped need not find
+it again.
 """
 
 import math
@@ -37,8 +37,7 @@ RISE = 0.15  # cost of the largest relief beside that of none, so that doubt dec
 WINDOW = 3  # pixels a side; costs are averaged over it
 SMALL, LARGE = 0.05, 0.3  # costs of a change by one step, and by more, from pixel to pixel
 WIDEST = 20.0  # degrees between two views that are matched
-BLOCK = 50  # scenes in each file of labels
-FOLDER = "labels"
+LABELS = "labels.safetensors"
 Progress = Callable[[int, int], Any]  # images done, in all
 
 
@@ -217,11 +216,11 @@ def _with_partner(pairs: list[tuple[list[int], list[int]]]) -> Tensor:
 
 
 def relief_of_rows(
-    rooms: Rooms, run_folder: str | Path | None, progress: Progress = lambda done, total: None
+    rooms: Rooms, run_folder: str | Path, progress: Progress = lambda done, total: None
 ) -> Tensor:
     """Return the relief of all rows, (N, S, S) float16; 0 for those that have no partner.
 
-    Labels that the run's folder holds are read, the others found and written; None for no folder.
+    Labels that the run's folder holds are read; else they are found and written.
 
     Raises SpecError as `matched_rows`, and for closed rooms; OSError; FileFormatError where the
     folder's labels are not those of these rooms.
@@ -229,34 +228,17 @@ def relief_of_rows(
     paper_rooms_only(rooms.room_size)
     pairs = pairs_of(rooms)
     matched = _with_partner(pairs)
-    folder = None if run_folder is None else Path(run_folder) / FOLDER
-    if folder:
-        folder.mkdir(parents=True, exist_ok=True)
+    path = Path(run_folder) / LABELS
     relief = torch.zeros(len(rooms), *rooms.image.shape[2:], dtype=torch.float16)
-    blocks = rooms.scene[matched] // BLOCK
-    done = 0
-    for block in sorted(set(blocks.tolist())):
-        rows = matched[blocks == block]
-        path = folder / f"{block:05d}.safetensors" if folder else None
-        if path and path.exists():
-            relief[rows] = _read(path, relief[rows], rooms.fingerprint)
-        else:
-            maps = [relief_of_row(rooms, row, pairs[row]) for row in rows.tolist()]
-            relief[rows] = torch.stack(maps).half()
-            if path:
-                save_tensors(path, {"relief": relief[rows]}, {"fingerprint": rooms.fingerprint})
-        done += len(rows)
+    if path.exists():
+        tensors, notes = load_tensors(path)
+        if notes.get("fingerprint") != rooms.fingerprint:
+            expected = f"those of the rooms {rooms.fingerprint[:12]}"
+            raise FileFormatError(path, "labels of other rooms", expected, "name another folder")
+        check_tensors(path, tensors, {"relief": relief})
+        return tensors["relief"]
+    for done, row in enumerate(matched.tolist(), 1):
+        relief[row] = relief_of_row(rooms, row, pairs[row]).half()
         progress(done, len(matched))
-    return relief
-
-
-def _read(path: Path, like: Tensor, fingerprint: str) -> Tensor:
-    tensors, notes = load_tensors(path)
-    if notes.get("fingerprint") != fingerprint:
-        expected = f"those of the rooms {fingerprint[:12]}"
-        raise FileFormatError(path, "labels of other rooms", expected, "name another folder")
-    check_tensors(path, tensors, {"relief": like})
-    relief = tensors["relief"]
-    if relief.min() < 0 or relief.max() > STEPS * STEP:
-        raise FileFormatError(f"{path}: relief", "numbers out of range", f"0 to {STEPS * STEP}")
+    save_tensors(path, {"relief": relief}, {"fingerprint": rooms.fingerprint})
     return relief

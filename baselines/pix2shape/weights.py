@@ -72,7 +72,7 @@ METHOD = Method(
     _network,
     _optimisers,
     kept=("encoder.", "decoder.", "prior."),
-    gone=('"compared_information":false,', '"consistency":0.0,', '"swap":0.0,'),
+    gone=('"bounded":false,', '"compared_information":false,', '"consistency":0.0,', '"swap":0.0,'),
 )
 
 

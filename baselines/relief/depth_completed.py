@@ -63,7 +63,7 @@ class Completion(Relief):
         return self.completed.relief(channels)
 
 
-def lessons_of(rooms: Rooms, settings: Settings, folder: Path | None, progress: Any) -> Lessons:
+def lessons_of(rooms: Rooms, settings: Settings, folder: Path, progress: Any) -> Lessons:
     """Return the lessons of `depth-supervised`, for any view of the scene of each image."""
     lessons = depth_supervised.lessons_of(rooms, settings, folder, progress)
     return Lessons(lessons.rows, lessons.target, views_of_scenes(rooms), lessons.inside)

@@ -19,7 +19,7 @@ METHOD = Method("depth-supervised", Card, relief_network)
 TOLD = "; in training, true depth and object ids"
 
 
-def lessons_of(rooms: Rooms, settings: Settings, _folder: Path | None, _progress: Any) -> Lessons:
+def lessons_of(rooms: Rooms, settings: Settings, _folder: Path, _progress: Any) -> Lessons:
     """Return the relief that the depth tells, where there is a surface, and the objects."""
     assert rooms.depth is not None, "train asks for it"
     depths = rooms.depth
@@ -40,5 +40,4 @@ BASELINE = Baseline(
     FILES,
     partial(training.lesson, lessons_of, with_depth=True),
     views=partial(views_of, TOLD),
-    streamed={},
 )

@@ -1,11 +1,11 @@
 """How relief networks learn, on any targets, and what they predict of rooms."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
-from types import MappingProxyType
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import torch
@@ -27,7 +27,6 @@ from baselines.training.rooms import (
     room_images,
     room_sizes,
 )
-from baselines.training.streams import Shown, TrainingStreams
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.rooms.reader import RoomsFile
 
@@ -64,7 +63,7 @@ def cameras_of(rooms: Rooms, rows: Tensor) -> Cameras:
     return Cameras(rooms.world_from_camera[rows], rooms.fov_of(rows), rooms.room_size[rows])
 
 
-Teach = Callable[[Rooms, Settings, Path | None, Callable[[int, int], None]], Lessons]
+Teach = Callable[[Rooms, Settings, Path, Callable[[int, int], None]], Lessons]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,36 +93,28 @@ def lesson(
     run: Run,
     *,
     with_depth: bool = False,
-    streamed: Mapping[str, Any] = MappingProxyType({}),
+    read: Callable[[Sequence[RoomsFile], int], Rooms] | None = None,
+    shape: bool = True,
     prepare: Callable[[Any], Any] = lambda network: None,
 ) -> Lesson:
-    """Return what a run of a relief network learns, of files or streams of rooms.
+    """Return what a run of a relief network learns, of files of rooms.
 
     The loss is the mean absolute difference of relief: in contrast to the squared one it lets a
     pixel be either floor or object, rather than something between them. `shape_loss` is added
     where objects are told.
 
     Args:
-        teach: finds the relief to learn; it gets the rooms, the settings, the run's folder (None
-            for rooms of a stream) and a function to call with the images done and in all.
+        teach: finds the relief to learn; it gets the rooms, the settings, the run's folder and a
+            function to call with the images done and in all.
         with_depth: whether the rooms' depth and objects are read.
-        streamed: settings of the rooms of streams.
+        read: reads the rooms of files; by default `read_rooms`.
+        shape: whether `shape_loss` is added where objects are told.
         prepare: is given the network of a new run.
     """
-    settings, rows = run.settings, 0
-    if isinstance(run.data, TrainingStreams):
-        shown = run.data.shown(settings.size, settings.seed, **streamed)
-        told, rows = shown.card(), shown.whole(settings.batch)
-    else:
-        files = run.data.rooms()
-        rooms = read_rooms(files, settings.size, depth=with_depth)
-        told = requests(files)
+    settings, files = run.settings, run.data.rooms()
+    rooms = (read or partial(read_rooms, depth=with_depth))(files, settings.size)
 
     def batches(first: int) -> Iterator[Batch]:
-        if rows:
-            workers = run.machine.workers
-            return batches_of_stream(shown, workers, teach, with_depth, settings, first)
-
         def matched(done: int, total: int) -> None:
             share = {"share of images matched": done / total}
             run.progress(first, settings.iterations, share)
@@ -137,11 +128,11 @@ def lesson(
 
     def loss_of(state: State[Card, Relief], batch: Batch, number: int) -> Loss:
         windows_only = number < (1 - WHOLE) * state.card.settings.iterations
-        loss = _loss(state.network, batch, windows_only)
+        loss = _loss(state.network, batch, windows_only, shape)
         return Loss(loss, {"loss": loss})
 
-    card = Card(run.method, settings, **told)
-    return Lesson(card, batches, loss_of, learning_rate, rows=rows, prepare=prepared)
+    card = Card(run.method, settings, **requests(files))
+    return Lesson(card, batches, loss_of, learning_rate, prepare=prepared)
 
 
 def learning_rate(settings: Settings, iteration: int) -> float:
@@ -154,43 +145,26 @@ def batches_of(rooms: Rooms, lessons: Lessons, settings: Settings, first: int) -
     """Yield the batches of iteration `first` and of those after it, without end."""
     draws = Draws(len(lessons.rows), settings.batch, settings.seed, first)
     for number, drawn in enumerate(draws, first):
-        rows = lessons.rows[torch.tensor(drawn)]
-        yield _batch(rooms, lessons, rows, item_rng(settings.seed, number, Purpose.TRAINING))
-
-
-def batches_of_stream(
-    shown: Shown, workers: int, teach: Teach, with_depth: bool, settings: Settings, first: int
-) -> Iterator[Batch]:
-    """Yield the batches of iteration `first` and of those after it, each of rooms of its own."""
-    size = shown.whole(settings.batch)
-    for number, block in enumerate(shown.blocks(first * size, size, workers), first):
-        rooms = read_rooms([cast(RoomsFile, block)], settings.size, depth=with_depth)
-        lessons = teach(rooms, settings, None, lambda done, total: None)
+        rows = seen = lessons.rows[torch.tensor(drawn)]
         rng = item_rng(settings.seed, number, Purpose.TRAINING)
-        yield _batch(rooms, lessons, lessons.rows, rng)
+        if lessons.views is not None:
+            share = rng.random(len(rows))
+            views = [lessons.views[row] for row in rows.tolist()]
+            chosen = zip(views, share, strict=True)
+            seen = torch.stack([others[int(place * len(others))] for others, place in chosen])
+        target, weight = lessons.target(seen)
+        yield Batch(
+            rooms.image[rows],
+            cameras_of(rooms, rows),
+            None if lessons.views is None else rooms.world_from_camera[seen],
+            target,
+            weight,
+            None if lessons.inside is None else lessons.inside[seen],
+            torch.from_numpy(rng.random(len(rows))),
+        )
 
 
-def _batch(rooms: Rooms, lessons: Lessons, rows: Tensor, rng: np.random.Generator) -> Batch:
-    """Return the batch of some rows."""
-    seen = rows
-    if lessons.views is not None:
-        share = rng.random(len(rows))
-        views = [lessons.views[row] for row in rows.tolist()]
-        chosen = zip(views, share, strict=True)
-        seen = torch.stack([others[int(place * len(others))] for others, place in chosen])
-    target, weight = lessons.target(seen)
-    return Batch(
-        rooms.image[rows],
-        cameras_of(rooms, rows),
-        None if lessons.views is None else rooms.world_from_camera[seen],
-        target,
-        weight,
-        None if lessons.inside is None else lessons.inside[seen],
-        torch.from_numpy(rng.random(len(rows))),
-    )
-
-
-def _loss(network: Relief, batch: Batch, windows_only: bool) -> Tensor:
+def _loss(network: Relief, batch: Batch, windows_only: bool, shape: bool) -> Tensor:
     """Return the loss of a batch; where objects are told, of windows around them or of all."""
     cameras = target_cameras = batch.cameras
     if batch.target_pose is not None:
@@ -203,7 +177,7 @@ def _loss(network: Relief, batch: Batch, windows_only: bool) -> Tensor:
         channels, target, weight, inside = windows(maps, inside > 0, side, batch.place)
     errors = (network.relief(channels) - target) * weight
     loss = errors.abs().sum() / weight.sum().clamp(min=1)
-    return loss if inside is None else loss + shape_loss(errors, inside)
+    return loss + shape_loss(errors, inside) if shape and inside is not None else loss
 
 
 def shape_loss(errors: Tensor, inside: Tensor) -> Tensor:

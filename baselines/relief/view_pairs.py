@@ -20,11 +20,10 @@ from baselines.relief.training import FILES, Lessons, views_of
 from baselines.training.baseline import Baseline
 from baselines.training.checkpoint import Method
 from baselines.training.rooms import Rooms
-from baselines.training.streams import NEIGHBOURS
 
 
 def lessons_of(
-    rooms: Rooms, _settings: Settings, folder: Path | None, progress: Callable[[int, int], Any]
+    rooms: Rooms, _settings: Settings, folder: Path, progress: Callable[[int, int], Any]
 ) -> Lessons:
     """Return the relief that matching finds, of the rows that have a partner."""
     relief = relief_of_rows(rooms, folder, progress)
@@ -40,7 +39,6 @@ BASELINE = Baseline(
     Method("view-pairs", Card, relief_network),
     Settings,
     FILES,
-    partial(training.lesson, lessons_of, streamed=NEIGHBOURS),
+    partial(training.lesson, lessons_of),
     views=partial(views_of, ""),
-    streamed=NEIGHBOURS,
 )

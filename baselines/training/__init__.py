@@ -5,7 +5,6 @@
     machine.py      where and how long a run trains
     fit.py          the training loop
     data.py         files to learn from, which are no named test sets
-    streams.py      rooms and questions to learn from that are rendered meanwhile
     images.py       images as networks take them, and batches of them
     rooms.py        images and cameras of rooms
     questions.py    images and answers of questions

@@ -1,7 +1,7 @@
 """A trained baseline as data, and the training and the submissions that all share."""
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +17,8 @@ from baselines.training.checkpoint import (
     alone_in,
     begun,
     bundled,
-    earlier_state,
+    check_new,
+    load_checkpoint,
     load_weights,
     save_weights,
 )
@@ -26,7 +27,6 @@ from baselines.training.fit import Loss, Progress, falling_late, fit
 from baselines.training.images import Array, read_ahead
 from baselines.training.machine import Machine, chosen_device
 from baselines.training.questions import each_question, is_question_file, open_test
-from baselines.training.streams import TrainingStreams
 from iqtt import QuestionsFile
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from scenegen import open_rooms
@@ -44,7 +44,7 @@ class Run:
 
     Attributes:
         method: name of the baseline.
-        data: open files or streams to learn from.
+        data: open files to learn from.
         earlier: the card of the checkpoint that the run goes on from; None for a new run.
     """
 
@@ -67,7 +67,6 @@ class Lesson:
         loss: of a state, a batch and the number of an iteration.
         rate: the learning rate of a card's settings in an iteration.
         clip: largest norm of the gradients of a step; None for any.
-        rows: of a stream that each iteration shows.
         prepare: is given the network before its first iteration.
         network: one that is trained already, so that only `finish` is left to do.
         finish: is given the trained network and its card, and returns the card to keep.
@@ -78,7 +77,6 @@ class Lesson:
     loss: Callable[[State[Any, Any], Any, int], Loss]
     rate: Callable[[Any, int], float] = falling_late
     clip: float | None = None
-    rows: int = 0
     prepare: Callable[[Any], Any] = lambda network: None
     network: Any = None
     finish: Callable[[Any, Any], Any] = lambda network, card: card
@@ -106,12 +104,12 @@ class Views:
     """What a network predicts of rooms.
 
     Attributes:
-        predicted: rows, (B,), with planar depth, (B, H, W), and normals, (B, H, W, 3).
+        predicted: rows, (B,), with what `RoomPredictionWriter.add` takes of them, by name.
         shown: which image each view is predicted from, as `RoomPredictionWriter` says.
         method, notes, run: of the submission.
     """
 
-    predicted: Iterator[tuple[Array, Array, Array]]
+    predicted: Iterator[tuple[Array, Mapping[str, Array]]]
     shown: Any
     method: str = ""
     notes: str = ""
@@ -130,7 +128,6 @@ class Baseline:
         options: names of these arguments.
         answers: how its network answers an open file of questions; None for rooms alone.
         views: what its network predicts of an open file of rooms; None for questions alone.
-        streamed: settings of the streams that it learns from; None for files alone.
         cpu_only: whether it trains on the CPU alone.
     """
 
@@ -141,13 +138,12 @@ class Baseline:
     options: tuple[str, ...] = ()
     answers: Callable[[Any, Any, QuestionsFile], Answers] | None = None
     views: Callable[[Any, Any, RoomsFile], Views] | None = None
-    streamed: Mapping[str, Any] | None = field(default=None)
     cpu_only: bool = False
 
 
 def train(
     baseline: Baseline,
-    data: TrainingFiles | TrainingStreams,
+    data: TrainingFiles,
     run_folder: str | Path,
     settings: Settings | None = None,
     machine: Machine | None = None,
@@ -180,21 +176,24 @@ def train(
         check(machine.device != "cuda", "device", "cuda", f"cpu, where {method.name} computes")
     device = chosen_device("cpu" if baseline.cpu_only else machine.device)
     with alone_in(folder):
-        earlier = earlier_state(folder, method, resume)
+        if not resume:
+            check_new(folder)
+        earlier = load_checkpoint(folder, method) if resume else None
         before = None if earlier is None else earlier.card
         chosen = before.settings if before else settings or baseline.settings()
         run = Run(method.name, data, folder, chosen, machine, before, progress)
         lesson = baseline.lesson(run, **options)
         network, card = lesson.network, lesson.card
         if network is None:
-            state = begun(method, lesson.card, earlier, data.where, device)
+            state = begun(method, lesson.card, earlier, data.where)
+            state.to(device)
             lesson.prepare(state.network)
             batches = read_ahead(lesson.batches(state.card.iteration), device)
 
             def losses(number: int) -> Iterator[Loss]:
                 yield lesson.loss(state, next(batches), number)
 
-            how: dict[str, Any] = {"clip": lesson.clip, "rows": lesson.rows, "progress": progress}
+            how: dict[str, Any] = {"clip": lesson.clip, "progress": progress}
             fit(folder, method, state, losses, lesson.rate, machine, **how)
             network, card = state.network, state.card
         save_weights(folder / WEIGHTS, method, network, lesson.finish(network, card))
@@ -240,7 +239,7 @@ def submit(
     overwrite: bool = False,
     progress: RowsDone = lambda done, total: None,
 ) -> None:
-    """Write answers to questions and their scores, or depth and normals of every view of rooms.
+    """Write answers to questions and their scores, or predict every view of rooms.
 
     Args:
         method: of the submission, unless `Views` have another one.
@@ -261,7 +260,7 @@ def submit(
         views = predict(rooms)
         how |= {"method": views.method or method, "run": views.run, "notes": views.notes}
         with RoomPredictionWriter(out, data, shown=views.shown, **how) as submission:
-            for rows, depths, normals in views.predicted:
-                for row, depth, normal in zip(rows.tolist(), depths, normals, strict=True):
-                    submission.add(row, depth, normal)
+            for rows, arrays in views.predicted:
+                for place, row in enumerate(rows.tolist()):
+                    submission.add(row, **{name: each[place] for name, each in arrays.items()})
                 progress(len(rows), len(rooms))

@@ -20,6 +20,7 @@ from torch.optim import Adam
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.common.records import LARGEST, check, from_json, normalise, to_json
+from scenegen.files.input_file import describing
 from scenegen.files.new_file import written_beside
 from scenegen.files.sets.workspace import run_lock
 
@@ -67,7 +68,6 @@ class Card:
         labels: how many answers of questions training was given.
         data, fingerprint: request and fingerprint of the training file.
         iteration, seconds: how many iterations are done, and how long they took.
-        rows: of streams that were shown; 0 where files were read.
     """
 
     method: str
@@ -77,7 +77,6 @@ class Card:
     fingerprint: str = ""
     iteration: int = 0
     seconds: float = 0.0
-    rows: int = 0
 
     def __post_init__(self) -> None:
         last = self.settings.iterations
@@ -146,20 +145,15 @@ def new_state(method: Method[CardT, NetworkT], card: CardT) -> State[CardT, Netw
 
 
 def save_weights(
-    path: str | Path,
-    method: Method[CardT, NetworkT],
-    network: NetworkT,
-    card: CardT,
-    dtype: torch.dtype = torch.float16,
+    path: str | Path, method: Method[CardT, NetworkT], network: NetworkT, card: CardT
 ) -> None:
     """Write weights and their card; the file is replaced when it is complete.
 
-    Args:
-        dtype: type of the stored numbers; tensors beyond its range keep their own.
+    Numbers are stored as float16; tensors beyond its range keep their type.
     """
     kept = {}
     for name, value in _stored_tensors(method, network.state_dict()).items():
-        short = value.to(dtype) if value.is_floating_point() else value
+        short = value.half() if value.is_floating_point() else value
         kept[name] = short if torch.isfinite(short).all() else value
     save_tensors(path, kept, {CONTENTS[0]: to_json(card)})
 
@@ -187,10 +181,8 @@ def bundled(folder: Path, method: Method[Any, Any], name: str = "") -> Path:
     Raises SpecError where there are none.
     """
     path = folder / f"{name or method.name}.safetensors"
+    hint = f"`bench train {method.name}` makes some for `bench baseline {method.name} --weights`"
     if not path.is_file():
-        hint = (
-            f"`bench train {method.name}` makes some for `bench baseline {method.name} --weights`"
-        )
         raise SpecError("weights", f"none of {method.name} in this package", "a file", hint)
     return path
 
@@ -303,12 +295,9 @@ def _load(
     text = notes[content]
     for setting in method.gone:
         text = text.replace(setting, "")
-    try:
+    with describing(str(path)):
         card = from_json(method.card, text, "card")
         check(card.method == method.name, "method", f"{card.method:.40}", method.name)
-    except SpecError as error:
-        wrong = error.inside(path)
-        raise FileFormatError(wrong.where, wrong.found, wrong.expected, wrong.hint) from error
     return tensors, card
 
 
@@ -332,25 +321,9 @@ def alone_in(folder: Path) -> Iterator[None]:
 
 def check_new(folder: Path) -> None:
     """Raise FileExistsError where a new run would replace a checkpoint or weights."""
-    if (folder / CHECKPOINT).exists():
-        message = "holds a checkpoint; use --resume, or another folder"
-        raise FileExistsError(errno.EEXIST, message, str(folder))
-    if (folder / WEIGHTS).exists():
-        message = "is there, and a new run would replace it; name another folder"
-        raise FileExistsError(errno.EEXIST, message, str(folder / WEIGHTS))
-
-
-def earlier_state(
-    folder: Path, method: Method[CardT, NetworkT], resume: bool
-) -> State[CardT, NetworkT] | None:
-    """Return the state of the folder's checkpoint, with `resume`; None for a new run.
-
-    Raises FileExistsError where a new run finds files of another; OSError, FileFormatError.
-    """
-    if resume:
-        return load_checkpoint(folder, method)
-    check_new(folder)
-    return None
+    for name, hint in ((CHECKPOINT, "use --resume, or another folder"), (WEIGHTS, "name another")):
+        if (folder / name).exists():
+            raise FileExistsError(errno.EEXIST, f"an earlier run made it; {hint}", folder / name)
 
 
 def begun(
@@ -358,14 +331,12 @@ def begun(
     card: CardT,
     earlier: State[CardT, NetworkT] | None,
     where: object,
-    device: torch.device | None = None,
 ) -> State[CardT, NetworkT]:
     """Return the state from which a run goes on: that of its checkpoint, or a new one.
 
     Args:
         card: of a new run on these data.
         where: the data, for messages.
-        device: to which the state is moved; by default it stays on the CPU.
 
     Raises SpecError where the earlier state saw other data.
     """
@@ -374,6 +345,4 @@ def begun(
     if mark != trained_on:
         expected = f"{trained_on[:12]}, on which the run was trained"
         raise SpecError(where, f"recipe hash {mark[:12]}", expected, "resume with the same data")
-    if device is not None:
-        state.to(device)
     return state

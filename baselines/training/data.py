@@ -132,28 +132,20 @@ def refuse_test_set(opened: OpenFile) -> None:
     file = opened.file
     texts = {name: str(value) for name, value in file.attrs.items()}
     pictures = str(file["questions"].attrs.get("sha256", "")) if "questions" in file else ""
-    test = known_test(texts.get("truth_digest", ""))
-    test = test or next((t for t in KNOWN_TESTS if pictures and t.pictures == pictures), None)
-    refuse_request(opened.path, texts.get("spec", ""), test)
-
-
-def refuse_request(where: object, spec: str, test: KnownTest | None = None) -> None:
-    """Raise SpecError for a named test set, or a request for rooms of its seed and objects."""
-    test = test or _like(spec)
+    test = known_test(texts.get("truth_digest", "")) or next(
+        (t for t in KNOWN_TESTS if pictures and t.pictures == pictures), None
+    )
+    if test is None:
+        try:
+            spec = json.loads(texts.get("spec", ""))
+            same = [spec[name] for name in SAME]
+        except (ValueError, TypeError, KeyError):
+            return
+        test = next((test for test in KNOWN_TESTS if _settings(test) == same), None)
     if test:
         hint = "use another --seed for training, or --allow-test-set"
-        found = f"the seed and the objects of the benchmark {test.name}"
-        raise SpecError(where, found, "training data", hint)
-
-
-def _like(text: str) -> KnownTest | None:
-    """Return the test set of rooms that has the seed and the objects of a specification."""
-    try:
-        spec: Any = json.loads(text)
-        found = [spec[name] for name in SAME]
-    except (ValueError, TypeError, KeyError):
-        return None
-    return next((test for test in KNOWN_TESTS if _settings(test) == found), None)
+        message = f"the seed and the objects of the benchmark {test.name}"
+        raise SpecError(opened.path, message, "training data", hint)
 
 
 def _settings(test: KnownTest) -> list[Any]:

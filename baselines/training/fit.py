@@ -61,7 +61,6 @@ def fit(
     machine: Machine,
     *,
     clip: float | None = None,
-    rows: int = 0,
     prepare: Callable[[], Any] = lambda: None,
     progress: Progress = lambda done, total, losses: None,
 ) -> None:
@@ -76,7 +75,6 @@ def fit(
         rate: the learning rate of a card's settings in an iteration.
         machine: says how often checkpoints are written, and how long training may take.
         clip: largest norm of the gradients of a step; None for any.
-        rows: of a stream that each iteration shows.
         prepare: called before a checkpoint is written.
         progress: called after each iteration.
 
@@ -118,7 +116,7 @@ def fit(
             message = f"no memory left on the GPU for a batch of {state.card.settings.batch}"
             raise TrainingError("training", message, hint="--set batch=N needs less") from error
         done, seconds = number + 1, round(before + time.monotonic() - started, 1)
-        state.card = replace(state.card, iteration=done, seconds=seconds, rows=done * rows)
+        state.card = replace(state.card, iteration=done, seconds=seconds)
         if plan is not None:
             state.card = plan.planned(state.card)
         last = state.card.settings.iterations

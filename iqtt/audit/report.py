@@ -35,28 +35,24 @@ _BLOCKS = (
 )
 
 
-def table(audit: Audit) -> str:
-    """Return the verdict, proofs and shortcut classifiers as text with aligned columns."""
-    files = [(t.name, f"{t.questions:,} questions", t.split or "released") for t in audit.tables]
-    lines = [*_conclusion(audit), "", *aligned(files), *audit.lacking, ""]
-    lines += aligned([(p.status, p.name, p.detail) for p in audit.proofs])
-    for title, rows in _blocks(audit.probes):
-        lines += ["", title, *("  " + line for line in aligned(rows))]
-    return "\n".join(map(printable, [*lines, *_legend(audit)]))
-
-
-def markdown(audit: Audit) -> str:
-    """Return the verdict, proofs and shortcut classifiers as Markdown tables."""
-    files = [(t.name, f"{t.questions:,}", f"{t.probed:,}") for t in audit.tables]
-    lines = [*_conclusion(audit), "", *piped([("table", "questions", "classified"), *files])]
-    lines += [*(f"\n{line}" for line in audit.lacking)]
-    lines += [
+def text(audit: Audit, markdown: bool = False) -> str:
+    """Return the verdict, proofs and shortcut classifiers as aligned columns, or as Markdown."""
+    table = piped if markdown else aligned
+    files = [(t.name, f"{t.questions:,}", f"{t.probed:,}", t.split or "released")
+             for t in audit.tables]  # fmt: skip
+    proofs = [(p.status, p.name, p.detail) for p in audit.proofs]
+    lines = [
+        *_conclusion(audit),
         "",
-        *piped([("", "proof", "found"), *((p.status, p.name, p.detail) for p in audit.proofs)]),
+        *table([("table", "questions", "classified", "split"), *files]),
     ]
+    lines += [*audit.lacking, "", *table([("", "proof", "found"), *proofs])]
     for title, rows in _blocks(audit.probes):
-        lines += ["", f"{title[0].upper()}{title[1:]}:", "", *piped(rows)]
-    return "\n".join(map(printable, [*lines, *_legend(audit)]))
+        lines += ["", title, *[""] * markdown, *table(rows)]
+    if audit.probes:
+        level = f"* beats chance at the {100 * ERROR_RATE:g}% level (Holm-corrected)"
+        lines += ["", f"accuracy in percent with its 95% Wilson interval; {level}"]
+    return "\n".join(map(printable, lines))
 
 
 def _blocks(probes: Sequence[Probe]) -> Iterator[tuple[str, list[tuple[str, ...]]]]:
@@ -96,10 +92,3 @@ def _conclusion(audit: Audit) -> list[str]:
     shortcuts = [f"{p.statistic}, {p.rule} ({p.sees})" for p in audit.shortcuts]
     names = f": {'; '.join(shortcuts)}" if shortcuts else ""
     return [proofs, f"{len(shortcuts)} of {tried} shortcut classifiers beat chance{names}"]
-
-
-def _legend(audit: Audit) -> list[str]:
-    """Return how to read the tables of classifiers."""
-    level = f"* beats chance at the {100 * ERROR_RATE:g}% level (Holm-corrected)"
-    text = f"accuracy in percent with its 95% Wilson interval; {level}"
-    return ["", text] if audit.probes else []

@@ -149,7 +149,7 @@ def audit(
     for group, one in zip(groups, found, strict=True):
         if len(groups) > 1:
             click.echo(f"{'## ' if markdown else ''}{', '.join(map(str, group))}\n")
-        click.echo(report.markdown(one) if markdown else report.table(one))
+        click.echo(report.text(one, markdown))
     ctx.exit(0 if all(one.passed for one in found) else 1)
 
 

@@ -29,7 +29,7 @@ LABELS = {"siamese": 1000, "rezende": 0, "depth-match": 0, "ptn": 0}
 
 
 def baseline_of(name: str) -> Baseline:
-    baseline: Baseline = import_module(f"baselines.{HOMES[name][0]}").BASELINE
+    baseline: Baseline = import_module(f"baselines.{HOMES[name]}").BASELINE
     return baseline
 
 

@@ -70,12 +70,3 @@ def test_a_mistake_is_one_line_and_leaves_nothing(line, words, folder, check_ref
     result = bench(*line.split())
     check_refusal(result.exit_code, result.stdout, result.stderr, words)
     assert files_in(folder) == before
-
-
-@pytest.mark.parametrize("name", ["cnn", "rezende"])
-def test_no_gpu_is_one_line(name, folder, check_refusal):
-    if pytest.importorskip("torch").cuda.is_available():
-        pytest.skip("there is one")
-    result = bench(*f"train {name} {DATA} --out run --device cuda".split())
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("device", "cpu"))
-    assert not (folder / "run").exists()

@@ -1,6 +1,5 @@
 """Features answer by the nearest; labels teach which dimensions count; misfits are refused."""
 
-import io
 from pathlib import Path
 
 import h5py
@@ -57,7 +56,6 @@ def test_a_submission_holds_the_answers_of_the_features(truths, train_questions,
         np.zeros((6, 4, 0)),
         np.zeros(24),
         np.full((6, 4, 3), np.nan),
-        np.full((6, 4, 3), "a"),
     ],
 )
 def test_features_that_do_not_fit_are_refused(values: np.ndarray, truths, tmp_path: Path):
@@ -76,26 +74,3 @@ def test_a_probe_needs_features_of_its_own_data(truths, train_questions, tmp_pat
         write_features(*data, *out, **how)
     with refused(SpecError, "labels", "7"):
         write_features(*data, *out, labels=7)
-
-
-def with_head(text: str) -> bytes:
-    """Return a file of numpy's format with this head and no values."""
-    head = text.ljust(117) + "\n"
-    return b"\x93NUMPY\x01\x00" + len(head).to_bytes(2, "little") + head.encode()
-
-
-def archive() -> bytes:
-    """Return an archive of one array."""
-    file = io.BytesIO()
-    np.savez(file, a=np.zeros(3))
-    return file.getvalue()
-
-
-HEADS = ("((((", "{[]: 1}", "{'descr': '<f8', 'fortran_order': False, 'shape': (10**23,)}")
-
-
-@pytest.mark.parametrize("content", [b"nothing", b"\x80\x04N.", archive(), *map(with_head, HEADS)])
-def test_files_that_are_no_arrays_are_refused(content: bytes, truths, tmp_path):
-    (tmp_path / "f.npy").write_bytes(content)
-    with open_questions(truths.iqtt) as questions, pytest.raises(SceneGenError):
-        read_features(tmp_path / "f.npy", 6, questions)

@@ -177,14 +177,6 @@ def test_every_cube_shows_in_every_image():
         assert np.isnan(one.depth[:, :, [0, -1]]).all()
 
 
-def test_depth_comes_only_where_it_was_asked_for():
-    without = replace(SPEC, with_depth=False)
-    pools = replace(pools_of(SPEC), spec=without)
-    one, other = render_question(pools, "val", 2), rendered(SPEC, "val")[2]
-    assert one.depth is None
-    assert one.images.tobytes() == other.images.tobytes()
-
-
 @pytest.mark.parametrize(
     "changed",
     [{"image_dtype": "float16"}, {"background": (0.0, 0.0, 0.0)}, {"ambient": (0.1,) * 3}],
@@ -195,12 +187,3 @@ def test_other_settings_of_the_image_leave_shapes_and_views_alone(changed):
         assert one.depth.tobytes() == plain.depth.tobytes()
         assert (one.question.world_from_shape == plain.question.world_from_shape).all()
         assert (one.images != plain.images).any()
-
-
-def test_questions_that_a_split_does_not_have():
-    for split, index in (("train", 12), ("train", -1), ("val", 4), ("test", 3)):
-        with pytest.raises(IndexError, match=f"{split} .* {index}"):
-            render_question(pools_of(SPEC), split, index)
-    empty = replace(SPEC, train=0, labeled=0, test=0)
-    assert rendered(empty, "train", "labeled") == rendered(empty, "test") == []
-    assert groups(replace(SPEC, labeled=12), "train") == {"labeled": (0, 12), "unlabeled": (12, 0)}

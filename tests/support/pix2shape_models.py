@@ -20,7 +20,7 @@ def tiny(size: int = SIZE, **settings: Any) -> Any:
     from baselines.pix2shape.network.architecture import NetworkSpec
     from baselines.pix2shape.network.config import ModelConfig
 
-    names = ("classes", "camera", "z_scene", "z_view", "encoder", "spherical", "rays", "bounded")
+    names = ("classes", "camera", "z_scene", "z_view", "encoder", "spherical", "rays")
     of_networks = {name: settings.pop(name) for name in names if name in settings}
     networks = NetworkSpec(size=size, width=0.05, **of_networks)
     plain = {"iterations": 4, "batch": 4, "critic_steps": 1}

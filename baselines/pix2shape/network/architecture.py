@@ -45,8 +45,6 @@ class NetworkSpec:
         rays: whether the networks are told the empty room. The encoder then sees, beside the
             image, its faint differences and where the ray of each pixel meets floor or walls, and
             the decoder gives relief: how far surfaces lie before these, scene units.
-        bounded: whether relief is between 0 and `model.HIGHEST`, and has a slope also where it
-            means floor or wall, so that losses of images can raise it again; for `rays` alone.
         spherical: whether z_scene is then scaled to the length sqrt(z_scene), so that distances
             are bounded.
         encoder: "paper", or "polar" for questions (`network/polar.py`).
@@ -60,7 +58,6 @@ class NetworkSpec:
     classes: int = 0
     standardised: bool = False
     rays: bool = False
-    bounded: bool = False
     spherical: bool = False
     encoder: str = "paper"
 
@@ -72,8 +69,6 @@ class NetworkSpec:
         check(self.size in SIZES, "size", self.size, f"one of {', '.join(map(str, SIZES))}")
         if self.rays:
             check(self.camera, "camera", self.camera, "true, as rays are those of a known camera")
-        expected = "false for networks without rays, which give no relief"
-        check(self.rays or not self.bounded, "bounded", self.bounded, expected)
         check_choice("encoder", self.encoder, ENCODERS)
         if self.encoder == "polar" and self.condition:
             found = "'polar' with a camera or categories as input"

@@ -13,8 +13,6 @@ from baselines.pix2shape.network.surfels import Scene, render
 
 MATERIAL = 5  # numbers of a surfel's material: albedo, k_s, exponent
 SHINIEST = 128.0
-HIGHEST = 0.6  # scene units; in rooms of one view 0.6% of the object pixels stand out more
-LOW = -3.0  # added to the decoder's numbers, so that a bounded relief begins near FLAT
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,11 +146,7 @@ class Pix2Shape(nn.Module):
 
         For networks of `rays`. What is below FLAT means floor or wall.
         """
-        return self._relief(self.decoder(code, condition)[:, 0].float())
-
-    def _relief(self, raw: Tensor) -> Tensor:
-        """Return relief from the decoder's numbers, (B, S, S)."""
-        return HIGHEST * torch.sigmoid(raw + LOW) if self.config.networks.bounded else raw
+        return self.decoder(code, condition)[:, 0].float()
 
     def surfels(self, code: Tensor, condition: Tensor, cameras: Cameras | None = None) -> Surfels:
         """Return the surfels that a camera sees: (B, z) -> (B, S, S) of each number.
@@ -164,10 +158,7 @@ class Pix2Shape(nn.Module):
         raw = self.decoder(code, condition).float()
         if self.config.networks.rays:
             assert cameras is not None, "networks of rays take the camera as input"
-            smooth = self._relief(raw[:, 0])
-            relief = torch.where(smooth > FLAT, smooth, 0)
-            if self.config.networks.bounded:  # the same numbers, with the slopes of `smooth`
-                relief = smooth + (relief - smooth).detach()
+            relief = torch.where(raw[:, 0] > FLAT, raw[:, 0], 0)
             pose, fov = cameras.world_from_camera, cameras.fov_y_degrees
             walls, entry, _ = empty_rooms(pose, fov, relief.shape[-1])
             depth = torch.maximum(walls - relief, entry)

@@ -16,14 +16,9 @@ from torch import Tensor
 from torch.utils.data import DataLoader, Dataset, default_collate
 
 from baselines.pix2shape.images import Batch, QuestionImages, RoomImages
-from baselines.pix2shape.matching import matched_rows, relief_of_rows
 from baselines.pix2shape.network.config import ModelConfig
-from baselines.training.data import Opened
 from baselines.training.fit import TrainingError
 from baselines.training.images import Draws
-from baselines.training.rooms import read_rooms
-from baselines.training.streams import Block, Shown
-from iqtt import SplitSpec
 from scenegen.common.errors import SceneGenError
 
 
@@ -34,13 +29,11 @@ class Sources:
     Attributes:
         images: of rooms, or of questions.
         labelled: questions whose first `labels` answers may be used; None if `labels` is 0.
-        shown: streams that are learned from; `images` are their first rows.
     """
 
     images: RoomImages | QuestionImages
     labelled: QuestionImages | None = None
     labels: int = 0
-    shown: Shown | None = None
 
     @property
     def fingerprint(self) -> str:
@@ -52,13 +45,6 @@ class Sources:
         """Return how many items a batch of images has: rooms, or questions."""
         asks = isinstance(self.images, QuestionImages)
         return config.reconstructed_questions if asks else config.batch
-
-    def rows(self, config: ModelConfig) -> int:
-        """Return how many rows of streams an iteration shows; 0 where files are read."""
-        if self.shown is None:
-            return 0
-        images = config.batches_per_iteration * self.batch_size(config)
-        return self.shown.whole(images) + self.question_sizes(config)[1]
 
     def question_sizes(self, config: ModelConfig) -> tuple[int, int]:
         """Return how many questions with and without a label are compared in each iteration."""
@@ -117,10 +103,6 @@ def image_batches(
     """
     source, size = sources.images, sources.batch_size(config)
     before = first * config.batches_per_iteration
-    if sources.shown is not None:
-        for streamed, items in _streamed(sources.shown, config, before, size, workers):
-            yield streamed.as_batch(items)
-        return
     draws = Draws(len(source), size, config.seed, before)
     for items in _loaded(source, draws, workers):
         yield source.as_batch(items)
@@ -135,10 +117,6 @@ def question_batches(
     """
     source, labelled = sources.images, sources.labelled
     with_label, without = sources.question_sizes(config)
-    if sources.shown is not None and without:
-        for streamed, items in _streamed(sources.shown, config, first, without, workers):
-            yield streamed.as_batch(items), torch.full((len(items["image"]),), -1)
-        return
     streams = []
     if labelled is not None and with_label:
         draws = Draws(sources.labels, with_label, config.seed, first)
@@ -152,32 +130,6 @@ def question_batches(
     for parts in zip(*streams, strict=False):
         items = {name: torch.cat([part[name] for part in parts]) for name in parts[0]}
         yield source.as_batch(items), items["answer"]
-
-
-def streamed_source(block: Block, config: ModelConfig) -> RoomImages | QuestionImages:
-    """Return the rows of a stream as a source. Raises as `RoomImages` and `QuestionImages`."""
-    opened: Any = Opened(lambda: block, block)
-    if isinstance(block.spec, SplitSpec):
-        return QuestionImages(opened, config)
-    return RoomImages(opened, config)
-
-
-def _streamed(
-    shown: Shown, config: ModelConfig, before: int, size: int, workers: int
-) -> Iterator[tuple[RoomImages | QuestionImages, dict[str, Tensor]]]:
-    """Yield batch after batch of streams, and its source.
-
-    Args:
-        before: batches that were shown before.
-    """
-    count = shown.whole(size)
-    for block in shown.blocks(before * count, count, workers):
-        source = streamed_source(block, config)
-        if config.matching and isinstance(source, RoomImages):
-            rooms = read_rooms([source.opened.file], config.networks.size)
-            source.pick_views(matched_rows(rooms).numpy())
-            source.learn_from(relief_of_rows(rooms, None).numpy())
-        yield source, default_collate([source[row] for row in range(len(source))])
 
 
 def _use_one_thread(_worker: int) -> None:

@@ -1,7 +1,6 @@
 """What a run begins from: settings that suit its data, first weights, or a checkpoint."""
 
 import functools
-import json
 from collections.abc import Collection
 from dataclasses import replace
 from pathlib import Path
@@ -11,29 +10,27 @@ from baselines.pix2shape.images import QuestionImages, RoomImages, for_questions
 from baselines.pix2shape.network.config import METHOD as PAPER
 from baselines.pix2shape.network.config import TAUGHT_DEPTH, ModelConfig
 from baselines.pix2shape.network.model import Pix2Shape
-from baselines.pix2shape.training.batches import Sources, streamed_source
+from baselines.pix2shape.training.batches import Sources
 from baselines.pix2shape.weights import METHOD, Card, open_weights
 from baselines.training.checkpoint import State, begun, load_checkpoint
 from baselines.training.data import TrainingFiles, only, shared_questions, shared_rooms
 from baselines.training.questions import LABELED, UNLABELED, check_labels
-from baselines.training.streams import NEIGHBOURS, Shown, TrainingStreams
 from iqtt import QuestionsFile
 from scenegen.common.errors import SpecError
-from scenegen.common.records import check, to_json
+from scenegen.common.records import check
 from scenegen.description.specs import Request
 from scenegen.rooms.reader import RoomsFile
 
-OF_NETWORKS = ("networks", "opacity", "material", "lights", "depth_middle", "depth_reach")
+OF_NETWORKS = ("opacity", "material", "lights", "depth_middle", "depth_reach")
 OF_QUESTIONS = (
     "question_batch", "labelled_batch", "turned", "temperature", "hard_negatives", "easy_negatives",
 )  # fmt: skip
 ModelState = State[Card, Pix2Shape]
 Files = RoomsFile | tuple[QuestionsFile, QuestionsFile]  # questions: unlabelled, labelled
-FIRST = 1024  # rows of streams that the prior is fitted to
 
 
 def new_run(
-    data: TrainingFiles | TrainingStreams,
+    data: TrainingFiles,
     config: ModelConfig,
     *,
     labels: int = 0,
@@ -47,7 +44,7 @@ def new_run(
     The arguments are those of `train_run`. Raises SpecError where they and the data do not fit;
     as `open_weights`, and as the readers of the data.
     """
-    files, shown = _tables(data, config)
+    files = _tables(data)
     suited = _suited(config, files, labels, conditional)
     for name in chosen:
         value, needed = (functools.reduce(getattr, name.split("."), c) for c in (config, suited))
@@ -56,12 +53,12 @@ def new_run(
                 f"leave it out: {data.where}, with {labels} labels, decides it or does not use it"
             )
             raise SpecError(name, f"{value} has no effect here", hint=hint)
-    sources = _sources(files, suited, labels, shown)
+    sources = _sources(files, suited, labels)
     card = Card(
         "pix2shape",
         suited,
         labels=labels,
-        data=shown.card()["data"] if shown else sources.images.spec.to_json(),
+        data=sources.images.spec.to_json(),
         fingerprint=sources.fingerprint,
         precision=precision,
         classes=sources.images.classes if suited.networks.classes else (),
@@ -73,7 +70,7 @@ def new_run(
 
 
 def resumed_run(
-    folder: Path, data: TrainingFiles | TrainingStreams, precision: str | None
+    folder: Path, data: TrainingFiles, precision: str | None
 ) -> tuple[ModelState, Sources]:
     """Return the state of a folder's checkpoint, and what it learns from.
 
@@ -84,37 +81,23 @@ def resumed_run(
     card = earlier.card
     expected = f"{card.precision}, as the run began with"
     check(precision in (None, card.precision), "precision", precision, expected)
-    files, shown = _tables(data, card.settings)
-    sources = _sources(files, card.settings, card.labels, shown)
+    sources = _sources(_tables(data), card.settings, card.labels)
     told = replace(card, fingerprint=sources.fingerprint)
     return begun(METHOD, told, earlier, data.where), sources
 
 
-def _tables(
-    data: TrainingFiles | TrainingStreams, config: ModelConfig
-) -> tuple[Files, Shown | None]:
-    """Return files, or the first rows of streams, and the streams."""
-    if isinstance(data, TrainingStreams):
-        more = NEIGHBOURS if config.matching and not data.hold_questions else {}
-        shown = data.shown(config.networks.size, config.seed, **more)
-        rows = shown.whole(FIRST)
-        block: Any = next(shown.blocks(0, rows, workers=0))
-        return (block, block) if data.hold_questions else block, shown
+def _tables(data: TrainingFiles) -> Files:
+    """Return the rooms, or the two tables of questions."""
     if not data.hold_questions:
-        return only(data.rooms(), "pix2shape"), None
+        return only(data.rooms(), "pix2shape")
     unlabelled, labelled = (
         only(data.questions(part), "pix2shape") for part in (UNLABELED, LABELED)
     )
-    return (unlabelled, labelled), None
+    return unlabelled, labelled
 
 
-def _sources(files: Files, config: ModelConfig, labels: int, shown: Shown | None) -> Sources:
+def _sources(files: Files, config: ModelConfig, labels: int) -> Sources:
     """Return what a run learns from; the labelled questions if some of their answers are used."""
-    if shown is not None:
-        if isinstance(files, tuple):
-            check_labels(files[1], labels)
-        first: Any = files[0] if isinstance(files, tuple) else files
-        return Sources(streamed_source(first, config), shown=shown)
     if isinstance(files, RoomsFile):
         return Sources(RoomImages(shared_rooms(files), config))
     unlabelled, labelled = files
@@ -161,13 +144,10 @@ def _begin_from(start: str | Path, state: ModelState) -> None:
     Raises SpecError, and as `open_weights`.
     """
     model, card = open_weights(start)
-    records = [json.loads(to_json(record)) for record in (card.settings, state.card.settings)]
-    for name in OF_NETWORKS:
-        group = records[1][name] if isinstance(records[1][name], dict) else {}
-        for part in [f"{name}.{key}" for key in group] or [name]:
-            there, here = (functools.reduce(dict.get, part.split("."), r) for r in records)
-            expected = f"weights of the {part} of this run, {here}"
-            check(there == here, "start", f"{start} with {there}", expected)
+    there, here = ({**vars(c.settings), **vars(c.settings.networks)} for c in (card, state.card))
+    for name in (*vars(card.settings.networks), *OF_NETWORKS):
+        message = f"{start} with {name} {there[name]}"
+        check(there[name] == here[name], "start", message, f"{here[name]}, as in this run")
     if state.card.submission == PAPER:
         expected = f"weights of {PAPER}, as other losses than the paper's would have trained them"
         check(card.submission == PAPER, "start", start, expected)

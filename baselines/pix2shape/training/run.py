@@ -25,7 +25,6 @@ from baselines.training.data import TrainingFiles
 from baselines.training.fit import Progress, falling_late, fit
 from baselines.training.machine import Machine, chosen_device
 from baselines.training.rooms import read_rooms
-from baselines.training.streams import TrainingStreams
 from scenegen.files.new_file import check_writable
 from scenegen.files.pictures import save_picture
 
@@ -36,7 +35,7 @@ PRIOR_ITEMS, BATCH = 2048, 64  # items that the prior is fitted to, and batch si
 
 def train_run(
     folder: str | Path,
-    data: TrainingFiles | TrainingStreams,
+    data: TrainingFiles,
     config: ModelConfig | None,
     machine: Machine,
     *,
@@ -78,7 +77,7 @@ def train_run(
             )
         model, settings, began = state.network, state.card.settings, state.card.iteration
         check_request(model, sources)
-        if isinstance(sources.images, RoomImages) and settings.matching and sources.shown is None:
+        if isinstance(sources.images, RoomImages) and settings.matching:
             _match(sources.images, folder, state, progress)
         state.to(device)
         half = state.card.precision == "bf16"
@@ -98,7 +97,6 @@ def train_run(
 
             fit(
                 folder, METHOD, state, iterations, learning_rate, machine,
-                rows=sources.rows(settings),
                 prepare=lambda: settings.adversarial or fit_prior(model, sources),
                 progress=show,
             )  # fmt: skip

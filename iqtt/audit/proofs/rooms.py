@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from iqtt.audit.proofs.verdict import Proof, judge
 from iqtt.audit.table import AuditTable
@@ -134,14 +135,7 @@ def _poses(scene: SceneSpec) -> Array:
 
 
 def _rotation(item: PlacedObject) -> Array:
-    w, x, y, z = item.rotation
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
+    return np.asarray(Rotation.from_quat(item.rotation, scalar_first=True).as_matrix())
 
 
 def same_arrangement(a: SceneSpec, b: SceneSpec) -> bool:

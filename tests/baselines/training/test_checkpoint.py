@@ -89,11 +89,10 @@ def test_a_checkpoint_holds_all_of_a_state(saved, tmp_path):
     assert trained == {f"adam.{number}.step" for number in range(4)}, "not the unused layer"
 
 
-@pytest.mark.parametrize("dtype", [torch.float32, torch.float16])
-def test_weights_come_back_and_those_beyond_the_type_are_kept_in_full(dtype, saved, tmp_path):
+def test_weights_come_back_and_those_beyond_float16_are_kept_in_full(saved, tmp_path):
     method, network = replace(METHOD, kept=("layers.",)), copy.deepcopy(saved.network)
     network.layers[0].weight.data[0, 0] = 1e5
-    save_weights(tmp_path / WEIGHTS, method, network, CARD, dtype)
+    save_weights(tmp_path / WEIGHTS, method, network, CARD)
     again, card = load_weights(tmp_path / WEIGHTS, method)
     assert (card, again.training) == (CARD, False)
     stored = load_tensors(tmp_path / WEIGHTS)[0]
@@ -101,7 +100,7 @@ def test_weights_come_back_and_those_beyond_the_type_are_kept_in_full(dtype, sav
     assert stored.keys() == expected.keys(), "only what is kept"
     for name, value in expected.items():
         full = name == "layers.0.weight" or not value.is_floating_point()
-        assert stored[name].dtype == (value.dtype if full else dtype), name
+        assert stored[name].dtype == (value.dtype if full else torch.float16), name
         assert torch.equal(again.state_dict()[name], stored[name].to(value.dtype)), name
     assert len(os.listdir(tmp_path)) == 2
 

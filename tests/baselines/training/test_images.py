@@ -60,14 +60,6 @@ def test_a_batch_depends_on_its_number_alone(rows, batch, seed, first):
         assert sorted(drawn[epoch * rows : (epoch + 1) * rows]) == list(range(rows))
 
 
-@pytest.mark.parametrize("world", [1, 2, 3])
-def test_processes_share_each_batch(world):
-    shares = [Draws(11, 5, 3, share=slice(rank, None, world)) for rank in range(world)]
-    for whole, *parts in islice(zip(Draws(11, 5, 3), *shares, strict=True), 9):
-        assert sorted(row for part in parts for row in part) == sorted(whole)
-        assert max(map(len, parts)) - min(map(len, parts)) <= 1
-
-
 @dataclass(frozen=True, eq=False)
 class Batch:
     image: torch.Tensor

@@ -65,24 +65,6 @@ def test_every_option_is_recorded(run, monkeypatch, tmp_path):
         assert np.unique(file["truth/labeled/light_count"][:]).max() <= 3
 
 
-@pytest.mark.parametrize(
-    "line",
-    [
-        "audit x/iqtt-test.h5 --json x/iqtt-test-answers.h5 --overwrite",
-        "audit x/iqtt-test-answers.h5 --json x/iqtt-test.h5 --overwrite",
-        "audit x --json x/iqtt-test-answers.h5 --overwrite",
-        "show x/iqtt-test.h5 --mark-correct --out x/iqtt-test-answers.h5 --overwrite",
-    ],
-)
-def test_files_that_are_read_beside_another_are_no_outputs(run, tmp_path, line, check_refusal):
-    (tmp_path / "x").mkdir()
-    for name in ("iqtt-test.h5", "iqtt-test-answers.h5"):
-        (tmp_path / "x" / name).write_text(name)
-    result = run(*line.split())
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("not an input",))
-    assert (tmp_path / "x/iqtt-test-answers.h5").read_text() == "iqtt-test-answers.h5"
-
-
 @pytest.mark.usefixtures("few_explained")
 def test_a_secret_seed(run, tmp_path):
     """The same content gives the same questions, blanks aside; tools that read need no seed."""
@@ -121,25 +103,6 @@ def test_a_secret_that_is_none(run, tmp_path, options, words, check_refusal):
 
 
 @pytest.mark.parametrize(
-    ("options", "words"),
-    [
-        ("--cubes 3-4", ["cubes", "too few", "--cubes"]),
-        ("--train 0 --labeled 0 --val 0 --test 0", ["train, val and test", "at least 1 question"]),
-        ("--train 5 --labeled 6", ["labeled", "6", "5 training"]),
-        ("--background red", ["background", "red", "R,G,B"]),
-        ("--out nowhere/x", ["nowhere", "does not exist"]),
-        ("--out a-file", ["a-file", "is a file"]),
-    ],
-)
-def test_a_mistake_is_one_line_and_leaves_nothing(run, options, words, tmp_path, check_refusal):
-    (tmp_path / "a-file").write_text("mine")
-    result = run("make-split", *options.split())
-    check_refusal(result.exit_code, result.stdout, result.stderr, tuple(words))
-    assert files_in(tmp_path) == ["a-file"]
-    assert (tmp_path / "a-file").read_text() == "mine"
-
-
-@pytest.mark.parametrize(
     ("arguments", "rows"),
     [
         (["iqtt-val.h5"], 3),
@@ -168,9 +131,3 @@ def test_audit_exits_with_1_when_a_proof_fails(run, split, tmp_path, check_refus
         file["answers"][0] = (file["answers"][0] + 1) % 3
     result = run("audit", "x")
     assert (result.exit_code, "FAIL" in result.stdout) == (1, True)
-
-
-def test_show_needs_answers_to_show_them(run, split, tmp_path, check_refusal):
-    shutil.copy(split / "iqtt-test.h5", tmp_path)
-    result = run("show", "iqtt-test.h5", "--mark-correct")
-    check_refusal(result.exit_code, result.stdout, result.stderr, ("iqtt-test.h5",))

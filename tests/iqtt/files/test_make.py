@@ -11,7 +11,6 @@ import pytest
 from made_splits import TINY, StopError, listing
 from polycubes import are_congruent
 
-from iqtt.files import make as module
 from iqtt.files import work
 from iqtt.files.make import make_split
 from iqtt.files.reader import QuestionsFile
@@ -192,30 +191,6 @@ def test_other_files_of_a_folder_are_left_alone(tmp_path, monkeypatch):
     make_split(".", TINY, overwrite=True)
     assert sorted(listing(tmp_path)) == sorted([*ALL_FILES, "notes.txt"])
     assert (tmp_path / "notes.txt").read_text() == "mine"
-
-
-@pytest.mark.parametrize("suite", [False, True])
-@pytest.mark.parametrize(
-    ("path", "kind"),
-    [
-        ("file", NotADirectoryError),
-        ("file/split", NotADirectoryError),
-        ("missing/split", FileNotFoundError),
-        ("nowhere", OSError),
-        ("locked/split", PermissionError),
-    ],
-)
-def test_places_that_cannot_be_a_folder_are_refused_first(tmp_path, monkeypatch, suite, path, kind):
-    monkeypatch.setattr(module, "make_source", None)
-    (tmp_path / "file").write_text("mine")
-    (tmp_path / "nowhere").symlink_to(tmp_path / "gone")
-    (tmp_path / "locked").mkdir()
-    before = listing(tmp_path)
-    monkeypatch.setattr(os, "access", lambda place, mode: "locked" not in str(place))
-    for overwrite in (False, True):
-        with pytest.raises(kind):
-            make_split(tmp_path / path, TINY, suite=suite, overwrite=overwrite)
-    assert listing(tmp_path) == before
 
 
 def test_errors_on_the_way_leave_nothing(tmp_path, monkeypatch):

@@ -6,8 +6,6 @@ import itertools
 import h5py
 import numpy as np
 import pytest
-from refusals import refused
-from sheets import enlarged, find
 from streamed import check_equal, stored
 
 from iqtt import QuestionStream, SplitSpec, make_split
@@ -18,8 +16,6 @@ from iqtt.questions.kinds import DISTRACTOR_KINDS
 from iqtt.questions.specs import SUITE
 from iqtt.shapes.polycube import canonical_class
 from iqtt.shapes.splits import split_of
-from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.rooms.preview import srgb_bytes
 
 TABLES = [  # of the tiny split: file, part, answers told, truth told
     ("iqtt-train.h5", "labeled", True, True),
@@ -158,17 +154,6 @@ def test_fields_are_what_there_is(split_folder, released):
     assert shapes == {"cubes": (4, 7, 3), "depth": (4, 32, 32), "answers": ()}
 
 
-def test_what_the_data_set_refuses(split_folder):
-    for name, arguments, where in (
-        ("iqtt-test.h5", {"fields": ("questions", "answers")}, "field"),
-        ("iqtt-val.h5", {"fields": ("question",)}, "field"),
-        ("iqtt-train.h5", {}, f"{split_folder / 'iqtt-train.h5'}: part"),
-        ("iqtt-test-answers.h5", {}, str(split_folder / "iqtt-test-answers.h5")),
-    ):
-        with refused((SpecError, FileFormatError), where):
-            QuestionsDataset(split_folder / name, **arguments)
-
-
 def expected_rows(folder, split="train"):
     """Return all columns of a split's questions; in training labelled ones come first."""
     if split == "train":
@@ -217,18 +202,6 @@ def test_pictures_stay_on_the_device(split_folder):
             np.testing.assert_array_equal(found, train[name], err_msg=name)
 
 
-def test_settings_that_no_stream_has():
-    for wrong in ({"fields": ["image"]}, {"split": "training"}, {"batch": 5000}):
-        with pytest.raises(SpecError):
-            QuestionStream("matched", **wrong)
-    with pytest.raises(SpecError, match="at most 4 rows"):
-        QuestionStream(SplitSpec(height=4096, width=4096), batch=5)
-    with pytest.raises(SpecError):
-        QuestionStream("matches")
-    with pytest.raises(SpecError):
-        QuestionStream({SplitSpec(cubes=(6, 6), answers=n, distractors="near"): 1 for n in (2, 3)})
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", SUITE)
 def test_all_kinds_have_the_bits_of_files(kind, tmp_path):
@@ -248,39 +221,8 @@ def records(split_folder):
         return list(questions)
 
 
-def shown(record, factor=1):
-    """The four images as a sheet should show them, `factor` times as large."""
-    return [enlarged(srgb_bytes(image), factor) for image in record.radiance]
-
-
 def has(pixels, color):
     return int((pixels == color).all(axis=-1).sum())
-
-
-def framed(sheet, places, size=(128, 128)):
-    """Tell of each tile whether the frame of the right answer surrounds it, and nothing half."""
-    found = []
-    for y, x in places:
-        around = np.ones((size[0] + 6, size[1] + 6), bool)
-        around[3:-3, 3:-3] = False
-        ring = sheet[y - 3 : y + size[0] + 3, x - 3 : x + size[1] + 3][around]
-        assert has(ring, RIGHT) in (0, len(ring))
-        found.append(has(ring, RIGHT) > 0)
-    return found
-
-
-@pytest.mark.parametrize("show_answers", [False, True])
-def test_reference_then_answers_in_reading_order(records, show_answers):
-    sheet = np.asarray(question_sheet(records[:3], show_answers))
-    for i, record in enumerate(records[:3]):
-        places = [find(sheet, tile) for tile in shown(record, 4)]
-        assert len({y for y, _ in places}) == 1
-        gaps = np.diff([x for _, x in places]) - 128
-        assert 0 < gaps[1] == gaps[2] < gaps[0] / 2, "the reference stands apart"
-        right = [False] + [show_answers and k == record.answer for k in range(3)]
-        assert framed(sheet, places) == right
-        y = places[0][0]
-        assert i == 0 or y > find(sheet, shown(records[i - 1], 4)[0])[0] + 128 + 20
 
 
 def test_nothing_is_given_away_unless_asked(records):

@@ -76,17 +76,6 @@ def test_trees_grow_on_every_free_face_alike():
     assert abs(rods - 10_000) < 5 * np.sqrt(50_000 * 0.2 * 0.8)
 
 
-def test_a_request_that_no_shape_meets_is_refused():
-    rng = np.random.default_rng(0)
-    for cubes in (0, 17):
-        for call in (lambda: random_shapes(rng, 1, cubes), lambda: all_classes(cubes, "tree")):
-            with pytest.raises(ValueError, match="16 cubes"):
-                call()
-    with pytest.raises(ValueError, match="ring"):
-        random_shapes(rng, 1, 5, "ring")  # type: ignore[arg-type]
-    assert random_shapes(rng, 0, 4).shape == (0, 4, 3)
-
-
 ROD = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [3, 0, 0]]
 TEE = [[0, 0, 0], [1, 0, 0], [2, 0, 0], [1, 1, 0]]
 RING = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]

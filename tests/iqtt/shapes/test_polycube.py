@@ -150,22 +150,3 @@ def test_the_radius_reaches_the_farthest_corner(cubes):
         assert box_centre(shape[None])[0] == pytest.approx(centre)
         farthest = np.linalg.norm(corners - centre, axis=1).max()
         assert bounding_radius(shape[None])[0] == pytest.approx(farthest)
-
-
-@pytest.mark.parametrize(
-    ("cubes", "message"),
-    [
-        (np.zeros((2, 3), np.int8), r"shape \(S, n, 3\)"),
-        (np.zeros((2, 3, 4), np.int8), r"shape \(S, n, 3\)"),
-        (np.zeros((2, 3, 3)), "signed integers"),
-        (np.zeros((2, 3, 3), np.uint8), "signed integers"),
-        (np.zeros((2, 0, 3), np.int8), "1 to 16 cubes, not 0"),
-        (np.zeros((2, 17, 3), np.int8), "1 to 16 cubes, not 17"),
-        (np.array([[[0, 0, 0]] * 2, [[0, 0, 0], [0, 16, 0]]]), "shape 1 spans more than 16"),
-        (np.array([[[-(2**63), 0, 0], [2**63 - 1, 0, 0]]]), "shape 0 spans more than 16"),
-    ],
-)
-def test_what_cannot_be_shapes_is_refused(cubes, message):
-    for function in (canonical, canonical_class, set_ids, is_chiral, symmetries):
-        with pytest.raises(ValueError, match=message):
-            function(cubes)

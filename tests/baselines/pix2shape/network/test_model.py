@@ -8,7 +8,6 @@ from pix2shape_models import made, room_source, tiny
 from refusals import refused
 from torch.utils.data import default_collate
 
-from baselines.pix2shape.network.empty_rooms import empty_rooms
 from baselines.pix2shape.network.model import shaded
 from baselines.pix2shape.training.steps import draw, generator_step
 from scenegen.common.errors import SpecError
@@ -61,23 +60,3 @@ def test_inferred_lights_are_one_place_in_all_cameras(colourful):
     assert not torch.allclose(views.scene.light_position[0], views.scene.light_position[1])
     torch.testing.assert_close(world, model.decoder.light_positions(code))
     assert (model.decoder.light_positions(100 * code) >= 0).all(), "a light behind a wall"
-
-
-def test_a_bounded_relief_can_rise_again(rooms_path):
-    """Where it means floor or wall the depth is exactly that, and has a slope all the same."""
-    config = tiny(rays=True, bounded=True)
-    batch, model = batch_of(rooms_path, config), made(config)
-    cameras, size = batch.views.cameras, config.networks.size
-    walls, _, _ = empty_rooms(cameras.world_from_camera, cameras.fov_y_degrees, size)
-    for bias, low, high in ((-20.0, 0, 0), (0.0, 0.02, 0.6), (20.0, 0.5, 0.6)):
-        torch.nn.init.zeros_(model.decoder.last.weight)
-        torch.nn.init.constant_(model.decoder.last.bias, bias)
-        code = torch.zeros(len(walls), config.networks.z)
-        depth = model.surfels(code, batch.views.condition, cameras).depth
-        relief = (walls - depth).detach()
-        assert low <= float(relief.min()) <= float(relief.max()) <= high + 1e-6
-        model.decoder.last.bias.grad = None
-        depth.sum().backward()
-        assert bias == 20 or float(model.decoder.last.bias.grad) < 0, "higher is nearer"
-    with pytest.raises(SpecError):
-        tiny(bounded=True)

@@ -50,7 +50,7 @@ def test_what_does_not_go_together(data, how, where, truths, train_questions):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"networks": replace(CONFIG.networks, width=0.06)}, "networks.width"),
+        ({"networks": replace(CONFIG.networks, width=0.06)}, "width"),
         ({"depth_reach": 0.3}, "depth_reach"),
         ({"depth_middle": 1.6}, "depth_middle"),
         ({"lights": 3}, "lights"),
@@ -59,7 +59,7 @@ def test_what_does_not_go_together(data, how, where, truths, train_questions):
 )
 def test_a_run_begins_from_models_of_its_own_kind_alone(change, told, rooms_path, tmp_path):
     start = untrained(tmp_path / "a.safetensors", rooms_path)
-    with refused(SpecError, "start", expected=told):
+    with refused(SpecError, "start", found=f"with {told} "):
         new_run(TrainingFiles(rooms_path), replace(CONFIG, **change), start=start)
 
 

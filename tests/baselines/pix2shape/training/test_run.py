@@ -107,17 +107,39 @@ def test_what_a_run_leaves(rooms_path, unbroken):
         assert picture.size == (4 * 134 + 6, 6 * 134 + 6)
 
 
-def test_a_killed_run_goes_on_as_if_it_had_not_been(rooms_path, folder, unbroken):
+CASES: dict[str, dict[str, Any]] = {
+    "rooms": {},
+    "critic steps": {"critic_steps": 2, "decay": True, "mutual_information": 0.0},
+    "questions": {
+        "questions": 0.1, "contrast": 1.0, "mutual_information": 0.1, "labelled_batch": 2,
+        "batch": 12, "question_batch": 6,
+    },
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+@pytest.mark.parametrize("case", CASES)
+def test_a_killed_run_goes_on_as_if_it_had_not_been(
+    case, rooms_path, train_questions, folder, unbroken
+):
+    """To the bit; nor do processes that read change anything."""
+    config, whole = replace(CONFIG, **CASES[case]), unbroken
+    path, how = rooms_path, {}
+    if case == "questions":
+        path, how = train_questions, {"labels": 2}
+    if case != "rooms":
+        whole = train_run(folder.with_name("whole"), path, config, HERE, **how).parent
+    there = replace(HERE, workers=2)
     with pytest.raises(Killed):
-        train_run(folder, rooms_path, CONFIG, HERE, progress=killed_at(3))
+        train_run(folder, path, config, there, progress=killed_at(3), **how)
     assert names(folder) == FILES
     assert load_checkpoint(folder, METHOD).card.iteration == 2
     steps: list[int] = []
-    train_run(folder, rooms_path, None, HERE, progress=lambda done, *_: steps.append(done))
+    train_run(folder, path, None, there, progress=lambda done, *_: steps.append(done))
     assert steps == [3, 4]
     for name in (CHECKPOINT, WEIGHTS):
-        assert same(folder / name, unbroken / name), name
-    (_, again), (_, card) = weights_of(folder), weights_of(unbroken)
+        assert same(folder / name, whole / name), name
+    (_, again), (_, card) = weights_of(folder), weights_of(whole)
     assert again == replace(card, seconds=again.seconds)
 
 
