@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measured.protocols import BY_NAME, ProtocolError
-from metrics.measured.reader import Images, MeasuredFile, open_images
+from metrics.measured.reader import Images, MeasuredFile, is_flat, open_images
 from metrics.measures.alignment import Alignment
 from metrics.measures.confidence import distance_from_edges
 from metrics.scoring.image_scores import (
@@ -24,9 +24,10 @@ from metrics.scoring.image_scores import (
     true_relief,
 )
 from metrics.scoring.kept_baselines import KeptBaselines, key_of
-from metrics.scoring.layers import read_true_layers, score_layers, worst_of_layers
+from metrics.scoring.layers import read_true_layers, score_layers, true_points, worst_of_layers
 from metrics.scoring.measured_rows import scores_of_view
 from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE
+from metrics.scoring.panoramas import baselines_of, score_panorama
 from metrics.scoring.records import OBJECT_COLUMNS
 from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.scoring.truth_digests import RowDigests, view_digests
@@ -225,9 +226,8 @@ def _of_rooms(truth: RoomsFile, confident: bool) -> Callable[[int, int, int], Be
     def begin(row: int, other: int, first: int) -> Begun:
         view, relief, first_view = read_true_view(truth, row), None, None
         if other != row:
-            seen = ("depth", "camera/world_from_camera", "camera/fov_y_degrees")
-            depth, pose, fov = (read(name, other) for name in seen)
-            relief = true_relief(depth, pose, float(fov), truth.room_size(other))
+            depth, pose = (read(name, other) for name in ("depth", "camera/world_from_camera"))
+            relief = true_relief(depth, pose, truth.lens(other), truth.room_size(other))
         if first not in (row, -1):
             seen = ("depth", "object_id", "camera/world_from_camera")
             first_view = FirstView(*(read(name, first) for name in seen))
@@ -269,18 +269,33 @@ def _of_measured(
     return begin
 
 
-def _of_layers(truth: RoomsFile) -> Callable[[int, int, int], Begun]:
+def _of_layers(truth: RoomsFile, meshes: bool) -> Callable[[int, int, int], Begun]:
     """Return what reads a row and its layers."""
 
     def begin(row: int, _other: int, _first: int) -> Begun:
         view = read_true_view(truth, row)
         layers = read_true_layers(truth, row, view)
+        surfaces = true_points(truth, row) if meshes else None
 
         def score(predicted: PredictedView, penalise: bool) -> ImageScores:
-            scores = worst_of_layers(layers) if penalise else score_layers(predicted, layers)
-            return ImageScores(scores, NO_OBJECTS)
+            scores_of = worst_of_layers if penalise else score_layers
+            return ImageScores(scores_of(predicted, layers, surfaces), NO_OBJECTS)
 
-        return view_digests(view), layers.floors(), score
+        return (*view_digests(view), *layers.digests), layers.floors(), score
+
+    return begin
+
+
+def _of_panoramas(truth: RoomsFile) -> Callable[[int, int, int], Begun]:
+    """Return what reads a row that is a panorama."""
+
+    def begin(row: int, _other: int, _first: int) -> Begun:
+        view = read_true_view(truth, row)
+
+        def score(predicted: PredictedView, penalise: bool) -> ImageScores:
+            return ImageScores(score_panorama(predicted, view, penalise), NO_OBJECTS)
+
+        return view_digests(view), baselines_of(view), score
 
     return begin
 
@@ -291,8 +306,12 @@ def _scorer(
     confident = any(file.has_confidence for file in files)
     if isinstance(truth, MeasuredFile):
         return RowScorer(files, _of_measured(truth, confident, protocols))
-    layered = files[0].kind == "layers"
-    return RowScorer(files, _of_layers(truth) if layered else _of_rooms(truth, confident))
+    if not is_flat(truth):
+        return RowScorer(files, _of_panoramas(truth))
+    if files[0].kind == "layers":
+        meshes = any(file.has_surface_points for file in files)
+        return RowScorer(files, _of_layers(truth, meshes))
+    return RowScorer(files, _of_rooms(truth, confident))
 
 
 def _scored_here(scorer: RowScorer, chunks: Sequence[Array]) -> Iterator[ScoredRows]:
