@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN = $(VENV)/bin
 WORKERS ?= 2
+# Where bytecode is not kept, each process of a test compiles all libraries again.
+unexport PYTHONDONTWRITEBYTECODE
 
 PIP = $(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt
 

@@ -21,7 +21,7 @@ class KnownTest:
         command: what makes the set, but for its place.
         purpose: what it is for.
         pictures: digest of the images; empty where they differ between machines by rounding, and
-            `scenegen verify` or `iqtt verify` compares them.
+            `scenegen verify` or `iqtt audit` compares them.
         superseded: whether older code made it, whose bits were others.
     """
 
@@ -114,11 +114,11 @@ _DIGESTS = {
         "1382577a054c986325744e6dc76009e5a68743c9279e064b66b2bc85a32f7101",
     ),
     "solids-1": (
-        "e57a597a9d00da0b2570b6805e92b15f854fd4c788540650c648bb99add4ece5",
+        "3e861fabfd4772b1ad2737c681a0fd8e33966b761a5f242305297119d51b2343",
         "1361175ee119e39feeffd380f052f2c00e78e629c14f6464bdbd437414d25a0f",
     ),
     "solids-objects-1": (
-        "c756eba3c930d3571fffce9bc0314100a981940cd70de1ee0958292a3c3374eb",
+        "38823b78cff0100bda0740c5a1fc5eb36af73e7f0510d74c4d8d9a182be6b0a8",
         "3fcd7d386d972db1c715da962a028499a028dc1b60ac761abffc97946824d3a3",
     ),
     "interiors-512-1": (
@@ -148,6 +148,14 @@ _DIGESTS = {
     "rotation-1/mirror": (
         "b5d9481c8f6ac819383869de64c514c1a05dccbb6bbaba66892681a6eacd43f0",
         "23b685fb1fcd5bd170ecb34acaa926904013188bd16413ed81ff4efc3cf6049a",
+    ),
+    "perspective-1/moved": (
+        "ec8c5cdc474999fc5bb7b46810148a93a0ca58043ee79c2b260b9ba0ecdb2d51",
+        "",
+    ),
+    "perspective-1/turned": (
+        "da93a1f60b18d1975f9e19da7470dc92d2a132175283abe4d5001e0287261cd5",
+        "",
     ),
 }
 # What older code made, whose bits were others: name, rows, digest of the truth, options.

@@ -94,11 +94,16 @@ BUSY = "print('ready cpu', flush=True)\nwhile True: pass"
     ("name", "kind", "most", "code", "said"),
     [
         ("sound", "RLIMIT_AS", 2 * 10**9, "", ""),
-        ("sound", "RLIMIT_CPU", 5, "", ""),
         ("crashes", "RLIMIT_CPU", 5, "", "file: "),
         ("sound", "RLIMIT_CPU", 1, BUSY, "trial: "),
-        ("sound", "RLIMIT_AS", 2 * 10**9, "print('ready memory'); exit(3)", "trial: "),
-        ("sound", "RLIMIT_AS", 2 * 10**9, "1 / 0", "trial: "),
+        *(
+            pytest.param("sound", *rest, marks=pytest.mark.slow)
+            for rest in (
+                ("RLIMIT_CPU", 5, "", ""),
+                ("RLIMIT_AS", 2 * 10**9, "print('ready memory'); exit(3)", "trial: "),
+                ("RLIMIT_AS", 2 * 10**9, "1 / 0", "trial: "),
+            )
+        ),
     ],
 )
 def test_limits_of_this_process_are_no_fault_of_the_file(

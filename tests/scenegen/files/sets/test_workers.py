@@ -87,7 +87,9 @@ def _dies_by(folder, number, dying, task):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
-@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGKILL])
+@pytest.mark.parametrize(
+    "number", [pytest.param(signal.SIGSEGV, marks=pytest.mark.slow), signal.SIGKILL]
+)
 def test_a_task_whose_process_a_signal_ended_is_done_again_once(tmp_path, number):
     for dying in ("once", "always"):
         results = in_processes(
