@@ -90,6 +90,8 @@ ALL = {
     "rezende": Named(CUBES, "meshes, trained through a non-differentiable renderer",
                      "rezende.training"),
     "siamese": Named(QUESTIONS, "the option with the most similar features", "resnets.siamese"),
+    "solid-supervised": Named(ROOMS, "layers from the ground-truth masks and depth, learned",
+                              "relief.solid_supervised"),
     "view-pairs": Named(ROOMS, "a network trained with pairs of images, without depth",
                         "relief.view_pairs"),
 }

@@ -11,17 +11,29 @@ from numpy.typing import NDArray
 from metrics.measured.reader import Images, MeasuredFile, matrix_of, rays_of
 from metrics.score_file import read_scores
 from metrics.scoring.geometry import points_as_scored
+from metrics.scoring.layers import fitted_layers, read_true_layers
 from metrics.scoring.measured_rows import points_as_declared
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.runs import ScoringError
 from metrics.scoring.truth_digests import require_truth, stated_truth
 from metrics.submissions.reader import Predictions, RoomPredictions
+from metrics.submissions.truths import read_true_view
+from scenegen.camera import pixel_directions
 from scenegen.common.errors import SpecError
 from scenegen.common.text_table import piped
-from scenegen.viewing import MOST_ROWS, SCENE, RecordedScene, Surfaces, View, room_scenes
+from scenegen.viewing import (
+    MOST_ROWS,
+    SCENE,
+    RecordedScene,
+    Surfaces,
+    View,
+    hidden_points,
+    room_scenes,
+)
 
 Array = NDArray[Any]
+FOV = "camera/fov_y_degrees"
 Scenes = Sequence[Sequence[int]]  # of each scene the rows of its images
 SORTED_BY = tuple(
     dict.fromkeys(
@@ -108,14 +120,19 @@ def _with_prediction(view: View, predictions: RoomPredictions, truth: Images) ->
     """Return a view with its prediction: points as they are scored, and normals."""
     (entry,) = np.flatnonzero(predictions.rows == view.row)
     predicted = predictions.view(int(entry))
-    depth, (height, width) = view.truth.depth, view.image.shape[:2]
+    (height, width), hidden = view.image.shape[:2], None
+    depth = view.truth.depth
     if isinstance(truth, MeasuredFile):
         points = points_as_declared(predicted, depth, rays_of(truth, view.row, height, width))
+    elif predicted.kind == "layers":
+        true = read_true_layers(truth, view.row, read_true_view(truth, view.row))
+        layers = fitted_layers(predicted, true)
+        rays = pixel_directions(height, width, float(truth.read(FOV, view.row)))
+        points, hidden = rays * layers[..., :1], hidden_points(rays, layers)
     else:
-        fov = float(truth.read("camera/fov_y_degrees", view.row))
-        points = points_as_scored(predicted, depth, fov)
+        points = points_as_scored(predicted, depth, float(truth.read(FOV, view.row)))
     normal = None if predicted.normal is None else predicted.normal[:height, :width]
-    return replace(view, prediction=Surfaces(points, normal))
+    return replace(view, prediction=Surfaces(points, normal, hidden))
 
 
 def _scores_table(scores: ScoreFile, names: Sequence[str], views: Sequence[View]) -> list[str]:

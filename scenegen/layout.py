@@ -60,7 +60,8 @@ NYU40 = {  # Gupta et al., "Perceptual organization and recognition of indoor sc
     "lamp": 35, "nightstand": 32, "pendant": 35, "picture": 11, "rug": 20, "screen": 25,
     "shelf": 15, "sofa": 6, "stool": 5, "table": 7,
 }  # fmt: skip
-# The datasets that scores depend on: the root attribute TRUTH_DIGEST is their joint digest.
+# The datasets that scores depend on, of those that a file has: the root attribute TRUTH_DIGEST is
+# their joint digest.
 SCORED = (
     "depth",
     "normal",
@@ -69,6 +70,9 @@ SCORED = (
     "view_index",
     "camera/world_from_camera",
     "camera/fov_y_degrees",
+    "layers/depth",
+    "layers/object_id",
+    "layers/entering",
 )
 # Sizes of axes that are the same in all files; those of the others follow from the spec.
 FIXED = {"channel": 3, "offset": 2, "xyz": 3, "matrix_row": 4, "matrix_column": 4, "coefficient": 2,

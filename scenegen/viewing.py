@@ -5,19 +5,19 @@ the values of pixels and points under the mouse.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import intrinsics, transform_points, transform_vectors
+from scenegen.camera import intrinsics, pixel_directions, transform_points, transform_vectors
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
 from scenegen.common.text_table import markdown, printable
 from scenegen.files.new_file import written_beside
-from scenegen.rooms.preview import NOTHING, id_colors, normal_bytes, srgb_bytes
+from scenegen.rooms.preview import LAYERS, NOTHING, id_colors, normal_bytes, srgb_bytes
 from scenegen.rooms.reader import Room, RoomsFile
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ FARTHEST = 1000.0  # units of length; points beyond are left out
 GAP = 1.1  # between true and predicted points, in widths of what the first view shows
 FRUSTUM = 0.12  # units of length, from a camera to the picture that it takes
 FULL_ERROR = 0.05  # units of length: errors of depth from here on have the full colour
+HIDDEN = (150, 150, 150)  # colour of points of hidden surfaces
 NO_OBJECT = 65535  # the object id -1 in 16 bits without sign, as ids of pictures have none
 
 
@@ -38,11 +39,13 @@ NO_OBJECT = 65535  # the object id -1 in 16 bits without sign, as ids of picture
 class Surfaces:
     """True or predicted points (H, W, 3) of an image, camera frame (y up, looks along -z).
 
-    NaN stands for no point. `normal` are their normals, in the same frame, or None.
+    NaN stands for no point. `normal` are their normals, in the same frame, or None. `hidden` are
+    points (N, 3) behind them, from layers.
     """
 
     points: Array
     normal: Array | None
+    hidden: Array | None = None
 
     @property
     def depth(self) -> Array:
@@ -134,7 +137,16 @@ def room_view(room: Room) -> View:
     matrix = intrinsics(height, width, fov, pixel_centers="half")
     name, image = f"view_{room.view_index}", srgb_bytes(room.radiance)
     truth = Surfaces(room.points, room.normal)
+    if LAYERS in room.truth:
+        rays = pixel_directions(height, width, fov)
+        truth = replace(truth, hidden=hidden_points(rays, room.truth[LAYERS]))
     return View(name, room.index, image, room.object_id, pose, matrix, truth)
+
+
+def hidden_points(rays: Array, layers: Array) -> Array:
+    """Return the points (N, 3) of the second and further layers (H, W, L) of rays (H, W, 3)."""
+    row, column, layer = np.nonzero(np.isfinite(layers[..., 1:]))
+    return np.asarray(rays[row, column] * layers[row, column, layer + 1, None])
 
 
 def write_recording(
@@ -220,6 +232,11 @@ def _record_view(recording: "RecordingStream", view: View) -> list[str]:
         radii = surfaces.depth[seen] / view.matrix[1, 1]  # a point is as wide as two pixels
         cloud = rr.Points3D(points, colors=colors[seen], radii=radii)
         recording.log(f"world/{side}/{view.name}", cloud)
+        if surfaces.hidden is not None:
+            behind = transform_points(pose, surfaces.hidden)
+            wide = -surfaces.hidden[:, 2] / view.matrix[1, 1] / 2
+            cloud = rr.Points3D(behind, colors=HIDDEN, radii=wide)
+            recording.log(f"world/{side}/{view.name}/hidden", cloud)
     for name, picture in pictures.items():
         recording.log(f"pixels/{view.name}/{name}", picture)
     return list(pictures)

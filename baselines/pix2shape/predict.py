@@ -140,8 +140,8 @@ def answers_of(model: Pix2Shape, labels: int, run: str, questions: QuestionsFile
 
 def enlarged_views(
     rooms: RoomsFile, depth_of: Callable[[Array], Tensor]
-) -> Iterator[tuple[Array, Array, Array]]:
-    """Yield rows, their depth, and the normals that follow from it, at the size of the images.
+) -> Iterator[tuple[Array, dict[str, Array]]]:
+    """Yield rows, with their depth and the normals that follow from it, at the size of the images.
 
     Args:
         depth_of: returns planar depth, (B, S, S), of some rows, which have one field of view.
@@ -150,7 +150,8 @@ def enlarged_views(
     runs = np.split(np.arange(len(fov)), np.flatnonzero(np.diff(fov)) + 1)
     for rows in (run[places] for run in runs for places in row_batches(len(run), BATCH)):
         depth, normal = enlarged(depth_of(rows), float(fov[rows[0]]), size)
-        yield rows, depth.cpu().numpy(), np.moveaxis(normal.cpu().numpy(), 1, -1)
+        normals = np.moveaxis(normal.cpu().numpy(), 1, -1)
+        yield rows, {"depth": depth.cpu().numpy(), "normal": normals}
 
 
 def enlarged(depth: Tensor, fov_y_degrees: float, size: int) -> tuple[Tensor, Tensor]:

@@ -65,7 +65,7 @@ def views_of(model: Ptn, card: Card, rooms: RoomsFile) -> Views:
     return Views(_predicted(model, RoomImages(rooms, model.settings.size)), "first_view", method)
 
 
-def _predicted(model: Ptn, images: RoomImages) -> Iterator[tuple[Array, Array, Array]]:
+def _predicted(model: Ptn, images: RoomImages) -> Iterator[tuple[Array, dict[str, Array]]]:
     """Yield rows, depth and normals, scene by scene."""
     for rows in images.rows_of:
         source = int(rows[0])
@@ -74,7 +74,7 @@ def _predicted(model: Ptn, images: RoomImages) -> Iterator[tuple[Array, Array, A
         volume, mirrored = model(image, place), bool(images.mirrored[source])
         views = [seen(model, volume, images, row, mirrored) for row in rows.tolist()]
         depths, normals = zip(*views, strict=True)
-        yield rows, np.stack(depths), np.stack(normals)
+        yield rows, {"depth": np.stack(depths), "normal": np.stack(normals)}
 
 
 def seen(

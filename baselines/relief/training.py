@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -92,6 +93,8 @@ def lesson(
     run: Run,
     *,
     with_depth: bool = False,
+    read: Callable[[Sequence[RoomsFile], int], Rooms] | None = None,
+    shape: bool = True,
     prepare: Callable[[Any], Any] = lambda network: None,
 ) -> Lesson:
     """Return what a run of a relief network learns, of files of rooms.
@@ -104,10 +107,12 @@ def lesson(
         teach: finds the relief to learn; it gets the rooms, the settings, the run's folder and a
             function to call with the images done and in all.
         with_depth: whether the rooms' depth and objects are read.
+        read: reads the rooms of files; by default `read_rooms`.
+        shape: whether `shape_loss` is added where objects are told.
         prepare: is given the network of a new run.
     """
     settings, files = run.settings, run.data.rooms()
-    rooms = read_rooms(files, settings.size, depth=with_depth)
+    rooms = (read or partial(read_rooms, depth=with_depth))(files, settings.size)
 
     def batches(first: int) -> Iterator[Batch]:
         def matched(done: int, total: int) -> None:
@@ -123,7 +128,7 @@ def lesson(
 
     def loss_of(state: State[Card, Relief], batch: Batch, number: int) -> Loss:
         windows_only = number < (1 - WHOLE) * state.card.settings.iterations
-        loss = _loss(state.network, batch, windows_only)
+        loss = _loss(state.network, batch, windows_only, shape)
         return Loss(loss, {"loss": loss})
 
     card = Card(run.method, settings, **requests(files))
@@ -159,7 +164,7 @@ def batches_of(rooms: Rooms, lessons: Lessons, settings: Settings, first: int) -
         )
 
 
-def _loss(network: Relief, batch: Batch, windows_only: bool) -> Tensor:
+def _loss(network: Relief, batch: Batch, windows_only: bool, shape: bool) -> Tensor:
     """Return the loss of a batch; where objects are told, of windows around them or of all."""
     cameras = target_cameras = batch.cameras
     if batch.target_pose is not None:
@@ -172,7 +177,7 @@ def _loss(network: Relief, batch: Batch, windows_only: bool) -> Tensor:
         channels, target, weight, inside = windows(maps, inside > 0, side, batch.place)
     errors = (network.relief(channels) - target) * weight
     loss = errors.abs().sum() / weight.sum().clamp(min=1)
-    return loss if inside is None else loss + shape_loss(errors, inside)
+    return loss + shape_loss(errors, inside) if shape and inside is not None else loss
 
 
 def shape_loss(errors: Tensor, inside: Tensor) -> Tensor:

@@ -1,6 +1,6 @@
 """A trained baseline as data, and the training and the submissions that all share."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -104,12 +104,12 @@ class Views:
     """What a network predicts of rooms.
 
     Attributes:
-        predicted: rows, (B,), with planar depth, (B, H, W), and normals, (B, H, W, 3).
+        predicted: rows, (B,), with what `RoomPredictionWriter.add` takes of them, by name.
         shown: which image each view is predicted from, as `RoomPredictionWriter` says.
         method, notes, run: of the submission.
     """
 
-    predicted: Iterator[tuple[Array, Array, Array]]
+    predicted: Iterator[tuple[Array, Mapping[str, Array]]]
     shown: Any
     method: str = ""
     notes: str = ""
@@ -239,7 +239,7 @@ def submit(
     overwrite: bool = False,
     progress: RowsDone = lambda done, total: None,
 ) -> None:
-    """Write answers to questions and their scores, or depth and normals of every view of rooms.
+    """Write answers to questions and their scores, or predict every view of rooms.
 
     Args:
         method: of the submission, unless `Views` have another one.
@@ -260,7 +260,7 @@ def submit(
         views = predict(rooms)
         how |= {"method": views.method or method, "run": views.run, "notes": views.notes}
         with RoomPredictionWriter(out, data, shown=views.shown, **how) as submission:
-            for rows, depths, normals in views.predicted:
-                for row, depth, normal in zip(rows.tolist(), depths, normals, strict=True):
-                    submission.add(row, depth, normal)
+            for rows, arrays in views.predicted:
+                for place, row in enumerate(rows.tolist()):
+                    submission.add(row, **{name: each[place] for name, each in arrays.items()})
                 progress(len(rows), len(rooms))

@@ -120,8 +120,8 @@ def read_as(
               help="Predictions of all surfaces along each ray: NPY or NPZ files with depths (h, w,"
               " L) or points (h, w, L, 3), nearest first, NaN behind the last layer.")
 @click.option("--meshes", metavar="FILES",
-              help="Predictions of whole objects: a GLB, PLY or OBJ file per image, in the frame of"
-              " the camera. The rays of the pixels are cast against these meshes.")
+              help="Predictions of whole objects: a GLB, PLY or OBJ file per image, or a folder of"
+              " them per image such as 'out/*/*.glb', in the frame of the camera.")
 @reading_options(*DEPTH_KINDS, "points")
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
               help="Alignment that the predictions need: what the method cannot determine [default:"
@@ -236,7 +236,7 @@ def _import_answers(
 def _name_of(pattern: str) -> str:
     """Return the name of the folder that files lie in, for tables."""
     path = Path(pattern)
-    folder = path if path.is_dir() else path.parent
+    folder = next(place for place in (path, *path.parents) if place.is_dir())
     return folder.resolve().name or "predictions"
 
 

@@ -1,4 +1,4 @@
-"""Import meshes, one file for each image, as layers along the rays of its pixels."""
+"""Import meshes, a file or a folder of files for each image, as layers along its rays."""
 
 from collections.abc import Callable
 from functools import partial
@@ -14,6 +14,7 @@ from metrics.intake.outputs import FRAMES
 from metrics.intake.reading import Reading
 from metrics.measured.reader import size_of
 from metrics.measures.solids import entered_spans
+from metrics.measures.surfaces.whole import drawn_points
 from metrics.submissions.hints.frames import AXES, frame_text
 from metrics.submissions.layout import Shown
 from metrics.submissions.writer import RoomPredictionWriter
@@ -58,7 +59,10 @@ def import_meshes(
     Of a reading, the scale, the frame, the alignment and the matching are used. Other arguments as
     `importing.import_rooms`. Raises MatchError, BadMeshError with the file's name, and as that.
     """
-    files = files_of(pattern, ENDINGS)
+    files, groups = files_of(pattern, ENDINGS), dict[Path, list[Path]]()
+    of_folders = not Path(pattern).parent.exists()  # as in 'out/*/*.glb'
+    for file in files:
+        groups.setdefault(file.parent if of_folders else file, []).append(file)
     with RoomPredictionWriter(
         out, truth, method=method, run=run, alignment=reading.alignment or "none", shown=shown,
         notes=notes, overwrite=overwrite,
@@ -66,15 +70,19 @@ def import_meshes(
         rooms = writer.truth
         if not isinstance(rooms, RoomsFile):
             raise SpecError(rooms.path, "ground truth of images alone", "rooms")
-        paths, how = match_files(files, names_of(rooms), partial(keys_of, rooms), reading.match)
-        lines, opened, unseen = [f"{len(paths)} files {how}"], 0, 0
+        paths, how = match_files(
+            sorted(groups), names_of(rooms), partial(keys_of, rooms), reading.match
+        )
+        noun = f"folders of {len(files)} files" if of_folders else "files"
+        lines, opened, unseen = [f"{len(paths)} {noun} {how}"], 0, 0
         tried: list[tuple[int, Array]] = []
         for row, path in enumerate(paths):
-            vertices, faces, closed = welded(*read_mesh(path))
+            vertices, faces, closed = _together(groups[path])
             vertices = vertices * FRAMES[reading.frame] * reading.scale
             camera = *size_of(rooms, row), float(rooms.read("camera/fov_y_degrees", row))
             layers = mesh_layers(vertices, faces, closed, *camera)
-            writer.add(row, layers=layers)
+            points = drawn_points(vertices[faces], row, "prediction")
+            writer.add(row, layers=layers, surface_points=points)
             opened += not closed.all()
             unseen += not np.isfinite(layers).any()
             if len(tried) < TRIED:
@@ -87,6 +95,18 @@ def import_meshes(
         if rooms.has_truth and (better := _better_frame(rooms, tried)):
             lines.append(f"hint: meshes look like {better}; see --frame")
     return "; ".join(lines)
+
+
+def _together(paths: list[Path]) -> tuple[Array, Array, Array]:
+    """Return what `layers.welded` makes of each file, as of one. Raises BadMeshError."""
+    parts, before, count = [], 0, 0
+    for path in paths:
+        vertices, faces, closed = welded(*read_mesh(path))
+        parts.append((vertices, faces + before, closed))
+        before, count = before + len(vertices), count + len(faces)
+        check_most(f"{path.parent}: faces", count, limits.MOST_FACES)
+    vertices, faces, closed = map(np.concatenate, zip(*parts, strict=True))
+    return vertices, faces, closed
 
 
 def read_mesh(path: Path) -> tuple[Array, Array]:

@@ -133,7 +133,7 @@ def read_output(
         None if normal is None else image_of(normal, "normal", vectors=True),
         _fov(output.get("intrinsics"), height),
         _confidence(output),
-        chosen,
+        key=chosen,
     )
     if mask is not None:
         geometry = geometry.within(image_of(mask, "mask") > 0.5)

@@ -247,7 +247,7 @@ def _geometry(arrays: Mapping[str, Any]) -> Geometry:
     fov = float(arrays["fov"]) if "fov" in arrays else None
     kind, key = str(arrays["kind"]), str(arrays["key"])
     normal, sure = arrays.get("normal"), arrays.get("confidence")
-    return Geometry(kind, alignment, arrays["geometry"], normal, fov, sure, key)
+    return Geometry(kind, alignment, arrays["geometry"], normal, fov, sure, key=key)
 
 
 # ---- questions ----

@@ -15,6 +15,8 @@ Spans = tuple[Array, Array]
 NEAR = 0.02  # scene units: within which a layer counts as found
 SHARES = np.linspace(0.0, 1.0, 12)[1:]  # quantiles of thickness that shortcuts try
 HIDDEN = (2, 3, 4)  # layers that have a recall of their own
+SEEN_SHARE = 0.01  # of the rays that meet an object; objects that fewer meet first are hidden
+LEAST_RAYS = 16  # that meet an object
 
 
 def paired_spans(layers: Array) -> Spans:
@@ -105,6 +107,34 @@ def layer_recalls(predicted: Array, true: Array, of_objects: Array) -> dict[str,
         here = np.s_[number - 1 : number]
         scores[f"layer_{number}_recall_{NEAR:g}"] = _share(found[here], of_objects[here])
     return scores
+
+
+def hidden_object_recall(predicted: Spans, true: Spans, depth: Array, object_id: Array) -> float:
+    """Return the fraction of hidden objects that are predicted; NaN where none is hidden.
+
+    Such an object begins a true span on at least LEAST_RAYS rays, and is the first layer of less
+    than SEEN_SHARE of the rays that meet it. It counts as predicted if half of those rays have a
+    predicted span whose IoU with the first true span that the object begins is above 0.5.
+
+    Args:
+        predicted, true: spans of N rays.
+        depth, object_id: of all layers, (L, N).
+    """
+    recalled = []
+    for number in np.unique(object_id[object_id > 0]).tolist():
+        of_object = object_id == number
+        first = np.where(of_object, depth, np.inf).min(axis=0)
+        begins = np.isfinite(first) & (true[0] == first)
+        rays = begins.any(axis=0)
+        if rays.sum() < LEAST_RAYS or of_object[0].sum() >= SEEN_SHARE * np.isfinite(first).sum():
+            continue
+        start, end = first[rays], true[1].T[begins.T]
+        a, b = predicted[0][:, rays], predicted[1][:, rays]
+        with np.errstate(invalid="ignore"):
+            both = np.minimum(b, end) - np.maximum(a, start)
+            either = np.maximum(b, end) - np.minimum(a, start)
+        recalled.append((both > 0.5 * either).any(axis=0).mean() >= 0.5)
+    return float(np.mean(recalled)) if recalled else np.nan
 
 
 def _share(found: Array, counted: Array) -> float:

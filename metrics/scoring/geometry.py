@@ -42,8 +42,6 @@ def fitted_geometry(
     height, width = true_depth.shape
     rays = pixel_directions(height, width, fov_y_degrees)[mask]
     true = true_depth[mask].astype(np.float64)
-    if predicted.kind == "layers":
-        predicted = replace(predicted, kind="depth", geometry=predicted.geometry[..., 0])
     depth = np.full(true_depth.shape, np.nan)
     if predicted.kind == "points":
         points = predicted.geometry[mask].astype(np.float64)

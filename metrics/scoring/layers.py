@@ -1,6 +1,6 @@
 """Scores of layers of one image: predicted surfaces along its rays against all true ones."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -8,13 +8,17 @@ from numpy.typing import NDArray
 
 from metrics.measures import solids
 from metrics.measures.alignment import scale_and_shift
+from metrics.measures.surfaces import whole
 from metrics.measures.surfaces.chamfer_hausdorff import chamfer, nearest_distances
 from metrics.scoring.metric_names import CONSTANT, INFLATED, MIRRORED, SIZED, metric
+from metrics.scoring.truth_digests import LAYERS
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import refuse_pixels
 from metrics.submissions.truths import TrueView
 from scenegen.camera import pixel_directions, pixel_size
+from scenegen.common.errors import SceneGenError
+from scenegen.files.content import row_digest
 from scenegen.rooms.reader import RoomsFile
 
 Array = NDArray[np.float64]
@@ -33,6 +37,7 @@ class TrueLayers:
         pixel: side of a pixel at depth 1.
         round: as `solids.round_bodies`, (N,).
         depth, object_id, entering: (L, N), as stored.
+        digests: of the three as they were read.
     """
 
     scored: NDArray[np.bool_]
@@ -42,6 +47,7 @@ class TrueLayers:
     depth: Array
     object_id: NDArray[np.int8]
     entering: NDArray[np.int8]
+    digests: tuple[bytes, ...]
 
     @cached_property
     def spans(self) -> solids.Spans:
@@ -89,25 +95,79 @@ class TrueLayers:
 
 def read_true_layers(truth: RoomsFile, row: int, view: TrueView) -> TrueLayers:
     """Return the true layers of a row. Raises FileFormatError."""
-    depth, ids, entering = (
-        truth.read(f"layers/{x}", row) for x in ("depth", "object_id", "entering")
-    )
+    stored = depth, ids, entering = [truth.read(name, row) for name in LAYERS]
+    digests = tuple(map(row_digest, stored))
     scored = view.mask & ~((ids > 0) & (entering == 0)).any(axis=-1)
     layers = depth[scored].T.astype(np.float64), ids[scored].T, entering[scored].T
     height, width = scored.shape
     rays = pixel_directions(height, width, view.fov_y_degrees)[scored]
     pixel, bodies = pixel_size(len(scored), view.fov_y_degrees), solids.round_bodies(view.object_id)
-    return TrueLayers(scored, rays, pixel, bodies[scored], *layers)
+    return TrueLayers(scored, rays, pixel, bodies[scored], *layers, digests)
 
 
-def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float]:
+def true_points(truth: RoomsFile, row: int) -> list[Array] | None:
+    """Return two draws of points of a row's objects, camera frame; None without their meshes.
+
+    Points inside of solids, such as those of parts that overlap, are left out. They are those that
+    are inside on the rays of all 9 pixels around, and 0.02 away from the ends.
+    """
+    from scenegen.objects.catalogue import objects_of
+    from scenegen.objects.scene_mesh import world_from_object
+
+    try:
+        objects = objects_of(truth.spec)
+    except SceneGenError:  # meshes of a folder
+        return None
+    room = truth[row]
+    meshes = []
+    for item in room.scene.objects:
+        pose = world_from_object(item.position, item.rotation, item.scale)
+        meshes.append(objects.shape(item.shape).triangles @ pose[:3, :3].T + pose[:3, 3])
+    if not meshes:
+        return None
+    triangles = np.concatenate(meshes)
+    rotation, place = room.world_from_camera[:3, :3], room.world_from_camera[:3, 3]
+    height, width = room.depth.shape
+    layers = (room.truth[f"layers/{x}"] for x in ("depth", "entering"))
+    spans = solids.entered_spans(*(x.reshape(height * width, -1).T for x in layers))
+    starts, ends = (
+        np.pad(x.reshape(-1, height, width), ((0, 0), (1, 1), (1, 1)), constant_values=np.inf)
+        for x in spans
+    )
+    draws = []
+    for draw in whole.DRAWS[1:]:
+        points = (whole.drawn_points(triangles, row, draw) - place) @ rotation
+        depth = -points[:, 2]
+        at = points[:, :2] / depth[:, None] / pixel_size(height, room.fov_y_degrees)
+        column = np.floor(at[:, 0] + width / 2).astype(int)
+        line = np.floor(height / 2 - at[:, 1]).astype(int)
+        inside = (column >= 0) & (column < width) & (line >= 0) & (line < height)
+        line, column = np.where(inside, line, 0), np.where(inside, column, 0)
+        for i, j in np.ndindex(3, 3):
+            start, end = starts[:, line + i, column + j], ends[:, line + i, column + j]
+            deep = (start + whole.NEAR < depth) & (depth < end - whole.NEAR)
+            inside &= deep.any(axis=0)
+        draws.append(points[~inside])
+    return draws
+
+
+def score_layers(
+    predicted: PredictedView, truth: TrueLayers, surfaces: list[Array] | None = None
+) -> dict[str, float]:
     """Return every score of predicted layers (H, W, L), fitted to the visible surfaces of objects.
 
-    They are NaN where no solid is visible. Raises PredictionError where a scored pixel breaks
-    `submissions.rules`.
+    `surfaces` are `true_points`. Scores are NaN where no solid is visible. Raises PredictionError
+    where a scored pixel breaks `submissions.rules`.
     """
     refuse_pixels(PredictionError, "predicted layers", "layers", predicted.geometry, truth.scored)
     layers = fitted_layers(predicted, truth)[truth.scored].T
+    points = predicted.surface_points
+    if points is not None:
+        where = "predicted points"
+        refuse_pixels(PredictionError, where, "surface_points", points, truth.scored)
+        scale, shift = _fit(predicted, truth)
+        depth = np.where(points[:, 2:] < 0, -points[:, 2:], np.inf)
+        points = points * (scale + shift / depth)
     layers = layers[: max(2, np.isfinite(layers).any(axis=1).sum())]
     of_objects = truth.object_id > 0
     spans = solids.paired_spans(layers)
@@ -115,7 +175,11 @@ def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float
         "solid_iou": truth.iou(spans),
         "back_depth_error": solids.back_depth_error(spans, truth.visible),
         **solids.layer_recalls(layers, truth.depth, of_objects),
+        "hidden_object_recall": solids.hidden_object_recall(
+            spans, truth.spans, truth.depth, truth.object_id
+        ),
     }
+    scores |= whole.surface_scores(points, surfaces)
     fronts_and_backs = np.stack(spans, axis=1).reshape(-1, layers.shape[1])
     for name, which in (("seen_chamfer", np.s_[:1]), ("unseen_chamfer", np.s_[1:])):
         true = _points(truth, np.where(of_objects, truth.depth, np.inf)[which])
@@ -129,16 +193,25 @@ def score_layers(predicted: PredictedView, truth: TrueLayers) -> dict[str, float
 
 def fitted_layers(predicted: PredictedView, truth: TrueLayers) -> Array:
     """Return layers (H, W, L) after the declared alignment of the first to visible objects."""
-    first = predicted.geometry[truth.scored, 0]
-    seen = np.isfinite(first) & (truth.object_id[0] > 0)
-    scale, shift = scale_and_shift(first[seen], truth.depth[0, seen], predicted.alignment)
+    scale, shift = _fit(predicted, truth)
     return np.asarray(scale * predicted.geometry + shift)
 
 
-def worst_of_layers(truth: TrueLayers) -> dict[str, float]:
+def _fit(predicted: PredictedView, truth: TrueLayers) -> tuple[float, float]:
+    """Return the scale and the shift of depth that the declared alignment allows."""
+    first = predicted.geometry[truth.scored, 0]
+    seen = np.isfinite(first) & (truth.object_id[0] > 0)
+    return scale_and_shift(first[seen], truth.depth[0, seen], predicted.alignment)
+
+
+def worst_of_layers(
+    predicted: PredictedView, truth: TrueLayers, surfaces: list[Array] | None = None
+) -> dict[str, float]:
     """Return the worst value of each score that an image has."""
-    nothing = PredictedView("layers", "none", np.full((*truth.scored.shape, 2), np.nan))
-    scores = score_layers(nothing, truth)
+    points = None if predicted.surface_points is None else np.full((1, 3), -1.0)
+    empty = np.full((*truth.scored.shape, 2), np.nan)
+    nothing = replace(predicted, geometry=empty, alignment="none", surface_points=points)
+    scores = score_layers(nothing, truth, surfaces)
     return {x: value if np.isnan(value) else metric(x).worst() for x, value in scores.items()}
 
 

@@ -132,7 +132,8 @@ _SEEN: Sequence[Shown] = ("no_view", "first_view", "scored_view")  # ever more
 Lacking = Literal[
     "", "objects", "relief", "inside", "bends", "behind", "boundary", "planes", "partner", "edges",
     "pairs", "order", "order within", "order between", "solids",
-    "layer 3", "layer 4",
+    "layer 3", "layer 4", "hidden objects",
+    "meshes",
 ]  # fmt: skip
 # The kinds of test sets, which differ in their headline: `ScoreFile.kind`.
 KINDS = ("rooms", "interiors", "layers", "measured", "iqtt")  # layers: of either kind of rooms
@@ -167,7 +168,8 @@ class Metric:
             a reliable normal from its depth; "partner", those whose view no other scene has;
             "edges", those without an occlusion edge; "pairs" and "order", those without the pairs
             of pixels that `measures.pairs` compares; "solids", those in which no ray first
-            meets a solid; "layer 3" and "layer 4", those without such layers; else "".
+            meets a solid; "layer 3", "layer 4" and "hidden objects", those without such layers or
+            objects; "meshes", those of submissions without meshes; else "".
         unchanged_by: what may be fitted to the truth without a change of the value.
         signed: whether the value is a bias, which is best at 0 and ranks nothing.
     """
@@ -272,6 +274,7 @@ _BEHIND = _SURFACE | {"lacking": "behind"}
 _OBJECT: dict[str, Any] = {"lacking": "objects", "of_objects": True}
 _RELIEF = _SURFACE | {"lacking": "relief", "baselines": (OTHER_SCENE,)}
 _LAYERS: dict[str, Any] = {"of": "layers", "lacking": "solids"}
+_MESHES = _LAYERS | {"lacking": "meshes"}
 # Tops and fronts of furniture are parallel to floor and walls, so the empty room may be better.
 _FLAT_OR_EMPTY = (CUT_OUT, EMPTY_ROOM)
 
@@ -485,6 +488,17 @@ TABLE: Sequence[Metric] = (
     *(_share(f"layer_{number}_recall_0.02", f"Layer recall, layer {number}",
              f"`layer_recall_0.02` of layer {number}.", **{**_LAYERS, "lacking": lacking})
       for number, lacking in ((2, "solids"), (3, "layer 3"), (4, "layer 4"))),
+    _share("hidden_object_recall", "Hidden objects",
+           "fraction of the objects that less than 1% of their rays meet first for which at least"
+           " half of the rays have a predicted span with an IoU above 0.5 with the true one.",
+           **{**_LAYERS, "lacking": "hidden objects"}),
+    _error("whole_chamfer", "Chamfer, whole surfaces",
+           "Chamfer distance of the whole surfaces of objects, of 4096 points of each, drawn evenly"
+           " by area.", **_MESHES),
+    _share("whole_f_score_0.02", "F-score, whole surfaces",
+           "F-score of these points at 0.02 scene units.", **_MESHES),
+    _error("whole_chamfer_noise", "Chamfer, noise level",
+           "`whole_chamfer` of other points of the true surfaces.", **_MESHES),
     _share("iqtt_accuracy", "IQTT accuracy",
            "1 if the correct option is chosen, else 0 (also abstentions); chance is 1 / options.",
            of="answers", tasks=("iqtt",), headline={"iqtt": 1}),

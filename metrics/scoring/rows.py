@@ -24,7 +24,7 @@ from metrics.scoring.image_scores import (
     true_relief,
 )
 from metrics.scoring.kept_baselines import KeptBaselines, key_of
-from metrics.scoring.layers import read_true_layers, score_layers, worst_of_layers
+from metrics.scoring.layers import read_true_layers, score_layers, true_points, worst_of_layers
 from metrics.scoring.measured_rows import scores_of_view
 from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE
 from metrics.scoring.records import OBJECT_COLUMNS
@@ -269,18 +269,19 @@ def _of_measured(
     return begin
 
 
-def _of_layers(truth: RoomsFile) -> Callable[[int, int, int], Begun]:
+def _of_layers(truth: RoomsFile, meshes: bool) -> Callable[[int, int, int], Begun]:
     """Return what reads a row and its layers."""
 
     def begin(row: int, _other: int, _first: int) -> Begun:
         view = read_true_view(truth, row)
         layers = read_true_layers(truth, row, view)
+        surfaces = true_points(truth, row) if meshes else None
 
         def score(predicted: PredictedView, penalise: bool) -> ImageScores:
-            scores = worst_of_layers(layers) if penalise else score_layers(predicted, layers)
-            return ImageScores(scores, NO_OBJECTS)
+            scores_of = worst_of_layers if penalise else score_layers
+            return ImageScores(scores_of(predicted, layers, surfaces), NO_OBJECTS)
 
-        return view_digests(view), layers.floors(), score
+        return (*view_digests(view), *layers.digests), layers.floors(), score
 
     return begin
 
@@ -291,8 +292,10 @@ def _scorer(
     confident = any(file.has_confidence for file in files)
     if isinstance(truth, MeasuredFile):
         return RowScorer(files, _of_measured(truth, confident, protocols))
-    layered = files[0].kind == "layers"
-    return RowScorer(files, _of_layers(truth) if layered else _of_rooms(truth, confident))
+    if files[0].kind == "layers":
+        meshes = any(file.has_surface_points for file in files)
+        return RowScorer(files, _of_layers(truth, meshes))
+    return RowScorer(files, _of_rooms(truth, confident))
 
 
 def _scored_here(scorer: RowScorer, chunks: Sequence[Array]) -> Iterator[ScoredRows]:

@@ -21,8 +21,9 @@ from scenegen.rooms.reader import RoomsFile
 if TYPE_CHECKING:
     from iqtt.files.reader import AnswersFile
 
-PER_PIXEL = ("depth", "normal", "object_id")
-RowDigests = tuple[bytes, ...]  # of PER_PIXEL
+LAYERS = ("layers/depth", "layers/object_id", "layers/entering")
+PER_PIXEL = ("depth", "normal", "object_id", *LAYERS)
+RowDigests = tuple[bytes, ...]  # of PER_PIXEL, or of the first ones
 
 
 class OtherTruthError(ScoringError):
@@ -30,8 +31,8 @@ class OtherTruthError(ScoringError):
 
 
 def view_digests(view: TrueView) -> RowDigests:
-    """Return the digest of each array of a row that was read to be scored."""
-    return tuple(row_digest(getattr(view, name)) for name in PER_PIXEL)
+    """Return the digests of depth, normal and object_id of a row that were read to be scored."""
+    return tuple(row_digest(getattr(view, name)) for name in PER_PIXEL[:3])
 
 
 def stored_digest(truth: "Images | AnswersFile") -> str | None:
@@ -81,12 +82,14 @@ def images_digest(truth: Images, scored: Mapping[int, RowDigests]) -> str:
     """
     columns = {}
     for name in truth.SCORED:
-        if name not in truth.fields:  # measured truth may have no normals
+        if name not in truth.fields:  # layers; and measured truth may have no normals
             continue
         if name in PER_PIXEL:
             place = PER_PIXEL.index(name)
             columns[name] = column_digest(
-                scored[row][place] if row in scored else row_digest(truth.read(name, row))
+                scored[row][place]
+                if len(scored.get(row, ())) > place
+                else row_digest(truth.read(name, row))
                 for row in range(len(truth))
             )
         else:

@@ -83,6 +83,9 @@ COLUMNS = {
                " NaN behind the last one; layers 1 and 2, 3 and 4, ... are front and back of a"
                " solid, a last one without a partner is background", ("y", "x", "layer"),
                own_chunk=True),
+        Column("surface_points", (), "float32", "scene unit", "camera",
+               "points evenly by area on the whole surfaces of predicted objects; with layers"
+               " alone", ("point", "xyz"), own_chunk=True),
         Column("normal", (), "float32", "1", "camera",
                "surface normal, x right, y up, z towards the viewer; faces the viewer; of any"
                " length but 0", ("y", "x", "xyz"), own_chunk=True),

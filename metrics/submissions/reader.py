@@ -136,6 +136,8 @@ class PredictedView:
         normal: (H, W, 3), camera frame, as stored; None where there are none.
         fov_y_degrees: vertical field of view; None where the method does not estimate it.
         confidence: of each pixel's depth, (H, W), larger is surer; None where there is none.
+        surface_points: of whole objects, (P, 3), camera frame, as stored; None where there are
+            none.
     """
 
     kind: str
@@ -144,6 +146,7 @@ class PredictedView:
     normal: Array | None = None
     fov_y_degrees: float | None = None
     confidence: Array | None = None
+    surface_points: Array | None = None
 
     @property
     def columns(self) -> tuple[tuple[str, Array | None], ...]:
@@ -186,12 +189,19 @@ class RoomPredictions(Predictions):
         """Whether there is a confidence of each pixel."""
         return "confidence" in self._arrays
 
+    @property
+    def has_surface_points(self) -> bool:
+        """Whether there are points of whole objects."""
+        return "surface_points" in self._arrays
+
     def view(self, index: int) -> PredictedView:
         """Everything that is predicted in entry `index`. Raises FileFormatError."""
         normal = self.normal(index) if self.has_normals else None
         fov = float(self._arrays["fov_y_degrees"][index]) if self.has_fov else None
         sure = self.confidence(index) if self.has_confidence else None
-        return PredictedView(self.kind, self.fitted, self.geometry(index), normal, fov, sure)
+        points = self.surface_points(index) if self.has_surface_points else None
+        geometry = self.geometry(index)
+        return PredictedView(self.kind, self.fitted, geometry, normal, fov, sure, points)
 
     @property
     def has_fov(self) -> bool:
@@ -229,6 +239,10 @@ class RoomPredictions(Predictions):
         Raises FileFormatError where there is none, or it is damaged.
         """
         return self._read("confidence", index)
+
+    def surface_points(self, index: int) -> Array:
+        """Points of whole objects (P, 3) of entry `index`. Raises as `normal`."""
+        return self._read("surface_points", index)
 
     def _read(self, name: str, index: int) -> Array:
         if name not in self._arrays:

@@ -124,6 +124,10 @@ RULES = (
         lambda vectors, against: _on_surface(~_finite(vectors).all(axis=-1), against),
     ),
     Rule(
+        ("surface_points",), "finite", "finite points", "NaN, infinite or huge",
+        lambda points, _: ~_finite(points).all(axis=-1),
+    ),
+    Rule(
         ("layers",), "range", "depths above 0, and NaN behind the last layer",
         "infinite, huge, or at or behind the camera",
         lambda layers, _: ~(np.isnan(layers) | (_finite(layers) & (layers > 0.0))).all(axis=-1),

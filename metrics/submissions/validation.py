@@ -111,9 +111,11 @@ def _row_problems(
         readers["normal"] = predictions.normal
     if predictions.has_confidence:
         readers["confidence"] = predictions.confidence
+    if predictions.has_surface_points:
+        readers["surface_points"] = predictions.surface_points
     for name, read in readers.items():
         try:
-            values = read(i)[:height, :width]
+            values = read(i) if name == "surface_points" else read(i)[:height, :width]
         except FileFormatError as error:
             why = str(error).removeprefix(f"{predictions.path}: {name}, row {row}: ")
             yield Problem(name, "readable", "rows that can be read", why), 0

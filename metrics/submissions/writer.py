@@ -98,6 +98,7 @@ class RoomPredictionWriter:
         disparity: ArrayLike | None = None,
         points: ArrayLike | None = None,
         layers: ArrayLike | None = None,
+        surface_points: ArrayLike | None = None,
         fov_y_degrees: float | None = None,
         confidence: ArrayLike | None = None,
     ) -> None:
@@ -116,6 +117,8 @@ class RoomPredictionWriter:
                 units.
             layers: (H, W, L) floats: planar depth of all surfaces along each ray, in order; NaN
                 behind the last one.
+            surface_points: (P, 3) floats: points evenly by area on the whole surfaces of objects,
+                camera frame, scene units; with layers alone. For all rows or none, as many in each.
             fov_y_degrees: vertical field of view that the method estimates. For all rows or none.
             confidence: (H, W) floats: larger for more certain depth; only the order within the
                 image counts. For all rows or none.
@@ -134,8 +137,10 @@ class RoomPredictionWriter:
         for column in self._table.columns if self._table else ():
             if column.name == "layers":
                 sizes["layer"] = (column.shape[-1],)  # as in the first row
+            elif column.name == "surface_points":
+                sizes["point"] = (column.shape[0],)
         images = {"depth": depth, "disparity": disparity, "points": points}
-        images["layers"] = layers
+        images |= {"layers": layers, "surface_points": surface_points}
         images |= {"normal": normal, "confidence": confidence}
         values = {}
         for column in layout.COLUMNS["rooms"]:
@@ -162,7 +167,7 @@ class RoomPredictionWriter:
     def _padded(self, image: rules.Array) -> rules.Array:
         """Return an image (h, w, ...) in the size to which those of the truth are padded."""
         height, width = padded_size(self._truth)
-        if image.shape[:2] == (height, width):
+        if not isinstance(self._truth, MeasuredFile) or image.shape[:2] == (height, width):
             return image
         padded = np.zeros((height, width, *image.shape[2:]), image.dtype)
         padded[: len(image), : image.shape[1]] = image
@@ -174,6 +179,12 @@ class RoomPredictionWriter:
         if len(kinds) != 1:
             expected = f"one of {', '.join(layout.KINDS)}"
             raise PredictionError(f"{where}: geometry", " and ".join(kinds) or "none", expected)
+        if "surface_points" in values and (
+            kinds[0] != "layers" or isinstance(self._truth, MeasuredFile)
+        ):
+            raise PredictionError(
+                f"{where}: surface_points", f"it with {kinds[0]}", "layers of rooms"
+            )
         kind, allowed = kinds[0], layout.KINDS[kinds[0]]
         alignment = self._texts.setdefault("alignment", allowed[0])
         if alignment not in allowed:

@@ -162,28 +162,34 @@ def mesh_crossings(
     A ray through an edge meets one of the two triangles that share it, as if it passed a bit to the
     right and above.
     """
+    if not len(faces):
+        return Crossings(*np.zeros((3, 0), np.int64))
     size = pixel_size(height, fov_y_degrees)
     points, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(faces.T)
     near = -points[2]
-    nearest, farthest = _ends(near[corners])
-    whole = nearest > NEAR * np.abs(points).max(initial=0.0)
-    seen = farthest > 0
+    ahead = near > NEAR * np.abs(points).max(initial=0.0)
 
     def span(values: Array, most: int) -> tuple[Array, Array]:
-        low, high = _ends(values[corners])
-        low = np.where(whole, np.clip(np.ceil(low - 1e-6), 0, most), 0)
-        high = np.where(whole, np.clip(np.floor(high + 1e-6), -1, most - 1), most - 1)
-        return low.astype(np.int64), np.where(seen, high - low + 1, 0).clip(0).astype(np.int64)
+        low = np.where(ahead, np.clip(np.ceil(values - 1e-6), 0, most), 0).astype(np.int32)
+        high = np.where(ahead, np.clip(np.floor(values + 1e-6), -1, most - 1), most - 1)
+        first, last = _ends(low[corners])[0], _ends(high.astype(np.int32)[corners])[1]
+        return first, (last - first + 1).clip(0)
 
     with np.errstate(divide="ignore", invalid="ignore"):
         left, columns = span(points[0] / (near * size) + (width / 2 - 0.5), width)
         top, rows = span((height / 2 - 0.5) - points[1] / (near * size), height)
+    # From here on, of the triangles that may have a pixel.
+    some = np.flatnonzero((columns > 0) & (rows > 0) & (near > 0)[corners].any(axis=0))
+    corners, (left, columns, top, rows) = (
+        corners[:, some],
+        (values[some].astype(np.int64) for values in (left, columns, top, rows)),
+    )
+    nearest, farthest = _ends(near[corners])
     area = columns * rows
     ends = np.cumsum(area)
     cuts = np.searchsorted(ends, np.arange(CANDIDATES, ends[-1] if len(ends) else 0, CANDIDATES))
     found = []
-    for chunk in np.split(np.arange(len(faces)), np.unique(cuts)):
-        some = chunk[area[chunk] > 0]
+    for some in np.split(np.arange(len(area)), np.unique(cuts)):
         face = np.repeat(some, area[some])
         place = np.arange(len(face)) - np.repeat(np.cumsum(area[some]) - area[some], area[some])
         row, column = np.divmod(place, columns[face])

@@ -89,7 +89,9 @@ def make_dataset(
         **settings, "format": FORMAT_NAME, "spec": spec.to_json(), "conventions": conventions(spec),
         "creation_command": command,
     }  # fmt: skip
-    marks = (Mark("fingerprint", ["scene"], request=spec.to_json()), Mark(TRUTH_DIGEST, SCORED))
+    stored = {column.name for column in columns(spec)}
+    scored = [name for name in SCORED if name in stored]
+    marks = (Mark("fingerprint", ["scene"], request=spec.to_json()), Mark(TRUTH_DIGEST, scored))
     file = whole({place.name: attributes}, [rooms_part(spec, count, marks)])
     work = RoomsWork(spec, batch, device, objects, compression, MEMBER_STORE.folder,
                      (ASSETS.materials, ASSETS.environment))  # fmt: skip

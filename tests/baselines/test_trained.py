@@ -37,12 +37,14 @@ CASES: dict[str, tuple[str, str, dict[str, Any], dict[str, Any]]] = {
     "unet": ("depth-supervised", "rooms", RELIEF, {}),
     "completed": ("depth-completed", "rooms", RELIEF, {}),
     "view-pairs": ("view-pairs", "rooms", RELIEF, {}),
+    "solids": ("solid-supervised", "layers", RELIEF, {}),
     "ptn, rooms": ("ptn", "rooms", PTN, {}),
     "ptn, ids": ("ptn", "rooms", {**PTN, "silhouettes": "ids"}, {}),
     "ptn, questions": ("ptn", "questions", PTN, {"labels": 2}),
     "rezende": ("rezende", "questions", REZENDE, {"labels": 2}),
 }
-VARIANTS = ("siamese", "completed", "ptn, ids")  # which share most of their code with another case
+# Which share most of their code with another case.
+VARIANTS = ("siamese", "completed", "solids", "ptn, ids")
 each = pytest.mark.parametrize(
     "case", [pytest.param(c, marks=[pytest.mark.slow] * (c in VARIANTS)) for c in CASES]
 )
@@ -55,9 +57,12 @@ def baseline_of(name: str) -> Baseline:
 
 
 @pytest.fixture(scope="session")
-def data(turned_path: Path, truths: Any) -> dict[str, Path]:
+def data(turned_path: Path, truths: Any, make_rooms: Any, tmp_path_factory: Any) -> dict[str, Path]:
     """Return rooms of 3 views, and 3 labelled questions and 3 others, all of 32x32 pixels."""
-    return {"rooms": turned_path, "questions": Path(truths.iqtt).with_name("iqtt-train.h5")}
+    layers = tmp_path_factory.mktemp("layers") / "layers.h5"
+    make_rooms(layers, 4, height=32, width=32, truth=("layers",))
+    questions = Path(truths.iqtt).with_name("iqtt-train.h5")
+    return {"rooms": turned_path, "layers": layers, "questions": questions}
 
 
 @pytest.fixture(scope="session")
@@ -135,7 +140,7 @@ def test_the_card_tells_data_and_labels(case, train, data):
     card = content(train("run", iterations=1))[1]
     with h5py.File(data[kind]) as file:
         part = "labeled" if name in ("cnn", "siamese") else "unlabeled"
-        mark = file.attrs["fingerprint" if kind == "rooms" else f"fingerprint_{part}"]
+        mark = file.attrs[f"fingerprint_{part}" if kind == "questions" else "fingerprint"]
     labels = 3 if name == "cnn" else how.get("labels", 0)
     assert (card["method"], card["fingerprint"], card["labels"]) == (name, mark, labels)
     assert card["settings"].items() >= settings.items()
@@ -145,7 +150,8 @@ def test_the_card_tells_data_and_labels(case, train, data):
 def test_a_run_goes_on_with_its_own_data_alone(case, train, data, tmp_path):
     train("run", iterations=1)
     kind = CASES[case][1]
-    marks = ["fingerprint"] if kind == "rooms" else ["fingerprint_labeled", "fingerprint_unlabeled"]
+    of_questions = ["fingerprint_labeled", "fingerprint_unlabeled"]
+    marks = of_questions if kind == "questions" else ["fingerprint"]
     edits = [attribute(name, "0" * 64) for name in marks]
     other = edited(data[kind], tmp_path / "other.h5", *edits)
     with refused(SpecError, str(other), "recipe hash 000000000000"):
@@ -160,7 +166,7 @@ def test_what_cannot_be_trained_on_leaves_no_folder(case, what, train, data, tmp
     kind = CASES[case][1]
     if what == "iqtt-test.h5":
         kind = "rooms"
-    paths = {"other": data["questions" if kind == "rooms" else "rooms"]}
+    paths = {"other": data["rooms" if kind == "questions" else "questions"]}
     path = paths.get(what, data["questions"].with_name(what) if "h5" in what else data[kind])
     how = {"batch": 0} if what == "batch" else {}
     if what == "labels" and CASES[case][0] == "depth-match":

@@ -20,8 +20,8 @@ from scenegen.viewing import write_recording as write
 def path(request, make_rooms, interior_path, tmp_path):
     if request.param == "interiors in metres":
         return interior_path
-    how = {"shard_size": 3}
-    return make_rooms(tmp_path / "set.h5", 3, how, views=(0, 40), fov_degrees=90.0, width=24)
+    how, more = {"shard_size": 3}, {"width": 24, "truth": ("layers",)}
+    return make_rooms(tmp_path / "set.h5", 3, how, views=(0, 40), fov_degrees=90.0, **more)
 
 
 def test_a_recording_holds_the_truth_of_each_view(path, tmp_path):
@@ -36,6 +36,11 @@ def test_a_recording_holds_the_truth_of_each_view(path, tmp_path):
             np.testing.assert_allclose(points, room.points_world[seen], atol=2e-6)
             image = srgb_bytes(room.radiance)
             np.testing.assert_array_equal(colors[:, :3], image[seen])
+            if "layers" in rooms.spec.truth:
+                hidden, _ = points_of(there[f"/world/truth/{view}/hidden"][step])
+                distance = -(hidden - room.world_from_camera[:3, 3]) @ room.world_from_camera[:3, 2]
+                behind = room.truth["layers/depth"][..., 1:]
+                np.testing.assert_allclose(distance, behind[np.isfinite(behind)], atol=2e-6)
             names = ("image", "truth_depth", "truth_normal", "object_id")
             pixels = {name: there[f"/pixels/{view}/{name}"][step] for name in names}
             depth = pixels_of(pixels["truth_depth"], "DepthImage", np.float32, shape)

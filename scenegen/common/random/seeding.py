@@ -41,6 +41,7 @@ class Purpose(IntEnum):
     VIEWPOINT = 21
     CORRUPTION = 22
     PERSPECTIVE = 23
+    SURFACE = 24
 
 
 def item_rng(

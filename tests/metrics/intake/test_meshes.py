@@ -41,7 +41,14 @@ def imported(folder, layered, change=lambda mesh: mesh, ending=".glb", alone=Tru
             change(in_camera(room, alone)).export(folder / f"{room.index}{ending}")
     out = folder.with_suffix(".h5")
     how = import_meshes(str(folder), layered, out, method="m", reading=Reading(**reading))
-    return score([out], layered, Settings(processes=1)).metrics["solid_iou"].value, how
+    found = score([out], layered, Settings(processes=1)).metrics
+    values = {name: one.value for name, one in found.items()}
+    if values["solid_iou"] > 0.999:  # whole surfaces, but for the room
+        assert values["whole_f_score_0.02"] > (0.98 if alone else 0.2)
+        assert (values["whole_chamfer"] < 1.1 * values["whole_chamfer_noise"] < 0.02) == alone
+    else:
+        assert values["whole_chamfer"] > 5 * values["whole_chamfer_noise"]
+    return values["solid_iou"], how
 
 
 @pytest.mark.parametrize(
@@ -60,6 +67,23 @@ def test_the_true_meshes_come_back(ending, change, reading, layered, tmp_path):
     assert value >= 0.999
     assert ("open parts" in how) == ("alone" in reading)
     assert "hint" not in how
+
+
+def test_an_image_may_have_a_file_for_each_object(layered, tmp_path, monkeypatch):
+    faces = []
+    with RoomsFile(layered) as rooms:
+        for room in rooms:
+            (folder := tmp_path / f"image-{room.index}").mkdir()
+            for k, mesh in enumerate(in_camera(room, True).split()):
+                mesh.export(folder / f"{k}.glb")
+                faces.append(len(mesh.faces))
+    read = {"method": "m", "reading": Reading(), "overwrite": True}
+    import_meshes(f"{tmp_path}/*/*.glb", layered, tmp_path / "p.h5", **read)
+    found = score([tmp_path / "p.h5"], layered, Settings(processes=1))
+    assert found.metrics["solid_iou"].value >= 0.999
+    monkeypatch.setattr(limits, "MOST_FACES", max(faces))
+    with refused(BadMeshError, "faces"):
+        import_meshes(f"{tmp_path}/*/*.glb", layered, tmp_path / "p.h5", **read)
 
 
 @pytest.mark.parametrize("turn", [np.diag([1.0, -1, -1]), np.eye(3)[[2, 0, 1]]])

@@ -6,6 +6,7 @@ import pytest
 from metrics.measures.solids import (
     back_depth_error,
     entered_spans,
+    hidden_object_recall,
     layer_recalls,
     overlap,
     paired_spans,
@@ -86,6 +87,34 @@ def test_recall_compares_layers_of_one_number():
     scores = layer_recalls(predicted, true, of_objects)
     expected = {"layer": 1 / 3, "layer_2": 1.0, "layer_3": 0.0, "layer_4": 0.0}
     assert scores == {f"{name}_recall_0.02": value for name, value in expected.items()}
+
+
+@pytest.mark.parametrize(
+    ("start", "end", "predicted"),
+    [
+        (4, 5, True),
+        (4.4, 5, True),
+        (4.6, 5, False),
+        (2, 5, False),
+        (6, 7, False),
+        (INF, INF, False),
+    ],
+)
+def test_hidden_objects_are_predicted_where_half_of_their_rays_are(start, end, predicted):
+    """Object 1 shows on all rays but one, and object 2 on that; object 3 is behind, hollow."""
+    depth = np.tile(np.array([1.0, 2, 4, 5, 6, 7])[:, None], 101)
+    ids = np.tile(np.array([1, 1, 3, 3, 3, 3])[:, None], 101)
+    entering = np.tile(np.array([1, -1, 1, -1, 1, -1])[:, None], 101)
+    ids[:2, 0], rays = 2, np.arange(101) < 51
+    spans = [np.stack([np.ones(101), np.where(rays, x, INF)]) for x in (start, end)]
+    spans[1][0] = 2.0
+    truth = entered_spans(depth, entering), depth, ids
+    assert hidden_object_recall(tuple(spans), *truth) == float(predicted)
+    fewer = [np.where(np.arange(101) < 50, x, INF) for x in spans]
+    assert hidden_object_recall(tuple(fewer), *truth) == 0.0
+    ids[0, 50:52] = 3  # of 101 rays
+    depth[0, 50:52] = 3.5
+    assert np.isnan(hidden_object_recall(tuple(spans), *truth))
 
 
 def test_shortcuts_are_perfect_for_what_they_assume():

@@ -306,7 +306,7 @@ def by_hand(file, names, group=""):
 def test_scores_name_the_digest_of_the_rooms_that_were_read(truth, processes):
     meta = score([truth.with_name("predictions.h5")], truth, Settings(processes=processes)).meta
     with h5py.File(truth) as file:
-        assert meta.truth_digest == file.attrs[TRUTH_DIGEST] == by_hand(file, SCORED)
+        assert meta.truth_digest == file.attrs[TRUTH_DIGEST] == by_hand(file, SCORED[:-3])
     assert meta.truth_source == "given"
 
 
@@ -336,7 +336,7 @@ def test_scores_name_the_digest_of_the_answers_that_were_read(answers):
 SOME = {"depth": 2.0, "normal": (0.0, 0.6, 0.8), "object_id": 7}
 
 
-@pytest.mark.parametrize("name", SCORED)
+@pytest.mark.parametrize("name", SCORED[:-3])  # `test_layers` has layers
 def test_changed_rooms_are_refused(name, truth):
     path = truth.with_name("predictions.h5")
     with h5py.File(truth, "r+") as file:

@@ -1,8 +1,11 @@
 """Submissions of layers: written, read, validated and scored against ground truth with layers."""
 
+import shutil
+
 import h5py
 import numpy as np
 import pytest
+from h5_edits import put
 from refusals import refused
 
 from metrics.measures.solids import length, paired_spans
@@ -15,6 +18,7 @@ from metrics.submissions.reader import open_predictions
 from metrics.submissions.validation import validate
 from metrics.viewing import predicted_scenes
 from metrics.views.examples import examples_of
+from scenegen.layout import SCORED
 from scenegen.rooms.reader import RoomsFile
 
 SETTINGS = Settings(processes=1)
@@ -112,12 +116,55 @@ def test_thickness_is_what_is_scored(layered, tmp_path):
                 assert value == pytest.approx(lengths[0] / lengths[1], abs=0.01)
 
 
-def test_depth_has_no_scores_of_solids(layered, tmp_path):
-    out = RoomPredictionWriter(tmp_path / "d.h5", layered, method="m")
-    with RoomsFile(layered) as rooms, out:
+def write_depth(path, truth):
+    with RoomsFile(truth) as rooms, RoomPredictionWriter(path, truth, method="m") as out:
         for row in range(len(rooms)):
             out.add(row, rooms.read("depth", row))
-    assert not set(score([tmp_path / "d.h5"], layered, SETTINGS).metrics) & set(SOLID)
+    return path
+
+
+def test_depth_has_no_scores_of_solids(layered, tmp_path):
+    path = write_depth(tmp_path / "d.h5", layered)
+    assert not set(score([path], layered, SETTINGS).metrics) & set(SOLID)
+
+
+def test_points_of_whole_surfaces_belong_to_layers_and_are_finite(layered, tmp_path):
+    out = RoomPredictionWriter(tmp_path / "d.h5", layered, method="m")
+    with refused(PredictionError, where="row 0: surface_points"), out:
+        out.add(0, np.ones((40, 48)), surface_points=np.ones((5, 3)))
+
+    def written(path, value):
+        out = RoomPredictionWriter(path, layered, method="m", allow_partial=True)
+        with RoomsFile(layered) as rooms, out:
+            out.add(0, layers=rooms.read("layers/depth", 0), surface_points=np.full((5, 3), value))
+        return path
+
+    with refused(PredictionError, where="row 0: surface_points"):
+        written(tmp_path / "p.h5", np.nan)
+    path = written(tmp_path / "p.h5", -1.0)
+    partial = Settings(processes=1, allow_partial=True, non_finite="penalise")
+    values = score([path], layered, partial).metrics
+    assert values["whole_chamfer"].value > values["whole_chamfer_noise"].value > 0
+    with h5py.File(path, "r+") as file:
+        file["surface_points"][0, 2] = np.inf
+        file["layers"][0, 0, 0, 0] = np.inf
+    assert ("surface_points", "finite") in {(p.dataset, p.rule) for p in validate(path, layered)}
+    assert score([path], layered, partial).metrics["whole_chamfer"].value == 4.0
+
+
+@pytest.mark.parametrize("name", SCORED[-3:])
+def test_changed_layers_are_refused(name, layered, tmp_path):
+    """Of all rows, in submissions of layers and of depth."""
+    paths = write(tmp_path / "p.h5", layered), write_depth(tmp_path / "d.h5", layered)
+    shutil.copyfile(layered, changed := tmp_path / "changed.h5")
+    with h5py.File(changed, "r+") as file:
+        assert [score([path], layered, SETTINGS).meta.truth_digest for path in paths] == [
+            file.attrs["truth_digest"]
+        ] * 2
+        put(name, (3, 9, 9, 15), 1)(file)
+    for path in paths:
+        with refused(ScoringError, hint=name):
+            score([path], changed, SETTINGS)
 
 
 @pytest.mark.parametrize(
@@ -171,8 +218,12 @@ def test_pages_and_the_3d_view_show_them(layered, tmp_path):
     with RoomsFile(layered) as rooms, open_predictions(path) as said:
         examples = [one for _, some in examples_of(scores, rooms, said) for one in some]
         assert [len(one.pictures) for one in examples] == [8] * len(examples)
-        scenes = list(predicted_scenes(said, rooms, scores))
-    assert sorted(view.row for scene in scenes for view in scene.views) == [0, 1, 2, 3]
+        views = [v for scene in predicted_scenes(said, rooms, scores) for v in scene.views]
+        count = [np.isfinite(rooms.read("layers/depth", v.row)[..., 1:]).sum() for v in views]
+    assert sorted(view.row for view in views) == [0, 1, 2, 3]
+    for view, points in zip(views, count, strict=True):
+        assert len(view.truth.hidden) == points > 0
+        np.testing.assert_allclose(view.prediction.hidden, view.truth.hidden, atol=1e-3)
 
 
 def test_they_are_aligned_by_least_squares_only(layered, tmp_path):
