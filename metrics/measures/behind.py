@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_size
+from scenegen.camera import Lens, as_lens
 
 Array = NDArray[Any]
 
@@ -20,7 +20,7 @@ def hidden_from(
     normals: Array,
     first_depth: Array,
     first_world_from_camera: Array,
-    fov_y_degrees: float,
+    lens: Lens | float,
 ) -> Array:
     """Return which surface points the first view does not see, (N,) bool.
 
@@ -30,16 +30,15 @@ def hidden_from(
     Args:
         points, normals: world, (N, 3) each; normals face the view that sees them.
         first_depth: planar depth of the first view, (H, W), scene units; NaN where no surface is.
-        first_world_from_camera, fov_y_degrees: its camera.
+        first_world_from_camera, lens: its camera.
     """
     height, width = first_depth.shape
     rotation, origin = first_world_from_camera[:3, :3], first_world_from_camera[:3, 3]
     seen = (points - origin) @ rotation
     depth = -seen[:, 2]
     ahead = np.where(depth > 0.0, depth, 1.0)
-    pitch = pixel_size(height, fov_y_degrees)
-    column = np.floor(seen[:, 0] / ahead / pitch + width / 2.0)
-    row = np.floor(height / 2.0 - seen[:, 1] / ahead / pitch)
+    grid = as_lens(lens).grid(height, width)
+    column, row = map(np.floor, grid.places(seen[:, 0], seen[:, 1], ahead))
     outside = (depth <= 0.0) | (column < 0) | (column >= width) | (row < 0) | (row >= height)
     away = ((origin - points) * normals).sum(axis=1) <= 0.0
     seen_depth = np.where(np.isfinite(first_depth), first_depth, np.inf).astype(np.float64)
