@@ -152,9 +152,10 @@ def leaderboard(
 
     Each METHOD is a score file of `bench score --json`, or a submission, which is scored first.
     Methods are ranked by their first main metric: shape_error for box rooms, abs_rel for interiors
-    and sensor data, and accuracy for questions. In box rooms with several views, methods that get
-    only the first view are ranked by behind_depth_error. Baselines are listed without a rank. The
-    results of the Pix2Shape paper, which are from other data, are also listed without a rank.
+    and sensor data, solid_iou for layers and meshes, and accuracy for questions. In box rooms with
+    several views, methods that get only the first view are ranked by behind_depth_error. Baselines
+    are listed without a rank, and so are the results that the Pix2Shape paper reports on other
+    data.
     """
     from metrics.views.leaderboard import leaderboard as rank
     from metrics.views.leaderboard import to_html
