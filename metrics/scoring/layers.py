@@ -122,10 +122,11 @@ def true_points(truth: RoomsFile, row: int) -> list[Array] | None:
     meshes = []
     for item in room.scene.objects:
         pose = world_from_object(item.position, item.rotation, item.scale)
-        meshes.append(objects.shape(item.shape).triangles @ pose[:3, :3].T + pose[:3, 3])
+        corners = objects.shape(item.shape).triangles.reshape(-1, 3)
+        meshes.append(corners @ pose[:3, :3].T + pose[:3, 3])
     if not meshes:
         return None
-    triangles = np.concatenate(meshes)
+    triangles = np.concatenate(meshes).reshape(-1, 3, 3)
     rotation, place = room.world_from_camera[:3, :3], room.world_from_camera[:3, 3]
     height, width = room.depth.shape
     layers = (room.truth[f"layers/{x}"] for x in ("depth", "entering"))
