@@ -18,7 +18,7 @@ from metrics.measures.surfaces.whole import drawn_points
 from metrics.submissions.hints.frames import AXES, frame_text
 from metrics.submissions.layout import Shown
 from metrics.submissions.writer import RoomPredictionWriter
-from scenegen.camera import pixel_size
+from scenegen.camera import pixels_of
 from scenegen.common.errors import SpecError
 from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError, check_most
@@ -174,10 +174,5 @@ def _better_frame(rooms: RoomsFile, tried: list[tuple[int, Array]]) -> str:
 
 def _share_on_objects(points: Array, object_id: Array, fov_y_degrees: float) -> float:
     """Return the share of points in the camera frame that are seen where objects are."""
-    height, width = object_id.shape
-    ahead = points[points[:, 2] < 0]
-    place = ahead[:, :2] / -ahead[:, 2:] / pixel_size(height, fov_y_degrees)
-    column, row = np.floor(place[:, 0] + width / 2), np.floor(height / 2 - place[:, 1])
-    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    at = object_id[row[inside].astype(int), column[inside].astype(int)]
-    return np.count_nonzero(at > 0) / len(points)
+    row, column, inside = pixels_of(points, object_id.shape, fov_y_degrees)
+    return np.count_nonzero(inside & (object_id[row, column] > 0)) / len(points)
