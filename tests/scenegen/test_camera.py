@@ -121,5 +121,5 @@ def test_pixels_of_points_are_those_that_show_them(height: int, width: int, fov:
     row, column, inside = pixels_of(points, (height, width), fov)
     np.testing.assert_array_equal(row * width + column, np.arange(height * width))
     assert inside.all()
-    for others in (-points, points + [1000, 0, 0]):
+    for others in (-points, points + np.array([1000, 0, 0])):
         assert not np.any(pixels_of(others, (height, width), fov))
