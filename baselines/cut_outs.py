@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from metrics.measures.relief import empty_room
-from scenegen.camera import back_project, pixel_directions, pixel_size, transform_points
+from scenegen.camera import Lens, back_project, pixel_directions, pixel_size, transform_points
 from scenegen.common.threads import one_thread
 from scenegen.rooms.reader import RoomsFile, radiance_of
 
@@ -48,7 +48,7 @@ CELLS = 16  # a side, of the pictures that `nearest` compares
 
 
 def outline_mask(
-    image: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+    image: Array, world_from_camera: Array, lens: Lens | float, room_size: Array | None = None
 ) -> Array:
     """Return the pixels that show objects, (H, W) bool.
 
@@ -57,16 +57,16 @@ def outline_mask(
         world_from_camera: (4, 4).
         room_size: of a closed room, (3,); None for the paper's room.
     """
-    return residual(image, world_from_camera, fov_y_degrees, room_size)[1]
+    return residual(image, world_from_camera, lens, room_size)[1]
 
 
 def residual(
-    image: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+    image: Array, world_from_camera: Array, lens: Lens | float, room_size: Array | None = None
 ) -> tuple[Array, Array]:
     """Return how far each pixel lies off the fitted shading, (H, W, 3), and the mask (H, W)."""
     height, width = image.shape[:2]
-    depth, normal = empty_room(world_from_camera, fov_y_degrees, height, width, room_size)
-    points = transform_points(world_from_camera, back_project(depth, fov_y_degrees))
+    depth, normal = empty_room(world_from_camera, lens, height, width, room_size)
+    points = transform_points(world_from_camera, back_project(depth, lens))
     places = points if room_size is None else points / room_size
     facing = normal @ world_from_camera[:3, :3].T
     walls = np.argmax(np.abs(facing), axis=-1)
@@ -107,10 +107,9 @@ def _cleaned(mask: Array) -> Array:
     return np.asarray(filled & (pixels[blobs] >= SMALLEST))
 
 
-def _camera(rooms: RoomsFile, row: int) -> tuple[Array, float]:
-    """Return world_from_camera and the vertical field of view of a row."""
-    matrix = rooms.read("camera/world_from_camera", row)
-    return matrix, float(rooms.read("camera/fov_y_degrees", row))
+def _camera(rooms: RoomsFile, row: int) -> tuple[Array, Lens]:
+    """Return world_from_camera and the lens of a row."""
+    return rooms.read("camera/world_from_camera", row), rooms.lens(row)
 
 
 def empty(rooms: RoomsFile, row: int) -> tuple[Array, Array]:
@@ -149,12 +148,12 @@ def balls(rooms: RoomsFile, row: int) -> Array:
         scenes, views = (rooms.read(n, slice(None)) for n in ("scene_index", "view_index"))
         first = np.flatnonzero((scenes == scene) & (views == 0))
         source = int(first[0]) if len(first) else row
-    matrix, fov = _camera(rooms, source)
-    found = blob_balls(_mask(rooms, source), _empty(rooms, source), fov)
+    matrix, lens = _camera(rooms, source)
+    found = blob_balls(_mask(rooms, source), _empty(rooms, source), lens)
     centres = transform_points(matrix, found[:, :3])
-    matrix, fov = _camera(rooms, row)
+    matrix, lens = _camera(rooms, row)
     depth = _empty(rooms, row)
-    rays = pixel_directions(depth.shape[0], depth.shape[1], fov)
+    rays = pixel_directions(depth.shape[0], depth.shape[1], lens)
     for centre, radius in zip((centres - matrix[:3, 3]) @ matrix[:3, :3], found[:, 3], strict=True):
         square, along = (rays * rays).sum(axis=-1), rays @ centre
         inside = along * along - square * (centre @ centre - radius * radius)
@@ -163,15 +162,15 @@ def balls(rooms: RoomsFile, row: int) -> Array:
     return depth
 
 
-def blob_balls(mask: Array, empty: Array, fov_y_degrees: float) -> Array:
+def blob_balls(mask: Array, empty: Array, lens: Lens | float) -> Array:
     """Return a ball for each blob of a mask: centre, camera frame, and radius, (K, 4).
 
     A ball takes as many pixels as its blob. Its surface stands before the empty room by LIFT on
     average, which puts the centre by two thirds of its radius behind that.
     """
     blobs, count = ndimage.label(mask)
-    rays = pixel_directions(mask.shape[0], mask.shape[1], fov_y_degrees)
-    pitch = pixel_size(mask.shape[0], fov_y_degrees)
+    rays = pixel_directions(mask.shape[0], mask.shape[1], lens)
+    pitch = pixel_size(mask.shape[0], lens)
     found = np.empty((count, 4))
     for k in range(count):
         own = blobs == k + 1

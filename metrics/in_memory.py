@@ -17,9 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.intake.outputs import Frame, Geometry, OutputError, fitted_to, image_of, read_output
+from metrics.measured.reader import is_flat
 from metrics.measures.alignment import Alignment
 from metrics.scoring.image_scores import NonFinite, reference_of, score_prediction
 from metrics.scoring.metric_names import OTHER_SCENE
+from metrics.scoring.panoramas import baselines_of, score_panorama
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import score_rooms
 from metrics.scoring.runs import RoomRuns, Settings
@@ -68,7 +70,7 @@ def evaluate_room(
     """
     height, width = truth.depth.shape
     geometry = _geometry(prediction, normal, height, width, kind, alignment, frame)
-    values = _stored(geometry, truth.depth, "prediction")
+    values = _stored(geometry, truth.depth, "prediction", truth.lens.is_flat)
     predicted = PredictedView(
         geometry.kind,
         geometry.alignment,
@@ -81,10 +83,12 @@ def evaluate_room(
         truth.depth,
         truth.normal,
         truth.object_id,
-        truth.fov_y_degrees,
+        truth.lens,
         truth.world_from_camera,
         truth.truth.get("room/size"),
     )
+    if not view.lens.is_flat:
+        return score_panorama(predicted, view, non_finite == "penalise") | baselines_of(view)
     reference = reference_of(view, row=truth.index)
     scores = score_prediction(predicted, view, reference, non_finite=non_finite).scores
     own = {name: value for name, value in scores.items() if not name.startswith(OTHER_SCENE)}
@@ -183,7 +187,7 @@ def _content(
             geometry = _geometry(prediction, normal, height, width, **how)
         except OutputError as error:
             raise error.inside(f"row {row}") from error
-        values = _stored(geometry, truth.read("depth", row), f"row {row}")
+        values = _stored(geometry, truth.read("depth", row), f"row {row}", is_flat(truth))
         first = first or geometry
         if (geometry.kind, geometry.alignment) != (first.kind, first.alignment) or (
             arrays and values.keys() != arrays.keys()
@@ -221,7 +225,7 @@ def _geometry(
     return fitted_to(geometry, height, width, frame=frame, missing="refuse")
 
 
-def _stored(geometry: Geometry, true_depth: Array, where: str) -> dict[str, Array]:
+def _stored(geometry: Geometry, true_depth: Array, where: str, flat: bool) -> dict[str, Array]:
     """Return the values in the precision of a submission. Raises PredictionError as its writer."""
     with np.errstate(over="ignore"):
         values = {
@@ -229,5 +233,6 @@ def _stored(geometry: Geometry, true_depth: Array, where: str) -> dict[str, Arra
             for name, value in geometry.values.items()
         }
     kind, alignment = geometry.kind, geometry.alignment
-    refuse_behind_camera(where, kind, alignment, values[kind], np.isfinite(true_depth))
+    if flat or kind != "points":
+        refuse_behind_camera(where, kind, alignment, values[kind], np.isfinite(true_depth))
     return values

@@ -33,7 +33,6 @@ from scenegen.viewing import (
 )
 
 Array = NDArray[Any]
-FOV = "camera/fov_y_degrees"
 Scenes = Sequence[Sequence[int]]  # of each scene the rows of its images
 SORTED_BY = tuple(
     dict.fromkeys(
@@ -127,10 +126,10 @@ def _with_prediction(view: View, predictions: RoomPredictions, truth: Images) ->
     elif predicted.kind == "layers":
         true = read_true_layers(truth, view.row, read_true_view(truth, view.row))
         layers = fitted_layers(predicted, true)
-        rays = pixel_directions(height, width, float(truth.read(FOV, view.row)))
+        rays = pixel_directions(height, width, truth.lens(view.row))
         points, hidden = rays * layers[..., :1], hidden_points(rays, layers)
     else:
-        points = points_as_scored(predicted, depth, float(truth.read(FOV, view.row)))
+        points = points_as_scored(predicted, depth, truth.lens(view.row))
     normal = None if predicted.normal is None else predicted.normal[:height, :width]
     return replace(view, prediction=Surfaces(points, normal, hidden))
 

@@ -8,14 +8,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import back_project, pixel_size, transform_points, transform_vectors
+from scenegen.camera import (
+    Lens,
+    as_lens,
+    back_project,
+    pixel_size,
+    transform_points,
+    transform_vectors,
+)
 from scenegen.common.records import check
 
 Array = NDArray[Any]
 
 
 def project(
-    points: Array, world_from_camera: Array, height: int, width: int, fov_y_degrees: float
+    points: Array, world_from_camera: Array, height: int, width: int, lens: Lens | float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return where points of the world, (..., 3), are in an image, and their planar depth.
 
@@ -24,18 +31,17 @@ def project(
     """
     local = (points - world_from_camera[:3, 3]) @ world_from_camera[:3, :3]
     depth = -local[..., 2]
-    scale = pixel_size(height, fov_y_degrees) * np.where(depth > 0, depth, np.nan)
-    x = width / 2 + local[..., 0] / scale
-    y = height / 2 - local[..., 1] / scale
-    return np.stack([x, y], axis=-1), np.asarray(depth)
+    ahead, grid = np.where(depth > 0, depth, np.nan), as_lens(lens).grid(height, width)
+    places = grid.places(local[..., 0], local[..., 1], ahead)
+    return np.stack(places, axis=-1), np.asarray(depth)
 
 
 def optical_flow(
     depth: Array,
     world_from_camera: Array,
     other_world_from_camera: Array,
-    fov_y_degrees: float,
-    other_fov_y_degrees: float | None = None,
+    lens: Lens | float,
+    other_lens: Lens | float | None = None,
 ) -> NDArray[np.float64]:
     """Return how far each pixel's surface point moves from one view to another, (H, W, 2).
 
@@ -43,9 +49,9 @@ def optical_flow(
     where the depth, (H, W), is NaN or the point is behind the other camera.
     """
     height, width = depth.shape
-    points = transform_points(world_from_camera, back_project(depth, fov_y_degrees))
-    fov = fov_y_degrees if other_fov_y_degrees is None else other_fov_y_degrees
-    pixels, _ = project(points, other_world_from_camera, height, width, fov)
+    points = transform_points(world_from_camera, back_project(depth, lens))
+    other_lens = lens if other_lens is None else other_lens
+    pixels, _ = project(points, other_world_from_camera, height, width, other_lens)
     centers = np.stack(np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5), axis=-1)
     return np.asarray(pixels - centers)
 
@@ -57,7 +63,7 @@ def seen_from(
     other_normal: Array,
     other_object_id: Array,
     other_world_from_camera: Array,
-    fov_y_degrees: float,
+    lens: Lens | float,
     tolerance: float = 0.75,
 ) -> NDArray[np.bool_]:
     """Return whether surface points are visible in another view, given the maps of that view.
@@ -72,11 +78,11 @@ def seen_from(
         object_id: of the points, (...).
         other_depth, other_normal, other_object_id: maps of the other view, (H, W), (H, W, 3) and
             (H, W), as in a file of rooms.
-        fov_y_degrees: vertical field of view of the other view.
+        lens: of the other view.
     """
     height, width = other_depth.shape
-    pixels, depth = project(points, other_world_from_camera, height, width, fov_y_degrees)
-    surfels = transform_points(other_world_from_camera, back_project(other_depth, fov_y_degrees))
+    pixels, depth = project(points, other_world_from_camera, height, width, lens)
+    surfels = transform_points(other_world_from_camera, back_project(other_depth, lens))
     normals = transform_vectors(other_world_from_camera, other_normal)
     inside = (
         (depth > 0)
@@ -85,7 +91,7 @@ def seen_from(
         & (pixels[..., 1] < height)
     )
     corner = np.floor(np.where(inside[..., None], pixels, 0.5) - 0.5).astype(np.int64)
-    thickness = tolerance * pixel_size(height, fov_y_degrees) * depth
+    thickness = tolerance * pixel_size(height, lens) * depth
     share = np.where(inside[..., None], pixels, 0.5) - 0.5 - corner  # of the right, lower pixel
     votes = np.zeros(inside.shape)
     for right, down in ((0, 0), (1, 0), (0, 1), (1, 1)):

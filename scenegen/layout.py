@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 from scenegen.common.text_table import piped
-from scenegen.description.specs import Request
+from scenegen.description.specs import FOV, Request
 from scenegen.files.content import CONTENT_DIGEST
 from scenegen.files.schema import DIGEST, Column, Format
 from scenegen.objects.meshes.as_furniture import family_like
@@ -76,7 +76,7 @@ SCORED = (
 )
 # Sizes of axes that are the same in all files; those of the others follow from the spec.
 FIXED = {"channel": 3, "offset": 2, "xyz": 3, "matrix_row": 4, "matrix_column": 4, "coefficient": 2,
-         "setting": 5, "layer": 16}  # fmt: skip
+         "setting": 5, "layer": 16, "image_axis": 3, "camera_axis": 3}  # fmt: skip
 MATRIX = ("matrix_row", "matrix_column")
 HEAD = ("dataset", "row", "type", "unit", "frame", "meaning")  # of tables of columns
 
@@ -156,6 +156,20 @@ INTERIOR = (  # columns of closed rooms
            "tone mapping of the image: exposure, gains of red, green and blue, and the exposed"
            " radiance that is white (docs/rendering.md has the tone curve)"),
 )
+LENS = (  # columns of images that are crops, or have pixels that are not square
+    _column("camera/intrinsics", ("image_axis", "camera_axis"), "float64", "pixel", "camera",
+           "pinhole matrix of a camera with x right, y down, looking along +z; the centre of the"
+           " first pixel is (0.5, 0.5)"),
+)
+OF_CROPS = {
+    "camera/fov_y_degrees": "vertical field of view, if the principal point were the image's middle"
+}
+OF_PANORAMAS = {
+    "depth": "distance of the hit along the one ray through the pixel's centre; NaN where it meets"
+    " nothing",
+    "camera/fov_y_degrees": "vertical field of view of the panorama, which is 360 degrees wide:"
+    " columns are longitudes from -180 to 180, 0 straight ahead, rows are latitudes from 90 to -90",
+}
 FURTHER = {  # columns of `DatasetSpec.truth`, by its names
     "amodal": (
         _column("object/amodal_mask", ("object_slot", "y", "x"), "uint8",
@@ -201,14 +215,18 @@ FURTHER = {  # columns of `DatasetSpec.truth`, by its names
 def fields(spec: Request) -> list[Column]:
     """Return the columns of a file that answers that spec, without the sizes of their axes."""
     further = [column for name in spec.truth for column in FURTHER[name]]
-    if not spec.interior:
-        return [*FIELDS, *further]
-    image = {"image": DEVELOPED} if spec.image_dtype == "uint8" else {}
-    found = []
-    for field in (*FIELDS, *INTERIOR, *further):
-        words: dict[str, Any] = {"unit": field.unit.replace("scene unit", "metre")}
-        found.append(replace(field, **{**words, **image.get(field.name, {})}))
-    return found
+    lens = spec.lens(FOV[0])
+    matrix = LENS if lens.is_flat and not lens.is_centred else ()
+    meanings = OF_CROPS if matrix else {} if lens.is_flat else OF_PANORAMAS
+    words = {name: {"meaning": meaning} for name, meaning in meanings.items()}
+    closed = INTERIOR if spec.interior else ()
+    if spec.interior and spec.image_dtype == "uint8":
+        words["image"] = DEVELOPED
+    unit = "metre" if spec.interior else "scene unit"
+    return [
+        replace(f, **{"unit": f.unit.replace("scene unit", unit), **words.get(f.name, {})})
+        for f in (*FIELDS, *matrix, *closed, *further)
+    ]
 
 
 def conventions(spec: Request) -> str:
@@ -249,6 +267,7 @@ def markdown_table(fields: Iterable[Column]) -> str:
 def csv_table() -> str:
     """Return all columns as CSV, with the files that have them."""
     groups = {"all": FIELDS, "interiors": INTERIOR}
+    groups |= {"--principal-point, --pixel-aspect": LENS}
     groups |= {f"--with {name}": columns for name, columns in FURTHER.items()}
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")

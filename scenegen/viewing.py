@@ -128,17 +128,21 @@ def room_scenes(rooms: RoomsFile, scenes: Iterable[Sequence[int]]) -> Iterator[R
 
 
 def room_view(room: Room) -> View:
-    """Return a row of a file of rooms. Raises FileFormatError for an impossible camera."""
+    """Return a row of a file of rooms.
+
+    Raises FileFormatError for an impossible camera, and SpecError for a panorama.
+    """
     pose, fov = room.world_from_camera, room.fov_y_degrees
+    check(room.lens.is_flat, f"row {room.index}", "a panorama", "a perspective camera")
     if not (0 < fov < 180 and np.isfinite(pose).all()):
         wrong, expected = f"{fov} degrees or {pose.tolist()}", "a finite pose, 0 to 180 degrees"
         raise FileFormatError(f"row {room.index}: camera", wrong, expected)
     height, width = room.depth.shape
-    matrix = intrinsics(height, width, fov, pixel_centers="half")
+    matrix = intrinsics(height, width, room.lens, pixel_centers="half")
     name, image = f"view_{room.view_index}", srgb_bytes(room.radiance)
     truth = Surfaces(room.points, room.normal)
     if LAYERS in room.truth:
-        rays = pixel_directions(height, width, fov)
+        rays = pixel_directions(height, width, room.lens)
         truth = replace(truth, hidden=hidden_points(rays, room.truth[LAYERS]))
     return View(name, room.index, image, room.object_id, pose, matrix, truth)
 

@@ -55,8 +55,7 @@ def drawn(model: Pix2Shape, code: Tensor, views: Views) -> tuple[Tiles, Tiles, T
         normals = normals * (opacity > 0.5)[:, None]
     depths = [preview.depth_bytes(z.cpu().numpy()) for z in depth]
     xyz = np.moveaxis(normals.cpu().numpy(), 1, -1)
-    colors = np.rint(np.clip(xyz * 0.5 + 0.5, 0, 1) * 255).astype(np.uint8)
-    return image_tiles(image), depths, list(colors)
+    return image_tiles(image), depths, list(preview.normal_bytes(xyz))
 
 
 def image_tiles(radiance: Tensor) -> Tiles:

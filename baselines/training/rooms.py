@@ -153,8 +153,9 @@ def camera_poses(rooms: RoomsFile, *, closed: bool = False) -> Array:
         closed: whether the method takes closed rooms, too.
 
     Raises FileFormatError where one is unknown, far away, or no rotation and translation, and
-    SpecError for closed rooms.
+    SpecError for closed rooms, and as `RoomSpec.check_centred`.
     """
+    rooms.spec.check_centred(rooms.path)
     if rooms.spec.interior and not closed:
         expected = "the paper's rooms, for which this method was made"
         raise SpecError(rooms.path, "closed rooms in metres", expected)

@@ -18,7 +18,11 @@ from metrics.measures.surfaces.whole import drawn_points
 from metrics.submissions.hints.frames import AXES, frame_text
 from metrics.submissions.layout import Shown
 from metrics.submissions.writer import RoomPredictionWriter
+<<<<<<< HEAD
 from scenegen.camera import pixels_of
+=======
+from scenegen.camera import Lens
+>>>>>>> main
 from scenegen.common.errors import SpecError
 from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError, check_most
@@ -79,7 +83,7 @@ def import_meshes(
         for row, path in enumerate(paths):
             vertices, faces, closed = _together(groups[path])
             vertices = vertices * FRAMES[reading.frame] * reading.scale
-            camera = *size_of(rooms, row), float(rooms.read("camera/fov_y_degrees", row))
+            camera = *size_of(rooms, row), rooms.lens(row)
             layers = mesh_layers(vertices, faces, closed, *camera)
             points = drawn_points(vertices[faces], row, "prediction")
             writer.add(row, layers=layers, surface_points=points)
@@ -131,13 +135,13 @@ def read_mesh(path: Path) -> tuple[Array, Array]:
 
 
 def mesh_layers(
-    vertices: Array, faces: Array, closed: Array, height: int, width: int, fov_y_degrees: float
+    vertices: Array, faces: Array, closed: Array, height: int, width: int, lens: Lens
 ) -> NDArray[np.float32]:
     """Return where rays enter and leave a mesh, (H, W, L), as layers of a submission.
 
     Args: as `layers.solid_crossings`. Crossings of open parts are paired in order.
     """
-    found = solid_crossings(vertices, faces, closed, height, width, fov_y_degrees)
+    found = solid_crossings(vertices, faces, closed, height, width, lens)
     order = np.lexsort((found.depth, found.pixel, found.kind == OPEN))
     pixel, depth, kind = found.pixel[order], found.depth[order], found.kind[order].copy()
     sheets = np.flatnonzero(kind == OPEN)
@@ -161,18 +165,28 @@ def _better_frame(rooms: RoomsFile, tried: list[tuple[int, Array]]) -> str:
     shares = np.zeros((len(AXES), 2))
     for row, vertices in tried:
         pose = rooms.read("camera/world_from_camera", row)
-        ids, fov = rooms.read("object_id", row), float(rooms.read("camera/fov_y_degrees", row))
+        ids, lens = rooms.read("object_id", row), rooms.lens(row)
         for k, axes in enumerate(AXES):
             for of_world in (0, 1):
                 points = vertices @ axes
                 points = (points - pose[:3, 3]) @ pose[:3, :3] if of_world else points
-                shares[k, of_world] += _share_on_objects(points, ids, fov) / len(tried)
+                shares[k, of_world] += _share_on_objects(points, ids, lens) / len(tried)
     best = np.unravel_index(shares.argmax(), shares.shape)
     better = shares[best] > 0.5 and shares[0, 0] < shares[best] / 2
     return frame_text(AXES[best[0]].T, bool(best[1])) if better else ""
 
 
-def _share_on_objects(points: Array, object_id: Array, fov_y_degrees: float) -> float:
+def _share_on_objects(points: Array, object_id: Array, lens: Lens) -> float:
     """Return the share of points in the camera frame that are seen where objects are."""
+<<<<<<< HEAD
     row, column, inside = pixels_of(points, object_id.shape, fov_y_degrees)
     return np.count_nonzero(inside & (object_id[row, column] > 0)) / len(points)
+=======
+    height, width = object_id.shape
+    ahead = points[points[:, 2] < 0]
+    places = lens.grid(height, width).places(ahead[:, 0], ahead[:, 1], -ahead[:, 2])
+    column, row = map(np.floor, places)
+    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    at = object_id[row[inside].astype(int), column[inside].astype(int)]
+    return np.count_nonzero(at > 0) / len(points)
+>>>>>>> main

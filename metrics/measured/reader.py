@@ -200,6 +200,11 @@ def size_of(truth: Images, row: int) -> tuple[int, int]:
     return truth.spec.height, truth.spec.width
 
 
+def is_flat(truth: Images) -> bool:
+    """Return whether images are planes, as of pinhole cameras."""
+    return isinstance(truth, MeasuredFile) or truth.spec.projection == "perspective"
+
+
 def padded_size(truth: Images) -> tuple[int, int]:
     """Return height and width of what is stored of each image."""
     return truth.shape if isinstance(truth, MeasuredFile) else size_of(truth, 0)
@@ -208,8 +213,7 @@ def padded_size(truth: Images) -> tuple[int, int]:
 def matrix_of(truth: Images, row: int) -> Array:
     """Return the pinhole matrix (3, 3) in pixels. Raises FileFormatError where it is not known."""
     if not isinstance(truth, MeasuredFile):
-        fov = float(truth.read("camera/fov_y_degrees", row))
-        return intrinsics(*size_of(truth, row), fov, pixel_centers="half")
+        return intrinsics(*size_of(truth, row), truth.lens(row), pixel_centers="half")
     matrix = truth.matrix(row)
     if matrix is None:
         raise FileFormatError(truth.place("intrinsics", row), "none", "a pinhole matrix", NO_MATRIX)
@@ -219,7 +223,7 @@ def matrix_of(truth: Images, row: int) -> Array:
 def rays_of(truth: Images, row: int, height: int, width: int) -> Array:
     """Return directions (h, w, 3), z = -1, of a row at any size. Raises as `matrix_of`."""
     if not isinstance(truth, MeasuredFile):
-        return pixel_directions(height, width, float(truth.read("camera/fov_y_degrees", row)))
+        return pixel_directions(height, width, truth.lens(row))
     matrix_of(truth, row)
     rays = truth.rays(row, height, width)
     assert rays is not None, "its matrix is known"

@@ -5,7 +5,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+<<<<<<< HEAD
 from scenegen.camera import pixels_of
+=======
+from scenegen.camera import Lens, as_lens
+>>>>>>> main
 
 Array = NDArray[Any]
 
@@ -20,7 +24,7 @@ def hidden_from(
     normals: Array,
     first_depth: Array,
     first_world_from_camera: Array,
-    fov_y_degrees: float,
+    lens: Lens | float,
 ) -> Array:
     """Return which surface points the first view does not see, (N,) bool.
 
@@ -30,12 +34,20 @@ def hidden_from(
     Args:
         points, normals: world, (N, 3) each; normals face the view that sees them.
         first_depth: planar depth of the first view, (H, W), scene units; NaN where no surface is.
-        first_world_from_camera, fov_y_degrees: its camera.
+        first_world_from_camera, lens: its camera.
     """
     height, width = first_depth.shape
     rotation, origin = first_world_from_camera[:3, :3], first_world_from_camera[:3, 3]
     seen = (points - origin) @ rotation
+<<<<<<< HEAD
     row, column, inside = pixels_of(seen, first_depth.shape, fov_y_degrees)
+=======
+    depth = -seen[:, 2]
+    ahead = np.where(depth > 0.0, depth, 1.0)
+    grid = as_lens(lens).grid(height, width)
+    column, row = map(np.floor, grid.places(seen[:, 0], seen[:, 1], ahead))
+    outside = (depth <= 0.0) | (column < 0) | (column >= width) | (row < 0) | (row >= height)
+>>>>>>> main
     away = ((origin - points) * normals).sum(axis=1) <= 0.0
     seen_depth = np.where(np.isfinite(first_depth), first_depth, np.inf).astype(np.float64)
     padded = np.pad(seen_depth, 1, mode="edge")

@@ -5,6 +5,7 @@ from typing import Any, TypeGuard
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from scenegen.camera import Lens, as_lens
 from scenegen.common.errors import SceneGenError
 
 # The squares of larger magnitudes overflow within a sum; no scene or prediction comes near.
@@ -107,6 +108,7 @@ def require_depth_pair(
     return predicted, true, inside
 
 
-def require_fov(fov_y_degrees: float) -> None:
+def require_fov(lens: Lens | float) -> None:
     """Raise MeasureError unless this is a vertical field of view of a pinhole camera, degrees."""
+    fov_y_degrees = as_lens(lens).fov_y_degrees
     require(0.0 < fov_y_degrees < 180.0, "fov_y_degrees", fov_y_degrees, "between 0 and 180")

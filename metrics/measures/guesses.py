@@ -18,13 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.objects import counted_objects
-from scenegen.camera import back_project, pixel_directions, pixel_size, transform_points
+from scenegen.camera import Lens, back_project, pixel_directions, pixel_size, transform_points
 
 Array = NDArray[Any]
 
 
 def balls_and_blocks(
-    depth: Array, object_id: Array, world_from_camera: Array, fov_y_degrees: float
+    depth: Array, object_id: Array, world_from_camera: Array, lens: Lens
 ) -> tuple[Array, Array]:
     """Return balls (K, 4), centre and radius, and blocks (K, 2, 3), ends, of a view's objects.
 
@@ -32,14 +32,14 @@ def balls_and_blocks(
     """
     height, width = depth.shape
     rays, points = (
-        pixel_directions(height, width, fov_y_degrees),
-        back_project(depth, fov_y_degrees),
+        pixel_directions(height, width, lens),
+        back_project(depth, lens),
     )
     ids = np.where(counted_objects(object_id), object_id, 0)
     balls, blocks = np.empty((0, 4)), np.empty((0, 2, 3))
     for number in np.unique(ids[ids > 0]).tolist():
         own = ids == number
-        slope = np.sqrt(np.count_nonzero(own) / np.pi) * pixel_size(height, fov_y_degrees)
+        slope = np.sqrt(np.count_nonzero(own) / np.pi) * pixel_size(height, lens)
         away = float(np.median(depth[own])) / (1.0 - min(slope, 1.0) * 2.0 / 3.0)
         middle = transform_points(world_from_camera, rays[own].mean(axis=0) * away)
         seen = transform_points(world_from_camera, points[own])
@@ -51,12 +51,10 @@ def balls_and_blocks(
     return balls, blocks
 
 
-def depth_of_balls(
-    balls: Array, world_from_camera: Array, fov_y_degrees: float, room: Array
-) -> Array:
+def depth_of_balls(balls: Array, world_from_camera: Array, lens: Lens, room: Array) -> Array:
     """Return planar depth (H, W) of balls (K, 4) before a room of depth (H, W)."""
     depth, (height, width) = room, room.shape
-    rays = pixel_directions(height, width, fov_y_degrees)
+    rays = pixel_directions(height, width, lens)
     square = (rays * rays).sum(axis=-1)
     centres = (balls[:, :3] - world_from_camera[:3, 3]) @ world_from_camera[:3, :3]
     for centre, radius in zip(centres, balls[:, 3].tolist(), strict=True):
@@ -67,12 +65,10 @@ def depth_of_balls(
     return depth
 
 
-def depth_of_blocks(
-    blocks: Array, world_from_camera: Array, fov_y_degrees: float, room: Array
-) -> Array:
+def depth_of_blocks(blocks: Array, world_from_camera: Array, lens: Lens, room: Array) -> Array:
     """Return planar depth (H, W) of blocks (K, 2, 3) before a room of depth (H, W)."""
     height, width = room.shape
-    rays = pixel_directions(height, width, fov_y_degrees) @ world_from_camera[:3, :3].T
+    rays = pixel_directions(height, width, lens) @ world_from_camera[:3, :3].T
     rays = np.where(np.abs(rays) < 1e-12, 1e-12, rays)
     depth, origin = room, world_from_camera[:3, 3]
     for low, high in blocks:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from metrics.measures.checks import as_float64, require, require_finite, require_some
-from scenegen.camera import pixel_directions
+from scenegen.camera import Lens, pixel_directions
 
 Array = NDArray[Any]
 RELIEF_ABOVE = 0.05  # scene units: pixels with more than this stand out
@@ -27,7 +27,7 @@ LEAST_SPREAD = 1e-3
 
 def empty_room(
     world_from_camera: Array,
-    fov_y_degrees: float,
+    lens: Lens | float,
     height: int,
     width: int,
     room_size: Array | None = None,
@@ -40,10 +40,10 @@ def empty_room(
 
     Args:
         world_from_camera: rigid transform of the camera, (4, 4).
-        fov_y_degrees: vertical field of view.
+        lens: of the camera.
         room_size: of a closed room, (3,); None for the paper's room.
     """
-    lines = pixel_directions(height, width, fov_y_degrees)
+    lines = pixel_directions(height, width, lens)
     reach = _reach(lines, world_from_camera, room_size)
     axis = np.eye(3)[reach.argmin(axis=-1)]
     if room_size is not None:

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from metrics.measures.alignment import Alignment, align, align_points, depth_of_disparity
 from metrics.submissions.reader import PredictedView
-from scenegen.camera import pixel_directions
+from scenegen.camera import Lens, as_lens, pixel_directions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -21,7 +21,8 @@ class Geometry:
     """What is predicted for one image after the declared alignment, as scores take it.
 
     Attributes:
-        depth: planar depth, (H, W), scene units: -z of the points; NaN outside of the mask.
+        depth: planar depth, (H, W), scene units: -z of the points; in panoramas, their distance;
+            NaN outside of the mask.
         points: camera frame, scene units, (N, 3), of the N pixels of the mask.
         on_rays: whether the points lie on the rays of their pixels, as those of depth do.
     """
@@ -32,7 +33,7 @@ class Geometry:
 
 
 def fitted_geometry(
-    predicted: PredictedView, true_depth: Array, fov_y_degrees: float, mask: Mask
+    predicted: PredictedView, true_depth: Array, lens: Lens | float, mask: Mask
 ) -> Geometry:
     """Return a prediction after its declared alignment to the true depth (H, W) of the mask.
 
@@ -40,14 +41,14 @@ def fitted_geometry(
     nothing is left open, nothing changes. What is predicted must be finite inside the mask.
     """
     height, width = true_depth.shape
-    rays = pixel_directions(height, width, fov_y_degrees)[mask]
+    rays = pixel_directions(height, width, lens)[mask]
     true = true_depth[mask].astype(np.float64)
     depth = np.full(true_depth.shape, np.nan)
     if predicted.kind == "points":
         points = predicted.geometry[mask].astype(np.float64)
         if len(true):
             points = align_points(points, rays * true[:, None], predicted.alignment)
-        depth[mask] = -points[:, 2]
+        depth[mask] = _depth_of(points, lens)
         return Geometry(depth, points, False)
     values = predicted.geometry[mask].astype(np.float64)
     if predicted.kind == "disparity" and len(true):
@@ -58,12 +59,17 @@ def fitted_geometry(
     return Geometry(depth, rays * values[:, None], True)
 
 
-def depth_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees: float) -> Array:
-    """Return planar depth (H, W) as scores see it, for pictures; no value needs to be finite."""
-    return np.asarray(-points_as_scored(predicted, true_depth, fov_y_degrees)[..., 2])
+def _depth_of(points: Array, lens: Lens | float) -> Array:
+    away = -points[..., 2] if as_lens(lens).is_flat else np.sqrt(np.square(points).sum(axis=-1))
+    return np.asarray(away)
 
 
-def points_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees: float) -> Array:
+def depth_as_scored(predicted: PredictedView, true_depth: Array, lens: Lens | float) -> Array:
+    """Return depth (H, W) as scores see it, for pictures; no value needs to be finite."""
+    return _depth_of(points_as_scored(predicted, true_depth, lens), lens)
+
+
+def points_as_scored(predicted: PredictedView, true_depth: Array, lens: Lens | float) -> Array:
     """Return points (H, W, 3) as scores see them, NaN where one of both is not finite."""
     known = np.isfinite(true_depth)
     if predicted.kind == "layers":
@@ -71,7 +77,7 @@ def points_as_scored(predicted: PredictedView, true_depth: Array, fov_y_degrees:
     finite = np.isfinite(predicted.geometry)
     known &= finite.all(axis=-1) if predicted.kind == "points" else finite
     image = np.full((*known.shape, 3), np.nan)
-    image[known] = fitted_geometry(predicted, true_depth, fov_y_degrees, known).points
+    image[known] = fitted_geometry(predicted, true_depth, lens, known).points
     return image
 
 

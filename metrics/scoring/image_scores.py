@@ -79,9 +79,9 @@ from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import Against, broken_rules, refuse_pixels
 from metrics.submissions.truths import TrueView
 from scenegen.camera import (
+    Lens,
     back_project,
     pixel_directions,
-    pixel_size,
     transform_points,
     transform_vectors,
 )
@@ -155,18 +155,18 @@ def reference_of(
         first: the first view of its scene; None where it is the first one itself.
         floors: those of the reference, where they are known.
     """
-    mask, fov = truth.mask, truth.fov_y_degrees
+    mask, lens = truth.mask, truth.lens
     height, width = truth.depth.shape
-    empty, facing = empty_room(truth.world_from_camera, fov, height, width, truth.room_size)
-    points = _image(back_project(truth.depth, fov)[mask], mask)
+    empty, facing = empty_room(truth.world_from_camera, lens, height, width, truth.room_size)
+    points = _image(back_project(truth.depth, lens)[mask], mask)
     true_normals = truth.normal[mask].astype(np.float64)
-    surface = surface_of(points[mask], true_normals, pixel_size(len(mask), fov), mask)
+    surface = surface_of(points[mask], true_normals, lens, mask)
     counted = counted_objects(truth.object_id)
     hidden = _hidden(truth, counted, first)
     reference = Reference(
         empty,
         surface,
-        *normals_from_points(points, fov, mask),
+        *normals_from_points(points, lens, mask),
         counted,
         inside_objects(truth.object_id),
         hidden,
@@ -185,15 +185,15 @@ def _floors(
     truth: TrueView, reference: Reference, facing: Array, guesses: dict[str, Array]
 ) -> dict[str, float]:
     """Return the scores of guesses that follow from the truth; `facing` has the walls' normals."""
-    mask, fov, empty = truth.mask, truth.fov_y_degrees, reference.empty
-    room = Geometry(empty, back_project(empty, fov)[mask], True)
-    walls, _ = normals_from_points(_image(room.points, mask), fov, mask)
+    mask, lens, empty = truth.mask, truth.lens, reference.empty
+    room = Geometry(empty, back_project(empty, lens)[mask], True)
+    walls, _ = normals_from_points(_image(room.points, mask), lens, mask)
     surface, true = reference.surface, truth.depth[mask].astype(np.float64)
     inside = reference.inside
     at, derived_at = inside > 0, _smooth_pixels(inside, reference.smooth)
     scores = depth_scores(DepthPair(empty[mask], true))
     if truth.room_size is None:  # distances of surfaces are no headline of closed rooms
-        seen = surface_of(room.points, walls[mask], surface.pitch, mask)
+        seen = surface_of(room.points, walls[mask], surface.lens, mask)
         nearest = surface_distances(seen, surface, _nearest(room, truth, surface), True)
         scores |= {"chamfer": chamfer(nearest), "hausdorff": hausdorff(nearest)}
         scores |= object_means(_single_objects(empty, truth, nearest))
@@ -233,7 +233,7 @@ def _floors(
     if truth.room_size is not None:  # of a leaning cut-out, but for each object's shift
         floors[f"{LEANING}shape_error"] = flat_error((empty / 2.0 - truth.depth)[at], inside[at])
     height, width = mask.shape
-    rays = pixel_directions(height, width, fov)[mask]
+    rays = pixel_directions(height, width, lens)[mask]
     down = (np.nonzero(mask)[0] + 0.5) / len(mask)
     at = truth.object_id[mask] > 0
     near, weights = room.depth[mask] - true, at / true
@@ -265,8 +265,8 @@ def _guesses(
         own = truth.object_id == number
         flat[own] = np.median(truth.depth[own])
         leaning[own] = flat[own] + (empty[own] - np.median(empty[own])) / 2.0
-    camera = truth.world_from_camera, truth.fov_y_degrees
-    seen = first.depth, first.object_id, first.world_from_camera, truth.fov_y_degrees
+    camera = truth.world_from_camera, truth.lens
+    seen = first.depth, first.object_id, first.world_from_camera, truth.lens
     balls, blocks = balls_and_blocks(*seen)
     return {
         EMPTY_ROOM: empty,
@@ -288,9 +288,7 @@ def _nearest(geometry: Geometry, truth: TrueView, surface: Surface) -> NearestDi
     """Return the distances both ways between predicted points and those of the true pixels."""
     if not geometry.on_rays:
         return nearest_distances(geometry.points, surface.points)
-    return nearest_distances_on_image(
-        geometry.depth, truth.depth, truth.fov_y_degrees, surface.mask
-    )
+    return nearest_distances_on_image(geometry.depth, truth.depth, truth.lens, surface.mask)
 
 
 def _smooth_pixels(inside: Array, smooth: Array) -> Array:
@@ -305,24 +303,24 @@ def _smooth_pixels(inside: Array, smooth: Array) -> Array:
 def _hidden(truth: TrueView, counted: Array, first: FirstView | None) -> Array:
     if first is None or not counted.any():
         return np.zeros_like(counted)
-    points = back_project(truth.depth, truth.fov_y_degrees)[counted]
+    points = back_project(truth.depth, truth.lens)[counted]
     hidden = np.zeros_like(counted)
     hidden[counted] = hidden_from(
         transform_points(truth.world_from_camera, points),
         transform_vectors(truth.world_from_camera, truth.normal[counted]),
         first.depth,
         first.world_from_camera,
-        truth.fov_y_degrees,
+        truth.lens,
     )
     return hidden
 
 
 def true_relief(
-    depth: Array, world_from_camera: Array, fov_y_degrees: float, room_size: Array | None = None
+    depth: Array, world_from_camera: Array, lens: Lens | float, room_size: Array | None = None
 ) -> Array:
     """Return the relief of a true view of this depth, (H, W), scene units; NaN where no depth."""
     height, width = depth.shape
-    empty, _ = empty_room(world_from_camera, fov_y_degrees, height, width, room_size)
+    empty, _ = empty_room(world_from_camera, lens, height, width, room_size)
     return np.asarray(empty - depth)
 
 
@@ -352,18 +350,18 @@ def score_prediction(
     Raises PredictionError with the count and the first pixel, unless they are penalised, and
     ValueError on other shapes than the truth's.
     """
-    if non_finite == "penalise" and _breaks_rules(predicted, truth):
+    if non_finite == "penalise" and breaks_rules(predicted, truth):
         return _worst(predicted, truth, reference, other_relief, edge_distance)
     for name, values in predicted.columns:
         if values is not None:
             refuse_pixels(PredictionError, f"predicted {name}", name, values, truth.mask)
-    mask, fov = truth.mask, truth.fov_y_degrees
+    mask, lens = truth.mask, truth.lens
     alignment = scored_alignment(predicted.kind, predicted.alignment)
     alignments = alignments_scored(predicted.kind, predicted.alignment)
-    geometry = fitted_geometry(predicted, truth.depth, fov, mask)
+    geometry = fitted_geometry(predicted, truth.depth, lens, mask)
     # Both derived alike, so that a perfect depth is perfect at creases, too, where planes blend.
-    derived, _ = normals_from_points(_image(geometry.points, mask), fov, mask)
-    surface = surface_of(geometry.points, derived[mask], reference.surface.pitch, mask)
+    derived, _ = normals_from_points(_image(geometry.points, mask), lens, mask)
+    surface = surface_of(geometry.points, derived[mask], reference.surface.lens, mask)
     closest = _nearest(geometry, truth, reference.surface)
     nearest = surface_distances(surface, reference.surface, closest, geometry.on_rays)
     scores = point_scores(nearest, F_SCORE_THRESHOLDS) | paper_scores(closest)
@@ -383,7 +381,7 @@ def score_prediction(
     scores["flying_points"] = flying_points(geometry.depth, truth.depth, reference.other)
     scores["scale_log2"] = scale_log2(pair)
     if predicted.fov_y_degrees is not None:
-        scores["fov_bias_degrees"] = predicted.fov_y_degrees - fov
+        scores["fov_bias_degrees"] = predicted.fov_y_degrees - truth.lens.fov_y_degrees
         scores["fov_error_degrees"] = abs(scores["fov_bias_degrees"])
     if predicted.confidence is not None:
         scores |= scores_of_confidence(pair, predicted.confidence[mask], edge_distance, mask)
@@ -423,7 +421,8 @@ def scores_of_confidence(
     return scores
 
 
-def _breaks_rules(predicted: PredictedView, truth: TrueView) -> bool:
+def breaks_rules(predicted: PredictedView, truth: TrueView) -> bool:
+    """Return whether a scored pixel breaks `submissions.rules`."""
     against = Against(surface=truth.mask)
     return any(
         True
@@ -443,7 +442,7 @@ def _worst(
     """Return the worst value of each score that the truth would have in this submission."""
     perfect: Array = np.where(truth.mask, truth.depth, 1.0)
     if predicted.kind == "points":
-        perfect = back_project(perfect, truth.fov_y_degrees)
+        perfect = back_project(perfect, truth.lens)
     elif predicted.kind == "disparity":
         perfect = 1.0 / perfect
     normal = None if predicted.normal is None else truth.normal
@@ -526,7 +525,7 @@ def _scores_of_points(
     scores = point_map_scores(points, true)
     if not geometry.on_rays:
         height, width = mask.shape
-        rays = pixel_directions(height, width, truth.fov_y_degrees)[mask]
+        rays = pixel_directions(height, width, truth.lens)[mask]
         scores["ray_error_degrees"] = ray_error_degrees(points, rays)
     for after in ("scale", "scale_shift"):
         if after in alignments:
@@ -534,7 +533,7 @@ def _scores_of_points(
     ids = np.where(reference.counted, truth.object_id, 0)[mask]
     scores |= local_point_scores(points, true, ids)
     height, width = mask.shape
-    rays = pixel_directions(height, width, truth.fov_y_degrees)[mask]
+    rays = pixel_directions(height, width, truth.lens)[mask]
     apart = departures(points, truth.depth[mask], rays, geometry.on_rays)
     inside = reference.inside[mask]
     at = inside > 0

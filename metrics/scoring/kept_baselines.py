@@ -50,7 +50,7 @@ class KeptBaselines:
 
 def key_of(view: TrueView, digests: RowDigests, first: FirstView | None, row: int) -> str:
     """Return the key of a row: a hash of all that its baselines follow from."""
-    parts = [*digests, _digest(np.array([row, view.fov_y_degrees]), view.world_from_camera)]
+    parts = [*digests, _digest(np.array([row]), view.world_from_camera), repr(view.lens).encode()]
     parts.append(_digest(view.room_size) if view.room_size is not None else b"open")
     if first is not None:
         parts.append(_digest(first.depth, first.object_id, first.world_from_camera))

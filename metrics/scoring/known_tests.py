@@ -21,7 +21,7 @@ class KnownTest:
         command: what makes the set, but for its place.
         purpose: what it is for.
         pictures: digest of the images; empty where they differ between machines by rounding, and
-            `scenegen verify` or `iqtt verify` compares them.
+            `scenegen verify` or `iqtt audit` compares them.
         superseded: whether older code made it, whose bits were others.
     """
 
@@ -148,6 +148,14 @@ _DIGESTS = {
     "rotation-1/mirror": (
         "b5d9481c8f6ac819383869de64c514c1a05dccbb6bbaba66892681a6eacd43f0",
         "23b685fb1fcd5bd170ecb34acaa926904013188bd16413ed81ff4efc3cf6049a",
+    ),
+    "perspective-1/moved": (
+        "ec8c5cdc474999fc5bb7b46810148a93a0ca58043ee79c2b260b9ba0ecdb2d51",
+        "",
+    ),
+    "perspective-1/turned": (
+        "da93a1f60b18d1975f9e19da7470dc92d2a132175283abe4d5001e0287261cd5",
+        "",
     ),
 }
 # What older code made, whose bits were others: name, rows, digest of the truth, options.

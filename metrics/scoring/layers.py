@@ -101,8 +101,8 @@ def read_true_layers(truth: RoomsFile, row: int, view: TrueView) -> TrueLayers:
     scored = view.mask & ~((ids > 0) & (entering == 0)).any(axis=-1)
     layers = depth[scored].T.astype(np.float64), ids[scored].T, entering[scored].T
     height, width = scored.shape
-    rays = pixel_directions(height, width, view.fov_y_degrees)[scored]
-    pixel, bodies = pixel_size(len(scored), view.fov_y_degrees), solids.round_bodies(view.object_id)
+    rays = pixel_directions(height, width, view.lens)[scored]
+    pixel, bodies = pixel_size(len(scored), view.lens), solids.round_bodies(view.object_id)
     return TrueLayers(scored, rays, pixel, bodies[scored], *layers, digests)
 
 
@@ -140,7 +140,14 @@ def true_points(truth: RoomsFile, row: int) -> list[NDArray[Any]] | None:
     for draw in whole.DRAWS[1:]:
         points = (whole.drawn_points(triangles, row, draw) - place) @ rotation
         depth = -points[:, 2]
+<<<<<<< HEAD
         line, column, inside = pixels_of(points, (height, width), room.fov_y_degrees)
+=======
+        places = room.lens.grid(height, width).places(points[:, 0], points[:, 1], depth)
+        column, line = (np.floor(place).astype(int) for place in places)
+        inside = (column >= 0) & (column < width) & (line >= 0) & (line < height)
+        line, column = np.where(inside, line, 0), np.where(inside, column, 0)
+>>>>>>> main
         for i, j in np.ndindex(3, 3):
             start, end = starts[:, line + i, column + j], ends[:, line + i, column + j]
             deep = (start + whole.NEAR < depth) & (depth < end - whole.NEAR)

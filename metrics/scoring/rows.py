@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measured.protocols import BY_NAME, ProtocolError
-from metrics.measured.reader import Images, MeasuredFile, open_images
+from metrics.measured.reader import Images, MeasuredFile, is_flat, open_images
 from metrics.measures.alignment import Alignment
 from metrics.measures.confidence import distance_from_edges
 from metrics.scoring.image_scores import (
@@ -27,6 +27,7 @@ from metrics.scoring.kept_baselines import KeptBaselines, key_of
 from metrics.scoring.layers import read_true_layers, score_layers, true_points, worst_of_layers
 from metrics.scoring.measured_rows import scores_of_view
 from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE
+from metrics.scoring.panoramas import baselines_of, score_panorama
 from metrics.scoring.records import OBJECT_COLUMNS
 from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.scoring.truth_digests import RowDigests, view_digests
@@ -225,9 +226,8 @@ def _of_rooms(truth: RoomsFile, confident: bool) -> Callable[[int, int, int], Be
     def begin(row: int, other: int, first: int) -> Begun:
         view, relief, first_view = read_true_view(truth, row), None, None
         if other != row:
-            seen = ("depth", "camera/world_from_camera", "camera/fov_y_degrees")
-            depth, pose, fov = (read(name, other) for name in seen)
-            relief = true_relief(depth, pose, float(fov), truth.room_size(other))
+            depth, pose = (read(name, other) for name in ("depth", "camera/world_from_camera"))
+            relief = true_relief(depth, pose, truth.lens(other), truth.room_size(other))
         if first not in (row, -1):
             seen = ("depth", "object_id", "camera/world_from_camera")
             first_view = FirstView(*(read(name, first) for name in seen))
@@ -286,12 +286,28 @@ def _of_layers(truth: RoomsFile, meshes: bool) -> Callable[[int, int, int], Begu
     return begin
 
 
+def _of_panoramas(truth: RoomsFile) -> Callable[[int, int, int], Begun]:
+    """Return what reads a row that is a panorama."""
+
+    def begin(row: int, _other: int, _first: int) -> Begun:
+        view = read_true_view(truth, row)
+
+        def score(predicted: PredictedView, penalise: bool) -> ImageScores:
+            return ImageScores(score_panorama(predicted, view, penalise), NO_OBJECTS)
+
+        return view_digests(view), baselines_of(view), score
+
+    return begin
+
+
 def _scorer(
     files: Sequence[RoomPredictions], truth: Images, protocols: tuple[str, ...]
 ) -> RowScorer:
     confident = any(file.has_confidence for file in files)
     if isinstance(truth, MeasuredFile):
         return RowScorer(files, _of_measured(truth, confident, protocols))
+    if not is_flat(truth):
+        return RowScorer(files, _of_panoramas(truth))
     if files[0].kind == "layers":
         meshes = any(file.has_surface_points for file in files)
         return RowScorer(files, _of_layers(truth, meshes))

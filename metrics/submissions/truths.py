@@ -17,6 +17,7 @@ from metrics.submissions.layout import ID_NAMES
 from metrics.submissions.problems import Problem, first_ids
 from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions
 from metrics.submissions.rules import Against, as_doubles, value_problems
+from scenegen.camera import Lens
 from scenegen.common.errors import FileFormatError
 from scenegen.files import trial
 from scenegen.files.rows import RowFile
@@ -45,10 +46,11 @@ class TrueView:
     """The true depth, normals and objects of one image, as stored.
 
     Attributes:
-        depth: planar depth, (H, W), scene units; the pixels where it is finite are scored.
+        depth: planar depth, (H, W), scene units, in panoramas the distance; the pixels where it is
+            finite are scored.
         normal: (H, W, 3), camera frame, unit, facing the viewer.
         object_id: (H, W).
-        fov_y_degrees: vertical field of view.
+        lens: of the camera.
         world_from_camera: (4, 4), rigid.
         room_size: of a closed room, (3,); None for the paper's room.
     """
@@ -56,7 +58,7 @@ class TrueView:
     depth: Array
     normal: Array
     object_id: Array
-    fov_y_degrees: float
+    lens: Lens
     world_from_camera: Array
     room_size: Array | None = None
 
@@ -182,7 +184,7 @@ def read_true_view(truth: RoomsFile, row: int) -> TrueView:
         truth.read("depth", row),
         truth.read("normal", row),
         truth.read("object_id", row),
-        float(truth.read("camera/fov_y_degrees", row)),
+        truth.lens(row),
         truth.read("camera/world_from_camera", row),
         truth.room_size(row),
     )
@@ -202,9 +204,9 @@ def read_true_view(truth: RoomsFile, row: int) -> TrueView:
             raise FileFormatError(truth.place(name, row), found, expected)
     if not surface.any():
         raise FileFormatError(truth.place("object_id", row), "no surface", "a pixel to be scored")
-    if not 0.0 < view.fov_y_degrees < 180.0:
+    if view.lens.is_flat and not 0.0 < view.lens.fov_y_degrees < 180.0:
         where = truth.place("camera/fov_y_degrees", row)
-        raise FileFormatError(where, view.fov_y_degrees, "between 0 and 180")
+        raise FileFormatError(where, view.lens.fov_y_degrees, "between 0 and 180")
     if not _is_rigid(view.world_from_camera):
         found = "a matrix that is no rotation and shift"
         where = truth.place("camera/world_from_camera", row)

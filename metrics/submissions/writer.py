@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
-from metrics.measured.reader import Images, MeasuredFile, open_images, padded_size, size_of
+from metrics.measured.reader import Images, MeasuredFile, is_flat, open_images, padded_size, size_of
 from metrics.measures.alignment import Alignment
 from metrics.submissions import layout, rules
 from metrics.submissions.inspection import Inspection, take_values
@@ -190,7 +190,8 @@ class RoomPredictionWriter:
         if alignment not in allowed:
             expected = f"{' or '.join(allowed)}, for {kind}"
             raise PredictionError(f"{where}: alignment", repr(alignment), expected)
-        rules.refuse_behind_camera(where, kind, alignment, values[kind], surface)
+        if is_flat(self._truth) or kind != "points":
+            rules.refuse_behind_camera(where, kind, alignment, values[kind], surface)
 
     @contextmanager
     def _opened(self) -> Iterator[None]:

@@ -134,9 +134,8 @@ def _pictures(rooms: Images, predictions: RoomPredictions, row: int, place: int)
     normal = predictions.normal(place) if predictions.has_normals else None
     if predictions.kind == "layers":
         return [*pictures, *_cut_pictures(rooms, predictions, row, place)]
-    fov_y_degrees = float(rooms.read("camera/fov_y_degrees", row))
     true_normal = rooms.read("normal", row)
-    return [*pictures, *normal_pictures(true, depth, true_normal, fov_y_degrees, normal)]
+    return [*pictures, *normal_pictures(true, depth, true_normal, rooms.lens(row), normal)]
 
 
 def _cut_pictures(

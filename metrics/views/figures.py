@@ -225,8 +225,7 @@ def shown_row(rooms: Images, row: int, views: Sequence[PredictedView]) -> Line:
         return rooms.picture(row), truth.depth.astype(np.float64), depths
     true = rooms.read("depth", row).astype(np.float64)
     picture = srgb_bytes(np.nan_to_num(radiance_of(rooms, row)))
-    fov = float(rooms.read("camera/fov_y_degrees", row))
-    return picture, true, [depth_as_scored(view, true, fov) for view in views]
+    return picture, true, [depth_as_scored(view, true, rooms.lens(row)) for view in views]
 
 
 def _view(file: Any, row: int) -> PredictedView:

@@ -11,6 +11,7 @@ from PIL import Image
 
 from metrics.measures.surfaces.normals import normals_from_depth
 from metrics.views.figures import load_matplotlib
+from scenegen.camera import Lens
 from scenegen.common.text_table import number
 
 Array = NDArray[Any]
@@ -47,7 +48,7 @@ def normal_pictures(
     true: Array,
     predicted: Array,
     true_normal: Array,
-    fov_y_degrees: float,
+    lens: Lens,
     predicted_normal: Array | None = None,
 ) -> list[Picture]:
     """Return normals, true and predicted, of one view of a room.
@@ -57,13 +58,13 @@ def normal_pictures(
     Args:
         true, predicted: planar depth, (H, W), scene units.
         true_normal: camera frame, (H, W, 3).
-        fov_y_degrees: with which normals of the predicted depth are made where there are no others.
+        lens: with which normals of the predicted depth are made where there are no others.
         predicted_normal: camera frame, (H, W, 3), of any length.
     """
     scored = np.isfinite(true)
     if predicted_normal is None:
         drawn = np.clip(np.nan_to_num(predicted.astype(np.float64)), -FARTHEST, FARTHEST)
-        name, normal = DERIVED_NORMALS, normals_from_depth(drawn, fov_y_degrees, scored)[0]
+        name, normal = DERIVED_NORMALS, normals_from_depth(drawn, lens, scored)[0]
     else:
         name, normal = NORMALS, predicted_normal
     pictures = {TRUE_NORMALS: _normals(true_normal), name: _normals(normal)}

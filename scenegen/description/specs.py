@@ -28,6 +28,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+    from scenegen.camera import Lens
+
 IMAGE_DTYPES = ("uint8", "float16", "float32")
 BUILT_IN = {"shapes": SHAPE_NAMES, "families": FAMILY_NAMES + FURNITURE_NAMES}
 FOLDERS = ("shapenet-v1", "shapenet-v2", "folder")
@@ -42,6 +44,7 @@ VISIBLE_SHARE = 0.003  # least share of the pixels of an image that show an obje
 FROM_SIZE = -(2**62)  # stands for the number that follows from the size of the image
 MOST_TURN = 80.0  # degrees between two views; at 90 all input views would be the same
 FOV = (1.0, 120.0)  # degrees
+FARTHEST = 2.0  # images from the middle to the principal point, along a side
 
 
 def setting(
@@ -92,6 +95,7 @@ class RoomSpec:
         fov_degrees: field of view of a square image; others have its diagonal.
         fov_spread_degrees: range of the field of view above `fov_degrees`; each scene samples its
             own, uniformly.
+        principal_point, pixel_aspect, projection: as in `camera.Lens`.
         stereo: distance between the cameras of a stereo pair; 0 for single cameras. Each view is
             then followed by a view whose camera is moved along its x axis.
         truth: additional ground truth, some of TRUTHS (`rooms.truth`).
@@ -124,6 +128,21 @@ class RoomSpec:
     )
     fov_degrees: float = setting(28.0)
     fov_spread_degrees: float = setting(0.0, later=True)
+    principal_point: tuple[float, float] = setting(
+        (0.5, 0.5),
+        "Principal point x,y as fractions of width and height from the upper left corner, such as"
+        " 0.3,0.6: the images are crops of larger ones",
+        later=True, shown="0.5,0.5",
+    )  # fmt: skip
+    pixel_aspect: float = setting(
+        1.0, "Width of a pixel over its height", limits=(0.25, 4.0), later=True
+    )
+    projection: str = setting(
+        "perspective",
+        "equirectangular: panoramas of interiors, 360 x 180 degrees, whose depth is the distance"
+        " along the ray; twice as wide as high",
+        choices=("perspective", "equirectangular"), later=True,
+    )  # fmt: skip
     stereo: float = setting(
         0.0,
         "Baseline of stereo pairs in scene units (metres in interiors), such as 0.065: each view"
@@ -164,17 +183,38 @@ class RoomSpec:
         return tuple(angle for angle in self.views for _ in range(eyes))
 
     @property
+    def middle(self) -> tuple[float, float]:
+        """Column and row of the principal point, in pixels from the upper left corner."""
+        return self.principal_point[0] * self.width, self.principal_point[1] * self.height
+
+    def lens(self, fov_y_degrees: float) -> "Lens":
+        """Return the lens of images with this vertical field of view."""
+        from scenegen.camera import Lens
+
+        return Lens(fov_y_degrees, self.principal_point, self.pixel_aspect, self.projection)
+
+    def fov_y(self, fov_degrees: float) -> float:
+        """Return the vertical field of view with the diagonal of a square image's."""
+        from scenegen.camera import Camera
+
+        return Camera.fov_y_from_square(fov_degrees, self.height, self.width * self.pixel_aspect)
+
+    def check_centred(self, where: Any) -> None:
+        """Raise SpecError unless `Lens.is_centred`."""
+        expected = "perspective images with square pixels around the principal point"
+        check(self.lens(FOV[0]).is_centred, str(where), "other images", expected)
+
+    @property
     def fov_y_degrees(self) -> float:
         """Vertical field of view; the diagonal is that of a square image with `fov_degrees`.
 
-        Raises SpecError where scenes have different ones.
+        Raises SpecError where scenes have different ones, and as `check_centred`.
         """
-        from scenegen.camera import Camera
-
+        self.check_centred("fov")
         widest = self.fov_degrees + self.fov_spread_degrees
         scenes = f"scenes of {self.fov_degrees:g} to {widest:g} degrees"
         check(widest == self.fov_degrees, "fov", scenes, "one field of view for all scenes")
-        return Camera.fov_y_from_square(self.fov_degrees, self.height, self.width)
+        return self.fov_y(self.fov_degrees)
 
     def _json(self, more: dict[str, Any]) -> str:
         later = {row.name: row.default for row in fields(self) if row.metadata["later"]}
@@ -405,9 +445,31 @@ def _check_image(spec: RoomSpec) -> None:
     sides, pixels = f"{spec.height}x{spec.width}", spec.height * spec.width
     check(min(spec.height, spec.width) >= 8, "size", sides, "at least 8 pixels a side")
     check(pixels <= MAX_PIXELS, "size", sides, f"at most {MAX_PIXELS:,} pixels")
+    point = spec.principal_point
+    near = len(point) == 2 and all(abs(x - 0.5) <= FARTHEST for x in point)
+    check(near, "principal point", point, f"x,y from {0.5 - FARTHEST:g} to {0.5 + FARTHEST:g}")
+    _check_panorama(spec)
     least = spec.min_visible_pixels
     expected = f"from 0 to the image's {pixels} pixels"
     check(0 <= least <= pixels, "min visible pixels", least, expected)
+
+
+def _check_panorama(spec: RoomSpec) -> None:
+    if spec.projection == "perspective":
+        return
+    expected = "interiors, which surround the camera"
+    check(isinstance(spec, InteriorSpec), "projection", "a panorama of an open room", expected)
+    sides = f"{spec.height}x{spec.width}"
+    check(spec.width == 2 * spec.height, "size", sides, "panoramas twice as wide as high")
+    of_planes = {
+        "flow": "flow" in spec.truth,
+        "layers": "layers" in spec.truth,
+        "stereo": spec.stereo > 0,
+        "principal point": spec.principal_point != (0.5, 0.5),
+        "pixel aspect": spec.pixel_aspect != 1,
+    }
+    for name, asked in of_planes.items():
+        check(not asked, name, "with a panorama", "a perspective camera")
 
 
 def _check_objects(spec: RoomSpec) -> None:

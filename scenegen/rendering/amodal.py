@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_size
 from scenegen.rendering.packing import SceneBatch
 from scenegen.rendering.renderer import launch_fields
 
@@ -47,6 +46,8 @@ def whole_pixels(batch: SceneBatch, image: Array, slot: Array, device: str = "au
     Raises BackendError as `renderer.render`.
     """
     spec = replace(batch.spec, height=2 * batch.spec.height, width=2 * batch.spec.width)
+    x, y = batch.spec.principal_point
+    spec = replace(spec, principal_point=(x / 2 + 0.25, y / 2 + 0.25))
     halves = np.tan(np.radians(batch.fov_y_degrees) / 2)
     fov = np.degrees(2 * np.arctan(2 * halves))  # pixels keep their size
     alone = _alone(replace(batch, spec=spec, fov_y_degrees=fov), image, slot)
@@ -75,8 +76,8 @@ def _beside(batch: SceneBatch, right: Array, down: Array) -> SceneBatch:
     points away from the middle of the adjoining image.
     """
     spec, matrix = batch.spec, batch.world_from_camera.copy()
-    pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
-    offsets = np.stack([right * spec.width, -down * spec.height], axis=1) * pixel[:, None]
+    steps = np.stack([right * spec.width * spec.pixel_aspect, -down * spec.height], axis=1)
+    offsets = steps * batch.pixel_heights[:, None]
     matrix[:, :3, 2] -= np.einsum("bic,bc->bi", matrix[:, :3, :2], offsets)
     return replace(batch, world_from_camera=matrix)
 

@@ -12,7 +12,7 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_size
+from scenegen.camera import Grid
 from scenegen.common.rotations import product
 from scenegen.description.specs import Request
 from scenegen.objects.cast_meshes import normal_table
@@ -28,6 +28,7 @@ from scenegen.rendering.meshes.rasteriser import (
     color_of_nearest,
     nearest_triangle,
     rasterise,
+    ray_of,
     upload_triangles,
 )
 from scenegen.rendering.meshes.unit_scene import UnitScene, stacked, unit_scene
@@ -101,7 +102,7 @@ def launch_pixels(
 def upload_scenes(
     batch: SceneBatch, variant: str, models: Sequence[Mesh], bounced: bool = False
 ) -> tuple[Scenes, Any]:
-    """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel size.
+    """Return the scenes on the device, and the cameras, (B, 13): world_from_camera, pixel height.
 
     `models` are those of the batch's names, unless these are basic shapes. If rays are `bounced`
     off models, `rays.closest_hit` meets these, too.
@@ -139,8 +140,7 @@ def upload_scenes(
     about[:, BEFORE_LIGHTS:] = lights.reshape(count, -1)
     glossy = spec.specular[1] > 0
     materials = [batch.reflectance, batch.gloss] if glossy else [batch.reflectance]
-    pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
-    camera = [batch.world_from_camera[:, :3].reshape(count, 12), pixel[:, None]]
+    camera = [batch.world_from_camera[:, :3].reshape(count, 12), batch.pixel_heights[:, None]]
     scenes = Scenes(
         unit=unit.scene,
         grid=unit.grid,
@@ -190,26 +190,30 @@ def _trace(
     column = pixel - row * width
     camera = gather_row(cameras, item, 13)
     right, up, back, origin = (mi.Vector3f(*camera[i:12:4]) for i in range(4))
+    grid = Grid(*spec.middle, camera[12] * spec.pixel_aspect, camera[12])
 
     def look(x: Any, y: Any) -> tuple[Any, Any, Any, Any, Any]:
         """Return what the rays through the point (x, y) of each pixel meet.
 
         That is t, object id, normal, radiance and own colour.
 
-        Their directions have -z = 1 in the camera frame, so t is planar depth.
+        Their directions have -z = 1 in the camera frame, so t is planar depth. Those of panoramas
+        have length 1, so that it is the distance, and pass through the middles of pixels.
         """
-        dx = (mi.Float(column) + x - width / 2) * camera[12]
-        dy = (height / 2 - (mi.Float(row) + y)) * camera[12]
-        d = right * dx + up * dy - back
+        if meshes:
+            local = ray_of(meshes, grid, column, row, x, y)
+        else:
+            local = (*grid.slopes(mi.Float(column) + x, mi.Float(row) + y), -1.0)
+        d = right * local[0] + up * local[1] + back * local[2]
         own = mi.Vector3f(1)
         if cubes:
             t, object_id, n = closest_cube(cubes, item, origin, d)
         elif meshes:
             keys = rasterise(meshes, x, y)
-            hit = nearest_triangle(meshes, keys, item * rays + pixel, dx, dy)
+            hit = nearest_triangle(meshes, keys, item * rays + pixel, local)
             t, object_id, flat, smooth = nearer_than_room(scenes, item, origin, d, hit)
             if colors is not None:
-                color = color_of_nearest(meshes, keys, item * rays + pixel, dx, dy, colors)
+                color = color_of_nearest(meshes, keys, item * rays + pixel, local, colors)
                 own = dr.select(object_id > 0, color, own)
         else:
             t, object_id, face, uv = closest_hit(scenes, item, origin, d)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_size
+from scenegen.camera import Grid, Lens, as_lens
 from scenegen.common.recent import recent
 from scenegen.common.rotations import cross, product
 from scenegen.objects.catalogue import mesh_to_cast
@@ -62,7 +62,7 @@ class Layers:
 def layers_of(batch: SceneBatch, image: int, depth: Array, object_id: Array) -> Layers:
     """Return the layers of an image of the batch, whose first layer is its depth and ids (H, W)."""
     height, width = depth.shape
-    fov, count = float(batch.fov_y_degrees[image]), int(batch.object_count[image])
+    lens, count = batch.lens(image), int(batch.object_count[image])
     rotation = np.swapaxes(batch.world_from_camera[image, :3, :3], 0, 1)
     view = np.concatenate([rotation, -product(rotation, batch.world_from_camera[image, :3, 3:])], 1)
     parts, closed = [], np.zeros(batch.spec.object_slots, np.uint8)
@@ -72,12 +72,12 @@ def layers_of(batch: SceneBatch, image: int, depth: Array, object_id: Array) -> 
         surface = batch.shape_of(name).surface if batch.spec.source == "shapes" else None
         if surface is not None:
             closed[k] = 1
-            parts.append(_surface_crossings(surface, placed, height, width, fov))
+            parts.append(_surface_crossings(surface, placed, height, width, lens))
         else:
             vertices, faces, whole = _model(batch.shape_of, name)
             closed[k] = whole.all()
             vertices = product(vertices, placed[:, :3].T) + placed[:, 3]
-            parts.append(solid_crossings(vertices, faces, whole, height, width, fov))
+            parts.append(solid_crossings(vertices, faces, whole, height, width, lens))
     # Of other rays, the first layer is the only one.
     layered = (object_id > 0).ravel()
     for part in parts:
@@ -124,7 +124,7 @@ def welded(vertices: Array, faces: Array) -> tuple[Array, Array, Array]:
 
 
 def solid_crossings(
-    vertices: Array, faces: Array, closed: Array, height: int, width: int, fov_y_degrees: float
+    vertices: Array, faces: Array, closed: Array, height: int, width: int, lens: Lens | float
 ) -> Crossings:
     """Return where rays enter and leave a solid of closed parts, and meet the others.
 
@@ -133,7 +133,7 @@ def solid_crossings(
         faces: triangles with consistent windings, (F, 3).
         closed: which of them are of closed parts, (F,).
     """
-    found = mesh_crossings(vertices, faces[closed], height, width, fov_y_degrees)
+    found = mesh_crossings(vertices, faces[closed], height, width, lens)
     order = np.lexsort((-found.kind, found.depth, found.pixel))
     pixel, depth, kind = found.pixel[order], found.depth[order], found.kind[order].astype(np.int64)
     starts = np.flatnonzero(np.diff(pixel, prepend=-1))
@@ -146,7 +146,7 @@ def solid_crossings(
     pixel, depth, enters = pixel[turns], depth[turns], (after != 0)[turns]
     touching = ~enters[:-1] & (np.diff(pixel) == 0) & (np.diff(depth) <= GAP * depth[:-1])
     kept = ~(np.append(touching, False) | np.insert(touching, 0, False)[: len(pixel)])
-    sheets = mesh_crossings(vertices, faces[~closed], height, width, fov_y_degrees)
+    sheets = mesh_crossings(vertices, faces[~closed], height, width, lens)
     return Crossings(
         np.concatenate([pixel[kept], sheets.pixel]),
         np.concatenate([depth[kept], sheets.depth]),
@@ -155,7 +155,7 @@ def solid_crossings(
 
 
 def mesh_crossings(
-    vertices: Array, faces: Array, height: int, width: int, fov_y_degrees: float
+    vertices: Array, faces: Array, height: int, width: int, lens: Lens | float
 ) -> Crossings:
     """Return where the rays of pixels cross triangles (F, 3) in the camera frame, in any order.
 
@@ -164,7 +164,7 @@ def mesh_crossings(
     """
     if not len(faces):
         return Crossings(*np.zeros((3, 0), np.int64))
-    size = pixel_size(height, fov_y_degrees)
+    grid = as_lens(lens).grid(height, width)
     points, corners = np.ascontiguousarray(vertices.T), np.ascontiguousarray(faces.T)
     near = -points[2]
     ahead = near > NEAR * np.abs(points).max(initial=0.0)
@@ -176,8 +176,9 @@ def mesh_crossings(
         return first, (last - first + 1).clip(0)
 
     with np.errstate(divide="ignore", invalid="ignore"):
-        left, columns = span(points[0] / (near * size) + (width / 2 - 0.5), width)
-        top, rows = span((height / 2 - 0.5) - points[1] / (near * size), height)
+        across, down = grid.places(points[0], points[1], near)
+    left, columns = span(across - 0.5, width)
+    top, rows = span(down - 0.5, height)
     # From here on, of the triangles that may have a pixel.
     some = np.flatnonzero((columns > 0) & (rows > 0) & (near > 0)[corners].any(axis=0))
     corners, (left, columns, top, rows) = (
@@ -195,8 +196,7 @@ def mesh_crossings(
         row, column = np.divmod(place, columns[face])
         row, column = row + top[face], column + left[face]
         pixel = row * width + column
-        x = (column + 0.5 - width / 2) * size
-        y = ((height / 2 - 0.5) - row) * size
+        x, y = grid.slopes(column + 0.5, row + 0.5)
         a, b, c = points[:, corners[:, some]].swapaxes(0, 1)
         planes = [_edge_plane(b, c), _edge_plane(c, a), _edge_plane(a, b)]
         place = np.repeat(np.arange(len(some)), area[some])
@@ -234,16 +234,16 @@ def _edge_plane(a: Array, b: Array) -> Array:
 
 
 def _surface_crossings(
-    surface: Surface, placed: Array, height: int, width: int, fov_y_degrees: float
+    surface: Surface, placed: Array, height: int, width: int, lens: Lens | float
 ) -> Crossings:
     """Return where rays enter and leave an exact surface, placed by camera_from_object (3, 4)."""
-    size, squared = pixel_size(height, fov_y_degrees), (placed[:, 0] * placed[:, 0]).sum()
+    grid, squared = as_lens(lens).grid(height, width), (placed[:, 0] * placed[:, 0]).sum()
     # The inverse of a similarity s R is its transpose over s squared.
     linear = placed[:, :3].T / squared
     start = (-product(linear, placed[:, 3:])[:, 0]).tolist()
-    (left, columns), (top, rows) = _bounds(placed[:, 3], np.sqrt(squared), height, width, size)
+    (left, columns), (top, rows) = _bounds(placed[:, 3], np.sqrt(squared), height, width, grid)
     row, column = np.arange(top, top + rows)[:, None], np.arange(left, left + columns)
-    x, y, z = _rays(linear, row, column, height, width, size)
+    x, y, z = _rays(linear, row, column, grid)
     middle = -(x * start[0] + y * start[1] + z * start[2]) / (x * x + y * y + z * z)
     nearest = [at + middle * along for at, along in zip(start, (x, y, z), strict=True)]
     inside = nearest[0] ** 2 + nearest[1] ** 2 + nearest[2] ** 2 < 1.0002
@@ -256,26 +256,25 @@ def _surface_crossings(
 
 
 def _bounds(
-    center: Array, radius: float, height: int, width: int, size: float
+    center: Array, radius: float, height: int, width: int, grid: Grid
 ) -> list[tuple[int, int]]:
     """Return first column and columns, first row and rows, of the image of a sphere, or more."""
     near, far = -center[2] - 1.01 * radius, -center[2] + 1.01 * radius
     found = []
-    for middle, most in ((center[0], width), (-center[1], height)):
+    sides = (center[0], width, grid.x, grid.across), (-center[1], height, grid.y, grid.down)
+    for middle, most, zero, size in sides:
         low, high = 0, most
         if near > 0:
             ends = [(middle + side) / at for side in (-radius, radius) for at in (near, far)]
-            low = min(max(int(np.floor(min(ends) / size + most / 2)) - 1, 0), most)
-            high = max(min(int(np.ceil(max(ends) / size + most / 2)) + 1, most), low)
+            low = min(max(int(np.floor(min(ends) / size + zero)) - 1, 0), most)
+            high = max(min(int(np.ceil(max(ends) / size + zero)) + 1, most), low)
         found.append((low, high - low if far > 0 else 0))
     return found
 
 
-def _rays(
-    linear: Array, row: Array, column: Array, height: int, width: int, size: float
-) -> list[Array]:
+def _rays(linear: Array, row: Array, column: Array, grid: Grid) -> list[Array]:
     """Return the components of the rays of pixels after a linear map (3, 3)."""
-    x, y = (column + 0.5 - width / 2) * size, ((height / 2 - 0.5) - row) * size
+    x, y = grid.slopes(column + 0.5, row + 0.5)
     return [a * x + b * y - c for a, b, c in linear.tolist()]
 
 
@@ -283,20 +282,20 @@ def _room_crossings(
     batch: SceneBatch, image: int, view: Array, chosen: Array, shape: tuple[int, ...]
 ) -> Crossings:
     """Return where the rays of chosen pixels, (H W,), first meet the room."""
-    (height, width), fov = shape, float(batch.fov_y_degrees[image])
+    (height, width), lens = shape, batch.lens(image)
     if not batch.has_room[image]:
         return Crossings(*np.zeros((3, 0), np.int64))
     if batch.interior is not None:
         shell = shell_of(shell_name(str(batch.interior[image]))).corners
         vertices = product(shell.reshape(-1, 3).astype(np.float64), view[:, :3].T) + view[:, 3]
         faces = np.arange(len(vertices)).reshape(-1, 3)
-        found = mesh_crossings(vertices, faces, height, width, fov)
+        found = mesh_crossings(vertices, faces, height, width, lens)
         order = np.lexsort((found.depth, found.pixel))
         first = order[np.diff(found.pixel[order], prepend=-1) > 0]
         first = first[chosen[found.pixel[first]]]
         return Crossings(found.pixel[first], found.depth[first], np.full(len(first), OPEN))
     camera, pixel = batch.world_from_camera[image], np.flatnonzero(chosen)
-    rays = _rays(camera[:3, :3], *np.divmod(pixel, width), height, width, pixel_size(height, fov))
+    rays = _rays(camera[:3, :3], *np.divmod(pixel, width), lens.grid(height, width))
     start = camera[:3, 3].tolist()
     with np.errstate(divide="ignore", invalid="ignore"):
         walls = [np.where(d < 0, -o / d, np.inf) for o, d in zip(start, rays, strict=True)]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_directions, pixel_size
+from scenegen.camera import pixel_directions
 from scenegen.objects.solids import UnitShape
 from scenegen.rendering.ground_truth import GroundTruth, encode_image
 from scenegen.rendering.packing import SceneBatch
@@ -35,13 +35,13 @@ def render_in_numpy(batch: SceneBatch, cast: Cast) -> GroundTruth:
 def _render_one(batch: SceneBatch, b: int, cast: Cast) -> tuple[Array, Array, Array, Array]:
     spec = batch.spec
     world_from_camera = batch.world_from_camera[b]
-    directions = pixel_directions(spec.height, spec.width, float(batch.fov_y_degrees[b]))
-    pixel = pixel_size(spec.height, float(batch.fov_y_degrees[b]))
+    directions = pixel_directions(spec.height, spec.width, batch.lens(b))
+    grid = batch.lens(b).grid(spec.height, spec.width)
     origin = world_from_camera[:3, 3]
 
     def look(x: float, y: float) -> tuple[Array, Array, Array, Array]:
         """Return radiance, depth, world normal and object id at the point (x, y) of every pixel."""
-        local = directions + np.array([(x - 0.5) * pixel, (0.5 - y) * pixel, 0.0])
+        local = directions + np.array([(x - 0.5) * grid.across, (0.5 - y) * grid.down, 0.0])
         rays = local.reshape(-1, 3) @ world_from_camera[:3, :3].T
         t, normal, object_id = _closest(batch, b, origin, rays, cast)
         hit = object_id >= 0

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import look_at
+from scenegen.camera import Lens, look_at, pixel_directions
 from scenegen.common.errors import SpecError
 from scenegen.common.records import check, to_json
 from scenegen.common.rotations import rotation_matrix
@@ -78,6 +78,25 @@ class SceneBatch:
 
     def __len__(self) -> int:
         return len(self.fov_y_degrees)
+
+    def lens(self, image: int) -> Lens:
+        """Return the lens of an image."""
+        return self.spec.lens(float(self.fov_y_degrees[image]))
+
+    @property
+    def pixel_heights(self) -> Array:
+        """Height of the pixels of each image on the plane at depth 1, (B,); 0 in panoramas."""
+        size = self.spec.height, self.spec.width
+        lenses = map(self.lens, range(len(self)))
+        return np.array([lens.grid(*size).down if lens.is_flat else 0.0 for lens in lenses])
+
+    @property
+    def directions(self) -> Array | None:
+        """Directions of the pixels of panoramas, all alike, (H W, 3); None for other images."""
+        lens = self.lens(0)
+        if lens.is_flat:
+            return None
+        return pixel_directions(self.spec.height, self.spec.width, lens).reshape(-1, 3)
 
     def rows(self, which: Any) -> "SceneBatch":
         """Return some images, by a slice or their numbers, with only the models that they need."""

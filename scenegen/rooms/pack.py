@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenegen.camera import intrinsics
 from scenegen.common.records import from_json
 from scenegen.description.interiors import Interior
 from scenegen.description.scene_arrays import SceneArrays
@@ -83,14 +84,21 @@ def described(batch: SceneBatch, images: Array) -> dict[str, Array]:
     models = np.array([*batch.names, ""], object)  # -1, an unused slot, takes the last
     classes = [spec.shapes.index(name.partition("/")[0]) for name in batch.names]
     shape, view = batch.shape[images], batch.view[images]
-    interior = _interior(batch, images) if batch.interior is not None else {}
+    more = _interior(batch, images) if batch.interior is not None else {}
+    fov = batch.fov_y_degrees[images]
+    if spec.projection != "perspective":
+        fov = np.full(len(images), 180.0)
+    elif not batch.lens(0).is_centred:
+        size = spec.height, spec.width
+        matrices = [intrinsics(*size, batch.lens(i), pixel_centers="half") for i in images]
+        more["camera/intrinsics"] = np.array(matrices)
     return {
-        **interior,
+        **more,
         "scene_index": batch.index[images],
         "view_index": view,
         "view_angle_degrees": np.array(spec.view_angles)[view],
         "camera/world_from_camera": batch.world_from_camera[images],
-        "camera/fov_y_degrees": batch.fov_y_degrees[images],
+        "camera/fov_y_degrees": fov,
         "light/count": batch.light_count[images],
         "light/position": batch.light_position[images],
         "light/color": batch.light_color[images],

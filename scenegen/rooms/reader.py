@@ -11,7 +11,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import back_project, pixel_size, transform_points
+from scenegen.camera import Lens, back_project, transform_points
 from scenegen.common.errors import FileFormatError
 from scenegen.common.records import check
 from scenegen.derived import seen_from
@@ -22,7 +22,7 @@ from scenegen.files.content import SHA256, joint_digest
 from scenegen.files.input_file import describing
 from scenegen.files.rows import RowDataset, RowFile, chosen_rows
 from scenegen.files.sets.shards import OpenFile
-from scenegen.layout import FORMAT, FURTHER, INTERIOR, SCORED, TRUTH_DIGEST, WITHHELD, columns
+from scenegen.layout import FORMAT, FURTHER, INTERIOR, LENS, SCORED, TRUTH_DIGEST, WITHHELD, columns
 from scenegen.rendering.ground_truth import decode_image, undeveloped
 
 Array = NDArray[Any]
@@ -35,6 +35,7 @@ INPUT = (
     "camera/world_from_camera",
     "camera/fov_y_degrees",
 )
+WITHOUT_TRUTH = (*INPUT, *(column.name for column in LENS))  # the same, of crops, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,9 +53,14 @@ class Room:
     normal: Array
     object_id: Array
     world_from_camera: Array
-    fov_y_degrees: float
+    lens: Lens
     scene: SceneSpec
     truth: Mapping[str, Array]
+
+    @property
+    def fov_y_degrees(self) -> float:
+        """Vertical field of view, as `camera.Lens` has it."""
+        return self.lens.fov_y_degrees
 
     @property
     def radiance(self) -> Array:
@@ -69,7 +75,7 @@ class Room:
     @property
     def points(self) -> Array:
         """Surfel positions in the camera frame, (H, W, 3), scene units; NaN where nothing."""
-        return back_project(self.depth, self.fov_y_degrees)
+        return back_project(self.depth, self.lens)
 
     @property
     def points_world(self) -> Array:
@@ -90,8 +96,8 @@ class StereoPair:
 
     @property
     def focal(self) -> float:
-        """The focal length, in pixels."""
-        return 1.0 / pixel_size(len(self.left.depth), self.left.fov_y_degrees)
+        """The focal length, in widths of a pixel."""
+        return float(1.0 / self.left.lens.grid(*self.left.depth.shape).across)
 
     @property
     def disparity(self) -> NDArray[np.float64]:
@@ -112,7 +118,7 @@ class StereoPair:
         pairs = (self.left, self.right), (self.right, self.left)
         return np.stack([
             seen_from(one.points_world, one.object_id, other.depth, other.normal, other.object_id,
-                      other.world_from_camera, other.fov_y_degrees)
+                      other.world_from_camera, other.lens)
             for one, other in pairs
         ])  # fmt: skip
 
@@ -167,7 +173,7 @@ class RoomsFile(RowFile):
         if not len(self):
             raise FileFormatError(f"{self.path}: image", "no rows", "at least one")
         self.has_truth = WITHHELD not in self.attributes
-        self._take("", [c for c in columns(self.spec) if self.has_truth or c.name in INPUT])
+        self._take("", [c for c in columns(self.spec) if self.has_truth or c.name in WITHOUT_TRUTH])
 
     @overload
     def __getitem__(self, index: int) -> Room: ...
@@ -197,10 +203,14 @@ class RoomsFile(RowFile):
             normal=read("normal", row),
             object_id=read("object_id", row),
             world_from_camera=read("camera/world_from_camera", row),
-            fov_y_degrees=float(read("camera/fov_y_degrees", row)),
+            lens=self.spec.lens(float(read("camera/fov_y_degrees", row))),
             scene=self._described(row, read("scene", row)),
             truth={name: read(name, row) for name in self.further},
         )
+
+    def lens(self, row: int) -> Lens:
+        """Return the lens of a row. Raises FileFormatError where it is damaged."""
+        return self.spec.lens(float(self.read("camera/fov_y_degrees", row)))
 
     def scene(self, index: int) -> SceneSpec:
         """Return the description of the scene that row `index` shows."""
@@ -216,7 +226,7 @@ class RoomsFile(RowFile):
 
     def check_field(self, name: str) -> None:
         """Raise SpecError unless `read` takes this name, FileFormatError if it is held out."""
-        if not self.has_truth and name in {c.name for c in columns(self.spec)} - {*INPUT}:
+        if not self.has_truth and name in {c.name for c in columns(self.spec)} - {*WITHOUT_TRUTH}:
             beside = f"{self.path.stem}-truth{self.path.suffix}"
             hint = f"it is in the file with the ground truth, such as {beside}"
             raise FileFormatError(

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_directions, transform_points, transform_vectors
+from scenegen.camera import Lens, pixel_directions, transform_points, transform_vectors
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.description.specs import Request
 from scenegen.files.rows import RowBlock
@@ -161,15 +161,15 @@ def _normal_problems(room: Room) -> Iterable[str]:
         yield f"a normal's length is off 1 by {np.nanmax(np.abs(length[hit] - 1)):.1e}"
     if not (room.normal[~hit] == 0).all():
         yield "a pixel without a hit has a normal"
-    rays = _rays(*room.depth.shape, room.fov_y_degrees)
+    rays = _rays(*room.depth.shape, room.lens)
     if not (np.einsum("yxi,yxi->yx", normal, rays)[hit] < UNIT_TOLERANCE).all():
         yield "a normal faces away from the viewer"
 
 
 @lru_cache(maxsize=1)
-def _rays(height: int, width: int, fov_y_degrees: float) -> Array:
+def _rays(height: int, width: int, lens: Lens) -> Array:
     """Return the unit directions of pixels, in the camera frame, (H, W, 3)."""
-    rays = pixel_directions(height, width, fov_y_degrees)
+    rays = pixel_directions(height, width, lens)
     return np.asarray(rays / np.linalg.norm(rays, axis=-1, keepdims=True))
 
 

@@ -11,7 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import back_project, pixel_directions, transform_points, transform_vectors
+from scenegen.camera import (
+    Lens,
+    back_project,
+    pixel_directions,
+    transform_points,
+    transform_vectors,
+)
 from scenegen.derived import albedo, object_coordinates, optical_flow, seen_from
 from scenegen.description.specs import Request
 from scenegen.rendering.layers import layers_of
@@ -31,14 +37,12 @@ class View:
     normal: Array
     object_id: Array
     world_from_camera: Array
-    fov_y_degrees: float
+    lens: Lens
 
     @property
     def points_world(self) -> Array:
         """Surface points in the world frame, (H, W, 3)."""
-        return transform_points(
-            self.world_from_camera, back_project(self.depth, self.fov_y_degrees)
-        )
+        return transform_points(self.world_from_camera, back_project(self.depth, self.lens))
 
 
 def further_truth(
@@ -55,7 +59,7 @@ def further_truth(
     images = range(first, first + len(pixels["depth"]))
     maps = zip(pixels["depth"], pixels["normal"], pixels["object_id"], strict=True)
     views = [
-        View(depth, normal, ids, batch.world_from_camera[i], float(batch.fov_y_degrees[i]))
+        View(depth, normal, ids, batch.world_from_camera[i], batch.lens(i))
         for (depth, normal, ids), i in zip(maps, images, strict=True)
     ]
     if masks is not None:
@@ -125,8 +129,8 @@ def flow(view: Any, other: Any) -> tuple[NDArray[np.float32], NDArray[np.uint8]]
         view.depth,
         view.world_from_camera,
         other.world_from_camera,
-        view.fov_y_degrees,
-        other.fov_y_degrees,
+        view.lens,
+        other.lens,
     )
     seen = seen_from(
         view.points_world,
@@ -135,7 +139,7 @@ def flow(view: Any, other: Any) -> tuple[NDArray[np.float32], NDArray[np.uint8]]
         other.normal,
         other.object_id,
         other.world_from_camera,
-        other.fov_y_degrees,
+        other.lens,
     )
     return moved.astype(np.float32), (~seen).astype(np.uint8)
 
@@ -243,7 +247,7 @@ def _reach_of_spheres(view: Any, world_from_object: Array) -> Array:
     It is -1 where the ray misses the sphere.
     """
     height, width = view.depth.shape
-    local = pixel_directions(height, width, view.fov_y_degrees)
+    local = pixel_directions(height, width, view.lens)
     rays = transform_vectors(view.world_from_camera, local)
     squared = np.einsum("yxi,yxi->yx", rays, rays)
     reach = np.full((len(world_from_object), *view.depth.shape), -1.0)

@@ -13,7 +13,7 @@ from scenegen.common.errors import FileFormatError
 from scenegen.files.input_file import is_virtual
 from scenegen.files.row_file import new_hdf5_file
 from scenegen.layout import WITHHELD
-from scenegen.rooms.reader import INPUT, RoomsFile
+from scenegen.rooms.reader import WITHOUT_TRUTH, RoomsFile
 
 
 def truth_path(path: str | Path) -> Path:
@@ -46,10 +46,11 @@ def withhold_truth(truth: str | Path, out: str | Path, overwrite: bool = False) 
         source = rooms.opened.file
         if not rooms.has_truth:
             raise FileFormatError(truth, "rooms without ground truth", "a whole file of rooms")
-        if any(is_virtual(source[name]) for name in INPUT):
+        names = [name for name in WITHOUT_TRUTH if name in source]
+        if any(is_virtual(source[name]) for name in names):
             hint = "merge it with `scenegen merge`, or render with a larger --shard-size"
             raise FileFormatError(truth, "a set of shards", "one file", hint)
-        for name in INPUT:
+        for name in names:
             home = file.require_group(str(Path(name).parent)) if "/" in name else file
             source.copy(source[name], home, name.rpartition("/")[2])
         _copy_attributes(source, file, rooms)

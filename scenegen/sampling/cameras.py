@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import Camera, look_at
+from scenegen.camera import look_at
 from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.description.specs import DatasetSpec, Request
 from scenegen.sampling.octant import octant_points
@@ -49,4 +49,4 @@ def sample_fov_y(spec: DatasetSpec, index: Array) -> Array:
     """Draw the vertical fields of view of the cameras of items `index`, (N,), in degrees: (N,)."""
     wider = item_numbers(spec.seed, index, Purpose.CAMERA, start=4, count=1)[:, 0]
     fov = spec.fov_degrees + spec.fov_spread_degrees * wider
-    return np.array([Camera.fov_y_from_square(f, spec.height, spec.width) for f in fov.tolist()])
+    return np.array([spec.fov_y(f) for f in fov.tolist()])

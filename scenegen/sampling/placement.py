@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import half_angle, look_at
+from scenegen.camera import Lens, as_lens, look_at
 from scenegen.common.rotations import cos_sin
 from scenegen.description.specs import DatasetSpec
 from scenegen.objects.coarse_hulls import POINT_STEP, rounded
@@ -96,20 +96,19 @@ def make_frustums(spec: DatasetSpec, cameras: Array, fov_y_degrees: Array) -> Fr
     """Return the frustums of cameras (N, V, 3) with vertical fields of view (N,)."""
     world_from_camera = look_at(cameras, np.array(spec.camera_target))[..., :3, :3]
     values, which = np.unique(fov_y_degrees, return_inverse=True)
-    normals = np.array([border_normals(f, spec.height, spec.width) for f in values.tolist()])
+    lenses = map(spec.lens, values.tolist())
+    normals = np.array([border_normals(lens, spec.height, spec.width) for lens in lenses])
     return Frustums(cameras, world_from_camera.swapaxes(-1, -2), normals[which])
 
 
-def border_normals(fov_y_degrees: float, height: int, width: int) -> Array:
+def border_normals(lens: Lens | float, height: int, width: int) -> Array:
     """Return the outward normals of the image's four border planes, camera frame: (4, 3).
 
     They are unit vectors within DIRECTION_STEP, of which they are multiples.
     """
-    cosine, sine = half_angle(fov_y_degrees)
-    half_y = sine / cosine
-    half_x = half_y * width / height
-    normals = np.array([[1, 0, half_x], [-1, 0, half_x], [0, 1, half_y], [0, -1, half_y]])
-    length = np.sqrt(1 + np.array([half_x, half_x, half_y, half_y]) ** 2)
+    left, right, top, bottom = as_lens(lens).edges(height, width)
+    normals = np.array([[1, 0, right], [-1, 0, -left], [0, 1, top], [0, -1, -bottom]])
+    length = np.sqrt(1 + normals[:, 2] ** 2)
     return rounded(normals / length[:, None], DIRECTION_STEP)
 
 

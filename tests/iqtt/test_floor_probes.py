@@ -2,11 +2,14 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+from iqtt.audit.probes.masks import RULES
 from iqtt.audit.probes.rules import Probe
-from iqtt.floor_probes import floor_of, floor_specs, measure_floors
+from iqtt.floor_probes import floor_of, floor_specs, measure_floors, probe_file
 from iqtt.floors import CHANCE, read_floors, settings_of, to_json
+from iqtt.perspective.specs import perspective_spec
 from iqtt.questions.specs import SplitSpec
 from iqtt.shapes.splits import TooFewShapesError
 
@@ -49,3 +52,15 @@ def test_a_probe_that_may_be_lucky_is_no_floor():
         0.5,
     )
     assert floor_of("near", 3, (lucky, good)).accuracy == 0.35
+
+
+def test_floors_of_rooms_are_those_of_masks_of_other_objects(rooms_folder, monkeypatch):
+    monkeypatch.setattr("iqtt.floor_probes.run_floor_probes", lambda *seen: seen)
+    statistics, right, masks = probe_file(rooms_folder / "iqtt-train.h5")
+    assert len(statistics) == len(right) == 2
+    assert masks.shape == (2, 3, len(RULES))
+    assert np.ptp(masks, axis=1).all(axis=0).any()
+    spec = perspective_spec("perspective", seed=9, object_split="test", height=512)
+    ((settings, kind), measured), *_ = floor_specs([spec], 300).items()
+    assert (kind, measured.object_split, measured.train) == ("moved", "train", 300)
+    assert settings == settings_of(replace(spec, spp=4)) != settings_of(replace(spec, width=512))

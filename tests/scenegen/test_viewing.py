@@ -10,6 +10,7 @@ pytest.importorskip("rerun")
 from recordings import pixels_of, points_of, recorded
 
 from scenegen import open_rooms
+from scenegen.camera import Lens
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.rooms.preview import normal_bytes, srgb_bytes
 from scenegen.viewing import NO_OBJECT, room_scenes, room_view, scene_rows
@@ -63,9 +64,11 @@ def test_rows_and_cameras_that_cannot_be_shown(rooms_path):
         with pytest.raises(SpecError):
             scene_rows(rooms, [3, len(rooms)])
         room = rooms[0]
-    for changes in ({"fov_y_degrees": 180.0}, {"world_from_camera": np.eye(4) * np.nan}):
+    for changes in ({"lens": Lens(180.0)}, {"world_from_camera": np.eye(4) * np.nan}):
         with pytest.raises(FileFormatError):
             room_view(replace(room, **changes))
+    with pytest.raises(SpecError):
+        room_view(replace(room, lens=Lens(180.0, projection="equirectangular")))
 
 
 def test_a_failed_recording_leaves_nothing(damaged, tmp_path):

@@ -57,7 +57,7 @@ def mask_costs(ids: Array, in_play: int, moving: Sequence[int]) -> Array:
         moving: numbers of this object and of what it carries, which no map is fitted to.
     """
     ids = np.maximum(ids, 0)  # the room, and what is outside
-    most = max(int(ids.max()), in_play) + 1
+    most = max(int(ids.max()), *moving) + 1
     measured = [_measured(image, most) for image in ids]
     (area, centres, feet), *options = measured
     costs = np.zeros((len(options), len(RULES)))

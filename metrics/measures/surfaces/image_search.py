@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from metrics.measures.checks import require, require_depth_pair, require_fov
 from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances, query_nearest
-from scenegen.camera import pixel_directions, pixel_size
+from scenegen.camera import Lens, as_lens, pixel_directions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -45,7 +45,7 @@ _NOWHERE = 1e110
 def nearest_distances_on_image(
     predicted_depth: ArrayLike,
     true_depth: ArrayLike,
-    fov_y_degrees: float,
+    lens: Lens | float,
     mask: Mask | None = None,
 ) -> NearestDistances:
     """Return nearest distances both ways between the surfels of two planar depth images (H, W).
@@ -56,11 +56,11 @@ def nearest_distances_on_image(
     EmptyError on an empty mask, and MeasureError on other shapes.
     """
     predicted, true, inside = require_depth_pair(predicted_depth, true_depth, mask)
-    require_fov(fov_y_degrees)
+    require_fov(lens)
     require(inside.ndim == 2, "depth", f"shape {inside.shape}", "(H, W)")
     grid = _Grid(inside)
-    clouds = _lay_out_clouds(grid, predicted, true, fov_y_degrees)
-    per_ring = _rings_per_distance(grid, clouds[:, 2], fov_y_degrees)
+    clouds = _lay_out_clouds(grid, predicted, true, lens)
+    per_ring = _rings_per_distance(grid, clouds[:, 2], lens)
     best = np.empty((2, grid.size))
     best[0] = _squared_distances(clouds[0], clouds[1])
     best[1] = best[0]
@@ -100,10 +100,10 @@ class _Grid:
         return flat[..., self.start : self.stop].reshape(*flat.shape[:-1], *self.inside.shape)
 
 
-def _lay_out_clouds(grid: _Grid, predicted: Array, true: Array, fov_y_degrees: float) -> Array:
+def _lay_out_clouds(grid: _Grid, predicted: Array, true: Array, lens: Lens | float) -> Array:
     """Prediction and truth back-projected: (2, 3, size)."""
     height, width = grid.inside.shape
-    rays = pixel_directions(height, width, fov_y_degrees)
+    rays = pixel_directions(height, width, lens)
     slopes = (rays[:1, :, 0], rays[:, :1, 1], rays[:1, :1, 2])
     clouds = np.empty((2, 3, grid.size))
     for cloud, depth, nowhere in zip(clouds, (predicted, true), (_NOWHERE, -_NOWHERE), strict=True):
@@ -116,15 +116,16 @@ def _lay_out_clouds(grid: _Grid, predicted: Array, true: Array, fov_y_degrees: f
     return clouds
 
 
-def _rings_per_distance(grid: _Grid, z: Array, fov_y_degrees: float) -> Array:
+def _rings_per_distance(grid: _Grid, z: Array, lens: Lens | float) -> Array:
     """Return how many rings a distance of 1 spans at most, (2, size): 1 / the bound of one ring.
 
     It is 0 where there is no point, so that nothing is ever open there. A point at depth 0 has no
     lower bound, and no ring settles it.
     """
-    shape = grid.inside.shape
-    pitch = pixel_size(shape[0], fov_y_degrees)
-    edge = (max(shape) - 1) / 2.0 * pitch
+    height, width = grid.inside.shape
+    pixels = as_lens(lens).grid(height, width)
+    edge = float(np.abs(pixel_directions(height, width, lens)[..., :2]).max())
+    pitch = min(pixels.across, pixels.down)
     bound = pitch / math.sqrt(1.0 + edge * edge) * _BOUND_MARGIN
     per_ring: Array = (1.0 / bound) / np.maximum(np.abs(z), 1e-100)
     per_ring *= grid.present

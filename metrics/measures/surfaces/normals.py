@@ -18,7 +18,7 @@ from metrics.measures.checks import (
     require_fov,
     require_mask,
 )
-from scenegen.camera import back_project, pixel_directions
+from scenegen.camera import Lens, back_project, pixel_directions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -107,18 +107,18 @@ def normal_scores(angles: Array) -> dict[str, float]:
 
 
 def normals_from_depth(
-    depth: ArrayLike, fov_y_degrees: float, mask: Mask | None = None
+    depth: ArrayLike, lens: Lens | float, mask: Mask | None = None
 ) -> tuple[Array, Mask]:
     """Return `normals_from_points` of planar depth (H, W), on the rays of its pixels."""
     planar = as_float64(depth, "depth")
     require(planar.ndim == 2, "depth", f"shape {planar.shape}", "(H, W)")
-    require_fov(fov_y_degrees)
+    require_fov(lens)
     inside = require_mask(np.isfinite(planar) if mask is None else mask, planar.shape)
     require_finite(planar, "depth", inside)
-    return normals_from_points(back_project(planar, fov_y_degrees), fov_y_degrees, inside)
+    return normals_from_points(back_project(planar, lens), lens, inside)
 
 
-def normals_from_points(points: ArrayLike, fov_y_degrees: float, mask: Mask) -> tuple[Array, Mask]:
+def normals_from_points(points: ArrayLike, lens: Lens | float, mask: Mask) -> tuple[Array, Mask]:
     """Return unit normals (H, W, 3) of points (H, W, 3), and where they are reliable (H, W).
 
     A normal is that of the plane that minimises the sum of squared distances to the points of the
@@ -137,7 +137,7 @@ def normals_from_points(points: ArrayLike, fov_y_degrees: float, mask: Mask) -> 
     image = np.where(inside[..., None], as_float64(points, "points"), 0.0)
     require_finite(image, "points")
     height, width = inside.shape
-    rays = np.ascontiguousarray(np.moveaxis(pixel_directions(height, width, fov_y_degrees), -1, 0))
+    rays = np.ascontiguousarray(np.moveaxis(pixel_directions(height, width, lens), -1, 0))
     rays /= _length(rays)
     parts = np.ascontiguousarray(np.moveaxis(image, -1, 0))
     normals, reliable = np.empty((3, height, width)), np.empty((height, width), np.bool_)

@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.surfaces.chamfer_hausdorff import NearestDistances
+from scenegen.camera import Lens, as_lens, pixel_size
 
 Array = NDArray[Any]
 Mask = NDArray[np.bool_]
@@ -48,29 +49,31 @@ class Surface:
     Attributes:
         mask: the scored pixels, (H, W).
         points: camera frame, scene units, (N, 3), in row-major order.
-        pitch: the pixel size on the plane at depth 1.
+        lens: of the camera.
         patches: x, y, z, the normal, and the reach of each pixel's patch, (7, H + 2, W + 2), with a
             border of one pixel; NOWHERE, with a normal of 0, where there is no point.
     """
 
     mask: Mask
     points: Array
-    pitch: float
+    lens: Lens | float
     patches: Array
 
 
-def surface_of(points: Array, normals: Array, pitch: float, mask: Mask) -> Surface:
+def surface_of(points: Array, normals: Array, lens: Lens | float, mask: Mask) -> Surface:
     """Return the surface of points and unit normals (N, 3), camera frame, of a mask (H, W)."""
     values = np.empty((7, len(points)))
     values[:3], values[3:6] = points.T, normals.T
     x, y, z, *n = values[:6]
     far = np.maximum(np.sqrt(x * x + y * y + z * z), np.finfo(float).tiny)
     cosine = -(x * n[0] + y * n[1] + z * n[2]) / far
-    values[6] = REACH * pitch * np.maximum(-z, 0.0) / np.maximum(cosine, LEAST_COSINE)
+    values[6] = (
+        REACH * pixel_size(len(mask), lens) * np.maximum(-z, 0.0) / np.maximum(cosine, LEAST_COSINE)
+    )
     patches = np.zeros((7, mask.shape[0] + 2, mask.shape[1] + 2))
     patches[:3] = NOWHERE
     patches[:, 1:-1, 1:-1][:, mask] = values
-    return Surface(mask, points, pitch, patches)
+    return Surface(mask, points, lens, patches)
 
 
 def surface_distances(
@@ -137,12 +140,13 @@ def _to_neighbours(surface: Surface, other: Surface) -> Array:
 def _to_where_seen(predicted: Surface, true: Surface) -> tuple[Array, Array]:
     """Return the distances (N,) of close pairs both ways, wherever predicted points are seen."""
     mask, points = true.mask, predicted.points
-    (height, width), scale = mask.shape, true.pitch * -points[:, 2]
+    height, width = mask.shape
+    grid, depth = as_lens(true.lens).grid(height, width), -points[:, 2]
     forward, reverse = np.full(len(points), np.inf), np.full((height + 2, width + 2), np.inf)
     with np.errstate(all="ignore"):  # points beside or behind the camera are in no pixel
-        column, row = points[:, 0] / scale + width / 2.0, height / 2.0 - points[:, 1] / scale
+        column, row = grid.places(points[:, 0], points[:, 1], depth)
     seen = np.flatnonzero(
-        (scale > 0.0) & (row >= -1.0) & (row < height + 1.0)
+        (depth > 0.0) & (row >= -1.0) & (row < height + 1.0)
         & (column >= -1.0) & (column < width + 1.0)
     )  # fmt: skip
     row, column = (np.floor(at[seen]).astype(int) + 1 for at in (row, column))

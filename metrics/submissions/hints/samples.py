@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measured.reader import Images, MeasuredFile
+from metrics.measured.reader import Images, MeasuredFile, is_flat
 from metrics.submissions.reader import RoomPredictions
 from metrics.submissions.rules import LARGEST
 from scenegen.camera import pixel_directions, pixel_size
@@ -63,7 +63,7 @@ class Sample:
 def sample_rooms(predictions: RoomPredictions, truth: Images) -> list[Sample]:
     """Return the usable ones of some rows that are spread evenly over a submission."""
     entries = np.flatnonzero((predictions.rows >= 0) & (predictions.rows < len(truth)))
-    if len(entries) == 0:
+    if len(entries) == 0 or not is_flat(truth):
         return []
     spread = np.linspace(0, len(entries) - 1, ROWS).astype(np.int64)
     samples = (_sample(predictions, int(i), truth) for i in entries[np.unique(spread)])
@@ -90,7 +90,7 @@ def _sample(predictions: RoomPredictions, i: int, truth: Images) -> Sample | Non
         return _measured_sample(depth, truth, row)
     height, width = depth.shape
     grid = np.ix_(mirrored_grid(height, SIDE), mirrored_grid(width, SIDE))
-    fov = float(truth.read("camera/fov_y_degrees", row))
+    lens = truth.lens(row)
     true_depth = truth.read("depth", row)[grid].astype(np.float64)
     pose = truth.read("camera/world_from_camera", row)
     usable = np.isfinite(true_depth) & (np.abs(depth[grid]) <= LARGEST)
@@ -103,14 +103,14 @@ def _sample(predictions: RoomPredictions, i: int, truth: Images) -> Sample | Non
         depth[grid],
         true_depth,
         usable,
-        pixel_directions(height, width, fov)[grid],
-        pixel_size(height, fov),
+        pixel_directions(height, width, lens)[grid],
+        pixel_size(height, lens),
         points,
         None if normal is None else normal[grid],
         truth.read("normal", row)[grid].astype(np.float64),
         pose[:3, :3].T,
         pose[:3, 3],
-        fov,
+        lens.fov_y_degrees,
     )
 
 

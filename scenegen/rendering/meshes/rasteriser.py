@@ -3,6 +3,7 @@
 A ray through the centre of a pixel meets a mesh where a triangle covers the centre. So each
 triangle visits the pixels of its bounding rectangle, and leaves its depth and number where it is
 nearer than what is there. All is computed in the camera frame, where rays start at the origin.
+In a panorama, the rectangle is that of the cap of the sphere around the triangle.
 
 A pixel is inside a triangle if it is on the same side of the three planes through the origin and
 an edge. The plane of an edge is computed from its two ends in an order of their own, so neighbours
@@ -20,11 +21,18 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_size
+from scenegen.camera import Grid
 from scenegen.common.rotations import product
 from scenegen.objects.solids import Mesh
 from scenegen.rendering.packing import SceneBatch
-from scenegen.rendering.tables import gather_packet, gather_row, upload, upload_rows, upload_table
+from scenegen.rendering.tables import (
+    gather_packet,
+    gather_row,
+    unit,
+    upload,
+    upload_rows,
+    upload_table,
+)
 
 Array = NDArray[Any]
 NOTHING = 0xFFFFFFFF_FFFFFFFF  # the key of a pixel that no triangle covers
@@ -44,13 +52,15 @@ class Triangles:
 
     Attributes:
         images, height, width: of the batch.
+        middle, aspect: principal point, pixels, and width of a pixel over its height.
         rays: of an image, padded to whole SIMD packets.
         count: number of threads.
         vertices: of all models, in the frames of their unit shapes, (V, 3).
         faces: three vertices of each triangle, counted in its model, uint32 in packets of four.
         normals: at the vertices of smooth models, (N, 3); before them a row for no vertex.
         draw: of each thread, its draw.
-        placed: of each draw, (D, 13): rows of camera_from_object, and the size of a pixel.
+        placed: of each draw, (D, 13): rows of camera_from_object, and the height of a pixel.
+        directions: of the pixels of panoramas, (H W, 3); None for other images.
         starts: of each draw, uint32 in packets of four: number of its image; of a triangle in
             `faces` minus its thread's, modulo 2^32; of its model's first row in `vertices` and in
             `normals`, which is 0 if it is flat.
@@ -60,6 +70,8 @@ class Triangles:
     images: int
     height: int
     width: int
+    middle: tuple[float, float]
+    aspect: float
     rays: int
     count: int
     vertices: Any
@@ -67,6 +79,7 @@ class Triangles:
     normals: Any
     draw: Any
     placed: Any
+    directions: Any
     starts: Any
     slot: Any
 
@@ -102,8 +115,7 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
     placed = np.zeros((max(1, len(model)), 13))
     moved = product(camera_from_world[image], batch.world_from_object[image, slot])
     placed[: len(model), :12] = moved.reshape(-1, 12)
-    pixel = np.array([pixel_size(spec.height, fov) for fov in batch.fov_y_degrees.tolist()])
-    placed[: len(model), 12] = pixel[image]
+    placed[: len(model), 12] = batch.pixel_heights[image]
 
     shift = (first_face[model] - first_thread) % 2**32
     starts = np.stack([image, shift, first_vertex[model], first_normal[model]], axis=1)
@@ -111,6 +123,8 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
         images=len(batch),
         height=spec.height,
         width=spec.width,
+        middle=spec.middle,
+        aspect=spec.pixel_aspect,
         rays=rays,
         count=int(threads.sum()),
         vertices=vertices,
@@ -118,6 +132,7 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
         normals=normals,
         draw=upload(np.repeat(np.arange(len(model)), threads), np.uint32),
         placed=upload_table(placed),
+        directions=None if batch.directions is None else upload_table(batch.directions),
         starts=upload_rows([starts], np.uint32)[0],
         slot=upload(slot, np.uint32),
     )
@@ -158,30 +173,29 @@ def _cover(triangles: Triangles, keys: Any, thread: Any, start: Any, x: Any, y: 
     """
     draw = dr.gather(mi.UInt32, triangles.draw, thread)
     image = dr.gather(mi.Vector4u, triangles.starts, draw).x
-    a, b, c, size = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
-    left, top, columns, rows = _rectangle(triangles, a, b, c, size, x, y)
+    a, b, c, grid = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
+    middle = _middle(triangles, a, b, c)
+    left, top, columns, rows = _pixels(triangles, a, b, c, grid, middle, x, y)
     area = mi.UInt32(columns * rows)
     planes = [edge_plane(b, c), edge_plane(c, a), edge_plane(a, b)]
     normal = dr.cross(b - a, c - a)
     above = dr.dot(a, normal)
-    nearest = -dr.maximum(a.z, dr.maximum(b.z, c.z))
-    farthest = -dr.minimum(a.z, dr.minimum(b.z, c.z))
+    p, q, r = [_ahead(corner, middle) for corner in (a, b, c)]
+    nearest = dr.minimum(p, dr.minimum(q, r))
+    farthest = dr.maximum(p, dr.maximum(q, r))
     i = mi.UInt32(start)
     end = dr.minimum(area, start + CHUNK)
     row = mi.Int32(start) // dr.maximum(columns, 1)
     column = mi.Int32(start) - row * columns
-    while dr.hint(i < end, exclude=[triangles, keys]):
-        dx = (mi.Float(left + column) + x - triangles.width / 2) * size
-        dy = (triangles.height / 2 - (mi.Float(top + row) + y)) * size
-        sides = [dx * n.x + dy * n.y - n.z for n in planes]
+    while dr.hint(i < end, exclude=[triangles, keys, grid, middle]):
+        ray = ray_of(triangles, grid, left + column, top + row, x, y)
+        sides = [_dot(ray, n) for n in planes]
         inside = ((sides[0] >= 0) & (sides[1] >= 0) & (sides[2] >= 0)) | (
             (sides[0] <= 0) & (sides[1] <= 0) & (sides[2] <= 0)
         )
-        depth = above / (dx * normal.x + dy * normal.y - normal.z)
-        # Rounding must not move a hit on a triangle seen edge-on beyond its corners.
-        depth = dr.select(nearest > 0, dr.clip(depth, nearest, farthest), depth)
+        depth = _between(above / _dot(ray, normal), ray, middle, nearest, farthest)
         key = _key()(dr.reinterpret_array(mi.UInt32, depth)) << 32 | _key()(thread)
-        pixel = image * triangles.rays + mi.UInt32((top + row) * triangles.width + left + column)
+        pixel = image * triangles.rays + _number(triangles, left + column, top + row)
         active = inside & (depth > 0) & (depth < dr.inf)
         dr.scatter_reduce(dr.ReduceOp.Min, keys, key, pixel, active, mode=dr.ReduceMode.Direct)
         column += 1
@@ -192,7 +206,74 @@ def _cover(triangles: Triangles, keys: Any, thread: Any, start: Any, x: Any, y: 
     return area
 
 
-def nearest_triangle(triangles: Triangles, keys: Any, ray: Any, dx: Any, dy: Any) -> Any:
+def ray_of(triangles: Triangles, grid: Grid, column: Any, row: Any, x: Any, y: Any) -> Any:
+    """Return the components of the ray through the point (x, y) of a pixel, camera frame.
+
+    Rays of panoramas pass through the middles of pixels, whatever the point.
+    """
+    if triangles.directions is None:
+        return *grid.slopes(mi.Float(column) + x, mi.Float(row) + y), -1.0
+    return gather_row(triangles.directions, _number(triangles, column, row), 3)
+
+
+def _number(triangles: Triangles, column: Any, row: Any) -> Any:
+    """Return the number of a pixel in its image; columns of panoramas go around."""
+    width = triangles.width
+    if triangles.directions is not None:
+        column = dr.select(column < 0, column + width, column)
+        column = dr.select(column >= width, column - width, column)
+    return mi.UInt32(row * width + column)
+
+
+def _dot(ray: Any, n: Any) -> Any:
+    return ray[0] * n.x + ray[1] * n.y + ray[2] * n.z
+
+
+def _middle(triangles: Triangles, a: Any, b: Any, c: Any) -> Any:
+    """Return the direction of a triangle in a panorama; None for the direction of a flat image."""
+    return None if triangles.directions is None else unit(unit(a) + unit(b) + unit(c))
+
+
+def _ahead(corner: Any, middle: Any) -> Any:
+    return -corner.z if middle is None else dr.dot(corner, middle)
+
+
+def _between(depth: Any, ray: Any, middle: Any, nearest: Any, farthest: Any) -> Any:
+    """Return depth that rounding has not moved beyond the corners of a triangle seen edge-on."""
+    if middle is None:
+        return dr.select(nearest > 0, dr.clip(depth, nearest, farthest), depth)
+    share = _dot(ray, middle)
+    clipped = dr.clip(depth * share, nearest, farthest) / share
+    return dr.select((nearest > 0) & (share > 0), clipped, depth)
+
+
+def _pixels(
+    triangles: Triangles, a: Any, b: Any, c: Any, grid: Grid, middle: Any, x: Any, y: Any
+) -> tuple[Any, Any, Any, Any]:
+    """Return `_rectangle`; in panoramas that of the cap of the sphere around a triangle.
+
+    Its left column may be outside of the image, which goes around.
+    """
+    if middle is None:
+        return _rectangle(triangles, a, b, c, grid, x, y)
+    height, width = triangles.height, triangles.width
+    cosine = dr.minimum(dr.dot(unit(a), middle), dr.dot(unit(b), middle))
+    cosine = dr.minimum(cosine, dr.dot(unit(c), middle))
+    radius = dr.acos(dr.clip(cosine, -1, 1)) + dr.pi / height
+    radius = dr.select(radius < dr.pi / 2, radius, dr.pi)
+    level, longitude = dr.asin(dr.clip(middle.y, -1, 1)), dr.atan2(middle.x, -middle.z)
+    half = dr.asin(dr.minimum(dr.sin(radius) / dr.cos(level), 1))
+    half = dr.select(dr.abs(level) + radius < dr.pi / 2, half, 4)  # else a pole may be in the cap
+    left = dr.ceil((longitude - half) / dr.two_pi * width + (width / 2 - 0.5))
+    right = dr.floor((longitude + half) / dr.two_pi * width + (width / 2 - 0.5))
+    top = dr.ceil(height / 2 - 0.5 - (level + radius) / dr.pi * height)
+    bottom = dr.floor(height / 2 - 0.5 - (level - radius) / dr.pi * height)
+    top, bottom = dr.clip(top, 0, height), dr.clip(bottom, -1, height - 1)
+    columns = mi.Int32(dr.clip(right - left + 1, 0, width))
+    return mi.Int32(left), mi.Int32(top), columns, mi.Int32(dr.maximum(bottom - top + 1, 0))
+
+
+def nearest_triangle(triangles: Triangles, keys: Any, ray: Any, local: Any) -> Any:
     """Return what rays meet: depth (inf: nothing), object slot, and the normals there.
 
     These are the normal of the triangle and that of the smooth surface, in the frame of the unit
@@ -202,10 +283,10 @@ def nearest_triangle(triangles: Triangles, keys: Any, ray: Any, dx: Any, dy: Any
     Args:
         keys: as from `rasterise`, of the same points of the pixels.
         ray: index of the ray in `keys`.
-        dx, dy: its direction in the camera frame, where z is -1.
+        local: components of its direction in the camera frame, as from `ray_of`.
     """
     key = dr.gather(_key(), keys, ray)
-    hit, thread, draw, u, v = _barycentrics(triangles, key, dx, dy)
+    hit, thread, draw, u, v = _barycentrics(triangles, key, local)
     depth = dr.reinterpret_array(mi.Float, mi.UInt32(key >> 32))
     corners, vertex = _corners(triangles, thread, draw)
     slot = dr.gather(mi.UInt32, triangles.slot, draw, hit)
@@ -218,29 +299,25 @@ def nearest_triangle(triangles: Triangles, keys: Any, ray: Any, dx: Any, dy: Any
     return dr.select(hit, depth, dr.inf), slot, flat, smooth
 
 
-def color_of_nearest(
-    triangles: Triangles, keys: Any, ray: Any, dx: Any, dy: Any, colors: Any
-) -> Any:
+def color_of_nearest(triangles: Triangles, keys: Any, ray: Any, local: Any, colors: Any) -> Any:
     """Return the colour where rays meet what `nearest_triangle` finds, blended between corners.
 
     `colors` has RGB of the three corners of each triangle, (F, 9), in the order of all models.
     """
-    hit, thread, draw, u, v = _barycentrics(triangles, dr.gather(_key(), keys, ray), dx, dy)
+    hit, thread, draw, u, v = _barycentrics(triangles, dr.gather(_key(), keys, ray), local)
     face = thread + dr.gather(mi.Vector4u, triangles.starts, draw, hit).y
     row = gather_row(colors, dr.select(hit, face, 0), 9)
     p, q, r = (mi.Vector3f(*row[i : i + 3]) for i in (0, 3, 6))
     return (1 - u - v) * p + u * q + v * r
 
 
-def _barycentrics(triangles: Triangles, key: Any, dx: Any, dy: Any) -> tuple[Any, ...]:
+def _barycentrics(triangles: Triangles, key: Any, local: Any) -> tuple[Any, ...]:
     """Return whether a key is of a triangle, its thread and draw, and the hit's u and v on it."""
     hit = key != NOTHING
     thread = mi.UInt32(dr.select(hit, key & 0xFFFFFFFF, 0))
     draw = dr.gather(mi.UInt32, triangles.draw, thread, hit)
     a, b, c, _ = _in_camera(triangles, draw, _corners(triangles, thread, draw)[0])
-    sides = [
-        dx * n.x + dy * n.y - n.z for n in (edge_plane(b, c), edge_plane(c, a), edge_plane(a, b))
-    ]
+    sides = [_dot(local, n) for n in (edge_plane(b, c), edge_plane(c, a), edge_plane(a, b))]
     total = sides[0] + sides[1] + sides[2]
     inverse = dr.select(total == 0, 0, 1 / total)
     return hit, thread, draw, sides[1] * inverse, sides[2] * inverse
@@ -255,7 +332,7 @@ def _corners(triangles: Triangles, thread: Any, draw: Any) -> tuple[list[Any], l
 
 
 def _in_camera(triangles: Triangles, draw: Any, corners: list[Any]) -> tuple[Any, Any, Any, Any]:
-    """Return a triangle's corners in the camera frame, and the size of a pixel at depth 1."""
+    """Return a triangle's corners in the camera frame, and the grid of its pixels."""
     m = gather_row(triangles.placed, draw, 13)
     a, b, c = (
         mi.Vector3f(
@@ -264,7 +341,7 @@ def _in_camera(triangles: Triangles, draw: Any, corners: list[Any]) -> tuple[Any
         )
         for p in corners
     )  # fmt: skip
-    return a, b, c, m[12]
+    return a, b, c, Grid(*triangles.middle, m[12] * triangles.aspect, m[12])
 
 
 def _cross(a: Any, b: Any) -> Any:
@@ -285,7 +362,7 @@ def _cross(a: Any, b: Any) -> Any:
 
 
 def _rectangle(
-    triangles: Triangles, a: Any, b: Any, c: Any, size: Any, x: Any, y: Any
+    triangles: Triangles, a: Any, b: Any, c: Any, grid: Grid, x: Any, y: Any
 ) -> tuple[Any, Any, Any, Any]:
     """Return left column, top row, columns and rows of the pixels that a triangle may cover.
 
@@ -294,8 +371,8 @@ def _rectangle(
     """
     height, width = triangles.height, triangles.width
     corners = (a, b, c)
-    across = [corner.x / (-corner.z * size) + width / 2 for corner in corners]
-    down = [height / 2 - corner.y / (-corner.z * size) for corner in corners]
+    places = [grid.places(corner.x, corner.y, -corner.z) for corner in corners]
+    across, down = ([place[k] for place in places] for k in (0, 1))
     before = dr.minimum(a.z, dr.minimum(b.z, c.z)) < -BEHIND
     whole = dr.maximum(a.z, dr.maximum(b.z, c.z)) < -NEAR
     ahead = [corner.z < -NEAR for corner in corners]
@@ -304,8 +381,7 @@ def _rectangle(
         p, q = corners[i], corners[j]
         share = (-NEAR - p.z) / dr.select(ahead[i] != ahead[j], q.z - p.z, 1)
         right, up = p.x + share * (q.x - p.x), p.y + share * (q.y - p.y)
-        cut = right / (NEAR * size) + width / 2, height / 2 - up / (NEAR * size)
-        cuts.append((ahead[i] != ahead[j], *cut))
+        cuts.append((ahead[i] != ahead[j], *grid.places(right, up, NEAR)))
 
     def span(values: list[Any], part: int, at: Any, most: int) -> tuple[Any, Any]:
         low = dr.minimum(values[0], dr.minimum(values[1], values[2])) - at

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import drjit
 import mitsuba
 
+from scenegen.camera import Grid
 from scenegen.rendering.tables import unit
 
 dr: Any = drjit  # typed Any, as its stubs are not exact enough
@@ -81,21 +82,35 @@ class Room(Protocol):
         """Return whether a surface is nearer than `distance`."""
 
 
+class Sphere(NamedTuple):
+    """The pixels of a panorama, which shows all directions."""
+
+    width: Any
+    height: Any
+
+    def ray(self, x: Any, y: Any) -> Any:
+        """Return the components of unit vectors, camera frame, through places of the picture."""
+        right, ahead = dr.sincos(dr.two_pi * (x / self.width - 0.5))
+        up, level = dr.sincos(dr.pi * (0.5 - y / self.height))
+        return level * right, up, -level * ahead
+
+
 class Camera(NamedTuple):
-    """A camera on the device: axes and position, world, and the size of a pixel at depth 1."""
+    """A camera on the device: axes and position, world, and its pixels."""
 
     right: Any
     up: Any
     back: Any
     origin: Any
-    size: Any
-    width: Any
-    height: Any
+    pixels: Grid | Sphere
 
     def ray(self, x: Any, y: Any) -> Any:
         """Return directions through places of the picture, in pixels."""
-        right = self.right * ((x - self.width / 2) * self.size)
-        return unit(right + self.up * ((self.height / 2 - y) * self.size) - self.back)
+        if isinstance(self.pixels, Sphere):
+            right, up, back = self.pixels.ray(x, y)
+            return unit(self.right * right + self.up * up + self.back * back)
+        dx, dy = self.pixels.slopes(x, y)
+        return unit(self.right * dx + self.up * dy - self.back)
 
 
 class Samples(NamedTuple):

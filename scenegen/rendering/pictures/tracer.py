@@ -12,7 +12,7 @@ import mitsuba
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import pixel_size
+from scenegen.camera import Grid
 from scenegen.common.random.seeding import Purpose, item_rng, item_seed
 from scenegen.common.records import from_json
 from scenegen.description.interiors import Interior
@@ -29,7 +29,7 @@ from scenegen.rendering.pictures.development import develop
 from scenegen.rendering.pictures.lights import Window, lights_of
 from scenegen.rendering.pictures.matter import gather_matter
 from scenegen.rendering.pictures.paper_rooms import PaperRooms, with_intensities
-from scenegen.rendering.pictures.paths import Camera, Room, Samples, trace_paths
+from scenegen.rendering.pictures.paths import Camera, Room, Samples, Sphere, trace_paths
 from scenegen.rendering.pictures.sky import Outside, outside
 from scenegen.rendering.pictures.sun import SUNLESS, sun_height
 from scenegen.rendering.pixel_samples import sample_positions
@@ -54,8 +54,9 @@ def trace_images(batch: SceneBatch, variant: str) -> Array:
     item, pixel = index // (pixels * lanes), index // lanes % pixels
     row = gather_row(cameras, item, 13)
     right, up, back, origin = (mi.Vector3f(*row[i:12:4]) for i in range(4))
-    width, height = (dr.opaque(mi.Float, n) for n in (spec.width, spec.height))
-    camera = Camera(right, up, back, origin, row[12], width, height)
+    x, y = (dr.opaque(mi.Float, n) for n in spec.middle)
+    grid = Grid(x, y, row[12] * spec.pixel_aspect, row[12])
+    camera = Camera(right, up, back, origin, grid)
     seeds = np.array([path_seed(batch, b) for b in range(count)], np.uint64)
     halves = upload(seeds.astype("<u8").view("<u4"), np.uint32)
     low, high = (mi.UInt64(dr.gather(mi.UInt32, halves, 2 * item + i)) for i in range(2))
@@ -154,11 +155,12 @@ def _sums(
 
 def device_camera(batch: SceneBatch, b: int) -> Camera:
     """Return a camera. Its numbers are variables, so that all cameras share a kernel."""
-    spec = batch.spec
-    size = pixel_size(spec.height, float(batch.fov_y_degrees[b]))
-    numbers = [*batch.world_from_camera[b, :3].T.ravel().tolist(), size, spec.width, spec.height]
+    spec, lens = batch.spec, batch.lens(b)
+    pixels = lens.grid(spec.height, spec.width) if lens.is_flat else Sphere(spec.width, spec.height)
+    numbers = [*batch.world_from_camera[b, :3].T.ravel().tolist(), *pixels]
     values = [dr.opaque(mi.Float, float(number)) for number in numbers]
-    return Camera(*(mi.Vector3f(*values[i : i + 3]) for i in (0, 3, 6, 9)), *values[12:])
+    right, up, back, origin = (mi.Vector3f(*values[i : i + 3]) for i in (0, 3, 6, 9))
+    return Camera(right, up, back, origin, type(pixels)(*values[12:]))
 
 
 def _albedo(spec: InteriorSpec, room: Room, camera: Camera) -> Array:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import intrinsics
+from scenegen.camera import Lens, intrinsics
 from scenegen.description.scenes import PlacedObject
 from scenegen.objects.catalogue import Objects, objects_of
 from scenegen.objects.scene_mesh import welded, world_from_object
@@ -78,7 +78,7 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
         write_json(place / "scene_gt_info.json", infos)
     write_json(folder / f"{SPLIT}_targets_bop19.json", targets)
     # That of one image; `scene_camera.json` has each image's own.
-    write_json(folder / "camera.json", _sensor(spec, views[0].fov_y_degrees, encoding.depth_unit))
+    write_json(folder / "camera.json", _sensor(spec, views[0].lens, encoding.depth_unit))
     _write_models(folder / "models", models, objects)
     return {
         "world": "right-handed, z up: our (x, y, z) is (x, -z, y) here",
@@ -105,7 +105,7 @@ def _visible_instances(ids: list[int], infos: list[dict[str, Any]]) -> Counter[i
 
 def _camera(room: Room, depth_unit: float) -> dict[str, Any]:
     height, width = room.depth.shape
-    matrix = intrinsics(height, width, room.fov_y_degrees, pixel_centers="integer")
+    matrix = intrinsics(height, width, room.lens, pixel_centers="integer")
     rotation = FLIP @ (Z_UP[:3, :3] @ room.world_from_camera[:3, :3]).T
     position = Z_UP[:3, :3] @ room.world_from_camera[:3, 3]
     return {
@@ -116,8 +116,8 @@ def _camera(room: Room, depth_unit: float) -> dict[str, Any]:
     }
 
 
-def _sensor(spec: Any, fov: float, depth_unit: float) -> dict[str, Any]:
-    matrix = intrinsics(spec.height, spec.width, fov, pixel_centers="integer")
+def _sensor(spec: Any, lens: Lens, depth_unit: float) -> dict[str, Any]:
+    matrix = intrinsics(spec.height, spec.width, lens, pixel_centers="integer")
     names = {"fx": matrix[0, 0], "fy": matrix[1, 1], "cx": matrix[0, 2], "cy": matrix[1, 2]}
     size = {"width": spec.width, "height": spec.height}
     return {**names, **size, "depth_scale": depth_unit * MILLIMETRES}

@@ -58,7 +58,7 @@ def _write_scene(views: Sequence[Room], folder: Path, encoding: Encoding) -> Non
 
 def _camera_line(number: int, room: Room) -> str:
     height, width = room.depth.shape
-    matrix = intrinsics(height, width, room.fov_y_degrees, pixel_centers="half")
+    matrix = intrinsics(height, width, room.lens, pixel_centers="half")
     values = (matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2])
     return f"{number} PINHOLE {width} {height} " + " ".join(map(repr, map(float, values)))
 
@@ -88,11 +88,11 @@ def _add_points(
     tracks: list[list[str]] = [[] for _ in rows]
     for k, other in enumerate(views):
         height, width = other.depth.shape
-        pixels, _ = project(world, other.world_from_camera, height, width, other.fov_y_degrees)
+        pixels, _ = project(world, other.world_from_camera, height, width, other.lens)
         maps = (other.depth, other.normal, other.object_id, other.world_from_camera)
         seen = np.ones(len(rows), bool)
         if k != number:
-            seen = seen_from(world, ids, *maps, other.fov_y_degrees)
+            seen = seen_from(world, ids, *maps, other.lens)
         for i in np.flatnonzero(seen).tolist():
             tracks[i].append(f"{k + 1} {len(observations[k])}")
             x, y = pixels[i].tolist()

@@ -9,6 +9,7 @@ import numpy as np
 import png
 from numpy.typing import NDArray
 
+from scenegen.camera import intrinsics
 from scenegen.common.errors import SpecError
 from scenegen.common.srgb import encoded
 from scenegen.rooms.reader import Room
@@ -87,6 +88,13 @@ class Encoding:
             "world_from_camera": room.world_from_camera.tolist(),
             "fov_y_degrees": room.fov_y_degrees,
         }
+        if not room.lens.is_flat:
+            about["projection"] = room.lens.projection
+            about["depth"] = {**about["depth"], "kind": "distance along the ray"}
+        elif not room.lens.is_centred:
+            height, width = room.depth.shape
+            matrix = intrinsics(height, width, room.lens, pixel_centers="half")
+            about["intrinsics"] = matrix.tolist()
         return json.dumps(about, indent=1) + "\n"
 
 

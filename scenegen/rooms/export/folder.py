@@ -78,12 +78,14 @@ def export_folder(
         overwrite: replace an older folder of this function.
 
     Raises:
-        SpecError: an unknown format; no rows, rows out of range or twice; a value that does not
-            fit into its encoding.
+        SpecError: an unknown format, or one that has no panoramas; no rows, rows out of range or
+            twice; a value that does not fit into its encoding.
         OSError: as `folder_written_beside`.
         FileFormatError: a row is damaged.
     """
     check_choice("format", form, FOLDER_FORMATS)
+    kind = rooms.spec.projection  # "coco" has masks alone
+    check(kind == "perspective" or form == "coco", f"format {form}", kind, "perspective cameras")
     chosen = list(range(len(rooms)) if rows is None else rows)
     good = len(chosen) > 0 and min(chosen) >= 0 and max(chosen) < len(rooms)
     check(good, "items", f"{len(chosen)} rows", f"rows from 0 to {len(rooms) - 1}")

@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from scenegen.camera import look_at
 from scenegen.common.errors import SpecError
+from scenegen.common.records import check
 from scenegen.common.srgb import encoded
 from scenegen.description.interiors import WALLS
 from scenegen.objects.catalogue import Objects, changed_meshes, objects_of
@@ -56,8 +57,13 @@ class Faces(NamedTuple):
 
 
 def write(source: Any, folder: Path) -> dict[str, Any]:
-    """Write a `folder.Source`; return its conventions. Raises SpecError where meshes changed."""
+    """Write a `folder.Source`; return its conventions.
+
+    Raises SpecError where meshes changed, or the principal point is not the middle.
+    """
     spec = source.rooms.spec
+    middle = "the middle of the image, which cameras of glTF have"
+    check(spec.principal_point == (0.5, 0.5), "principal point", spec.principal_point, middle)
     objects = source.objects or objects_of(spec)
     for scene, views in source.views():
         if changed := changed_meshes(objects, views[0].scene):
@@ -128,7 +134,7 @@ class _Scene:
         return self.gltf.add("nodes", {**node, **told})
 
     def _cameras(self) -> None:
-        aspect = self.spec.width / self.spec.height
+        aspect = self.spec.width / self.spec.height * self.spec.pixel_aspect
         for i, camera in enumerate(self.scene.cameras):
             lens = {"yfov": float(np.radians(camera.fov_y_degrees)), "aspectRatio": aspect}
             told = {"type": "perspective", "perspective": {**lens, "znear": NEAR}}

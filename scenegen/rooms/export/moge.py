@@ -42,7 +42,7 @@ def write(source: Any, folder: Path) -> dict[str, Any]:
             write_png(folder / name / "normal.png", normal, 16)
             _write_segmentation(folder / name / "segmentation.png", room)
             height, width = room.depth.shape
-            matrix = intrinsics(height, width, room.fov_y_degrees, pixel_centers="half")
+            matrix = intrinsics(height, width, room.lens, pixel_centers="half")
             normalized = matrix / np.array([[width], [height], [1]])
             about = {
                 "intrinsics": normalized.tolist(),

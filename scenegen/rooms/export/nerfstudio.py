@@ -49,7 +49,7 @@ def _write_scene(views: Sequence[Room], folder: Path, encoding: Encoding) -> Non
             }
         )
     height, width = views[0].depth.shape
-    matrix = intrinsics(height, width, views[0].fov_y_degrees, pixel_centers="half")
+    matrix = intrinsics(height, width, views[0].lens, pixel_centers="half")
     about = {
         "camera_model": "OPENCV",
         "w": width,

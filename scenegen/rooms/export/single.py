@@ -80,7 +80,7 @@ def obj_writers(_room: Room, paths: list[Path], _how: Encoding, shape_of: ShapeO
 
 
 def write_exr(room: Room, path: str | Path) -> None:
-    """Write linear radiance R G B, planar depth Z, normal N.X N.Y N.Z and id, all float32.
+    """Write linear radiance R G B, depth Z, normal N.X N.Y N.Z and id, all float32.
 
     Z is infinite where nothing is hit, as compositing tools expect; id is -1 there.
     """
@@ -93,11 +93,11 @@ def write_exr(room: Room, path: str | Path) -> None:
         name: OpenEXR.Channel(name, np.ascontiguousarray(plane, np.float32))
         for name, plane in zip(names, (*planes, room.object_id), strict=True)
     }
+    kind = "planar depth" if room.lens.is_flat else "distance along the ray"
     header = {
         "compression": OpenEXR.ZIP_COMPRESSION,
         "type": OpenEXR.scanlineimage,
-        "comments": f"Z planar depth in {room.unit}s; N in the camera frame (x right, y up, -z"
-        " view)",
+        "comments": f"Z {kind} in {room.unit}s; N in the camera frame (x right, y up, -z view)",
     }
     OpenEXR.File(header, channels).write(str(path))
 

@@ -49,7 +49,7 @@ def _write_pair(pair: StereoPair, place: Path, encoding: Any) -> None:
         codes = np.where(np.isnan(disparity), 0, np.where(visible, BOTH, HIDDEN))
         write_png(place / f"mask{i}nocc.png", codes, 8)
     height, width = pair.left.depth.shape
-    matrix = intrinsics(height, width, pair.left.fov_y_degrees, pixel_centers="integer")
+    matrix = intrinsics(height, width, pair.left.lens, pixel_centers="integer")
     rows = "; ".join(" ".join(map(repr, row)) for row in matrix.tolist())
     known = pair.disparity[np.isfinite(pair.disparity)]
     low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)

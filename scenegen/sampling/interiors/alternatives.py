@@ -10,7 +10,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
-from scenegen.camera import Camera
 from scenegen.common.random.seeding import Purpose
 from scenegen.description.specs import InteriorSpec
 from scenegen.objects.catalogue import Objects
@@ -144,7 +143,7 @@ def _varied(
     cameras = _cameras(spec, space, draws, fov, degrees, focuses) if focuses else None
     if cameras is None:
         return
-    fov_y = Camera.fov_y_from_square(fov, spec.height, spec.width)
+    fov_y = spec.fov_y(fov)
     views = _Views(*cameras, math.tan(math.radians(fov_y) / 2), spec.width / spec.height)
     surface = (parent, *support[1:])
     for _ in range(SETS):

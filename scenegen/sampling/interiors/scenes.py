@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import Camera
 from scenegen.common.random.seeding import Purpose, item_numbers
 from scenegen.common.records import to_json
 from scenegen.description.interiors import Interior
@@ -123,7 +122,7 @@ def scene_arrays(
             rotation[row, k] = cosine, 0.0, sine, 0.0
         camera[row], target[row] = places, at
         degrees = item_room(spec, int(index[row]))[2]
-        fov[row] = Camera.fov_y_from_square(degrees, spec.height, spec.width)
+        fov[row] = spec.fov_y(degrees)
         told = Interior(
             room.size, room.openings, tuple(thing.stands_on for thing in things),
             room.hour, room.facing_degrees, room.lit,

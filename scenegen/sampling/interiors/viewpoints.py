@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import Camera, half_angle
+from scenegen.camera import Lens, half_angle
 from scenegen.common.rotations import cos_sin
 from scenegen.description.specs import InteriorSpec
 from scenegen.sampling.cameras import with_right_eyes
@@ -53,7 +53,7 @@ def draw_cameras(
     boxes = _table([thing.box for thing in space.placed])
     floor = focuses or [t.box for t in space.placed if t.piece.surfaces]
     floor = floor or [thing.box for thing in space.placed]
-    fov_y = Camera.fov_y_from_square(fov_degrees, spec.height, spec.width)
+    lens = spec.lens(spec.fov_y(fov_degrees))
     cosine, sine = cos_sin(np.array(spec.views if views is None else views) / 360)
     found: list[tuple[float, Array, Array]] = []
     for _ in range(TRIES):
@@ -79,7 +79,7 @@ def draw_cameras(
         ]
         cameras = with_right_eyes(spec, np.array(places), np.tile(target, (len(places), 1)))
         pairs = zip(*(values.tolist() for values in cameras), strict=True)
-        shown = [_shown(place, at, space, boxes, fov_y, spec) for place, at in pairs]
+        shown = [_shown(place, at, space, boxes, lens, spec) for place, at in pairs]
         if all(shown):
             found.append((min(shown), *cameras))
     return max(found, key=lambda one: one[0])[1:] if found else None
@@ -93,7 +93,7 @@ def _table(boxes: list[Box]) -> Array:
 
 
 def _shown(
-    place: Place, target: Place, space: Space, boxes: Array, fov_y: float, spec: InteriorSpec
+    place: Place, target: Place, space: Space, boxes: Array, lens: Lens, spec: InteriorSpec
 ) -> float:
     """Return how much a camera shows; 0 where it is not free, or something stands right before it.
 
@@ -109,7 +109,7 @@ def _shown(
     outside = np.maximum(np.abs(start) - half, 0.0)
     if (np.sqrt((outside * outside).sum(axis=0)) < CLEAR).any():
         return 0.0
-    hit = _met(place, target, start, half, c, s, fov_y, spec.width / spec.height)
+    hit = _met(place, target, start, half, c, s, lens.edges(spec.height, spec.width))
     near = hit.min(axis=1)
     if (near <= NEAREST).any() or (near < NEAR).mean() > SHARE_NEAR:
         return 0.0
@@ -119,7 +119,7 @@ def _shown(
     too_large = max(float(rays.max(initial=0.0)) - LARGEST, 0.0)
     tall = hit[:, :-1][:, boxes[:, 5] > TALL].min(axis=1, initial=np.inf)
     hidden = float((tall < NEAR_TALL).mean())
-    before = _before(place, target, boxes, fov_y) / max(len(boxes), 1)
+    before = _before(place, target, boxes, lens.fov_y_degrees) / max(len(boxes), 1)
     shown = several + before + 3 * min(1 - empty, FURNISHED) - 3 * (too_large + hidden)
     return max(shown, LEAST_SHOWN)
 
@@ -136,8 +136,8 @@ def _before(place: Place, target: Place, boxes: Array, fov_y: float) -> int:
 
 
 def _met(
-    place: Place, target: Place, start: Array, half: Array, c: Array, s: Array, fov_y: float,
-    aspect: float,
+    place: Place, target: Place, start: Array, half: Array, c: Array, s: Array,
+    edges: tuple[float, float, float, float],
 ) -> Array:  # fmt: skip
     """Return the distance along some rays of the picture to each box, inf for none, (R, N + 1).
 
@@ -149,10 +149,7 @@ def _met(
     right /= np.sqrt((right * right).sum())
     up = np.array([back[1] * right[2], back[2] * right[0] - back[0] * right[2],
                    -back[1] * right[0]])  # fmt: skip
-    cosine, sine = half_angle(fov_y)
-    edge = sine / cosine
-    u, v = np.meshgrid(np.linspace(-aspect * edge, aspect * edge, COLUMNS),
-                       np.linspace(-edge, edge, ROWS))  # fmt: skip
+    u, v = np.meshgrid(np.linspace(*edges[:2], COLUMNS), np.linspace(*edges[:1:-1], ROWS))
     rays = u.reshape(-1, 1) * right + v.reshape(-1, 1) * up - back
     dx, dy, dz = (rays[:, i, None] for i in range(3))
     along = np.stack([c * dx - s * dz, dy + 0 * c, s * dx + c * dz])  # (3, R, N)

@@ -11,7 +11,9 @@ from perspective_splits import SETTINGS
 import cli
 from iqtt import QuestionStream
 from iqtt.files.reader import QuestionsFile
+from iqtt.floors import Floor, Measured, settings_of, to_json
 from iqtt.perspective.specs import perspective_spec
+from iqtt.questions.kinds import ROOM_KINDS
 from iqtt.vlm.rows import Asked, vlm_rows
 
 
@@ -27,10 +29,18 @@ def test_the_oracle_is_scored_by_type_and_angle(rooms_folder, tmp_path, name):
     ran("bench", "baseline", "oracle-warp", "--data", rooms_folder / name,
         "--out", tmp_path / "o.h5")  # fmt: skip
     truth = rooms_folder / name.replace("test", "test-answers")
-    ran("bench", "score", tmp_path / "o.h5", "--truth", truth, "--json", scores)
-    groups = json.loads(scores.read_text())["answer_groups"]
+    with QuestionsFile(rooms_folder / name) as table:
+        settings = settings_of(table.spec)
+    floors = tmp_path / "floors.json"
+    known = tuple(Floor(kind, "same place, nearest", 0.5, 100) for kind in ROOM_KINDS)
+    floors.write_text(to_json([Measured(settings, known)]))
+    ran("bench", "score", tmp_path / "o.h5", "--truth", truth, "--json", scores,
+        "--baselines", floors)  # fmt: skip
+    record = json.loads(scores.read_text())
+    groups = record["answer_groups"]
     assert set(groups["by_distractor"]) <= {"moved", "turned"}
     assert set(groups["by_rotation_angle"]) <= {"20-40", "40-60"}
+    assert {f["kind"] for f in record["meta"]["question_floors"]} == set(groups["by_distractor"])
 
 
 def test_baselines_of_shapes_are_refused(rooms_folder, tmp_path):

@@ -27,7 +27,7 @@ from metrics.measures.surfaces.normals import (
 from metrics.measures.surfaces.patches import surface_distances, surface_of
 from metrics.measures.surfaces.points import departures, local_point_scores, point_map_scores
 from metrics.scoring.metric_names import metric
-from scenegen.camera import back_project, pixel_directions, pixel_size
+from scenegen.camera import back_project, pixel_directions
 
 Array = np.ndarray[Any, Any]
 SIZE, FOV = 12, 40.0
@@ -59,10 +59,9 @@ def normals(p, t):
 
 def surfaces(p, t):
     both = [
-        surface_of(points(d), normals_from_depth(d, FOV)[0].reshape(-1, 3), pixel_size(SIZE, FOV),
-                   WHOLE)
+        surface_of(points(d), normals_from_depth(d, FOV)[0].reshape(-1, 3), FOV, WHOLE)
         for d in (p, t)
-    ]  # fmt: skip
+    ]
     nearest = nearest_distances(points(p), points(t))
     return point_scores(surface_distances(both[0], both[1], nearest, True))
 

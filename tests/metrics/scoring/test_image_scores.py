@@ -191,7 +191,7 @@ def test_an_image_without_a_plane_has_no_score_of_derived_normals(folder):
         room = rooms[0]
     row = np.zeros(room.depth.shape, bool)
     row[len(row) // 2] = True  # rounding alone would choose a side of its planes
-    camera = room.fov_y_degrees, room.world_from_camera
+    camera = room.lens, room.world_from_camera
     depth = np.where(row, room.depth, np.nan)
     view = TrueView(depth, room.normal, np.where(row, room.object_id, -1), *camera)
     same = PredictedView("depth", "none", np.nan_to_num(depth, nan=1.0).astype(float), None)
@@ -236,9 +236,9 @@ def closed(interior_path):
     """The view of a closed room, and the depth of its walls."""
     with RoomsFile(interior_path) as rooms:
         room, size = rooms[0], np.asarray(rooms.room_size(0), float)
-    names = ("depth", "normal", "object_id", "fov_y_degrees", "world_from_camera")
+    names = ("depth", "normal", "object_id", "lens", "world_from_camera")
     view = TrueView(*(getattr(room, name) for name in names), size)
-    empty, _ = empty_room(view.world_from_camera, view.fov_y_degrees, *view.depth.shape, size)
+    empty, _ = empty_room(view.world_from_camera, view.lens, *view.depth.shape, size)
     return view, empty
 
 
@@ -255,7 +255,7 @@ def test_leaning_cut_outs_lean_half_as_much_as_the_walls(closed):
 
 def test_true_points_of_a_closed_room_are_perfect_and_the_worst_are_as_far_as_it(closed):
     view, _ = closed
-    points = back_project(np.nan_to_num(view.depth, nan=1.0), view.fov_y_degrees)
+    points = back_project(np.nan_to_num(view.depth, nan=1.0), view.lens)
     pose = view.world_from_camera.copy()
     pose[:3, 3] *= 10.0
     far = replace(

@@ -31,8 +31,9 @@ def out(make_rooms, tmp_path_factory):
 def exported(make_rooms, tmp_path_factory, kind):
     folder = tmp_path_factory.mktemp(kind)
     if kind == "shapes":
-        make_rooms(folder / "x.h5", 4, seed=3, views=(0.0, 20.0), height=64, width=80,
-                   shapes=("box", "sphere", "cone"), objects=(2, 3), fov_degrees=40.0)  # fmt: skip
+        make_rooms(folder / "x.h5", 2, seed=3, views=(0.0, 20.0), height=64, width=80,
+                   objects=(3, 3), shapes=("box", "pyramid", "octahedron"),
+                   fov_degrees=40.0)  # fmt: skip
     else:
         make_dataset(folder / "x.h5", preset_spec("interiors", height=96, width=96, spp=16, seed=6,
                      objects=(8, 12), views=(0.0, 12.0), denoise=False), 1)  # fmt: skip

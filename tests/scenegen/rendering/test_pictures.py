@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from scenegen.camera import Grid
 from scenegen.common.errors import FileFormatError
 from scenegen.rendering.backend import point_to_llvm
 from scenegen.rendering.materials.material import Material
@@ -132,7 +133,7 @@ def radiance_of_floor(lamp=None, sky=0.0, sun=(0.0, 0.0), windows=(), share=0.0,
     around = Outside(np.full((8, 16, 3), sky, np.float32), up, np.full(3, sun[1]))
     lights = lights_of(around, windows, corners, radiance, share)
     axes = (mi.Vector3f(*map(float, v)) for v in ((1, 0, 0), (0, 0, -1), (0, 1, 0), (0.5, 1, 0)))
-    camera = Camera(*axes, *map(mi.Float, (1e-4, 4, 4)))
+    camera = Camera(*axes, Grid(*map(mi.Float, (2, 2, 1e-4, 1e-4))))
     lanes, each = dr.arange(mi.UInt32, 256), spp // 256
     sums = trace_paths(
         closed_room(matter, lights), camera, mi.Float(lanes % 4), mi.Float(1),
