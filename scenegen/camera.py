@@ -211,7 +211,7 @@ def back_project(depth: Array, lens: Lens | float) -> NDArray[np.float64]:
 
 
 def pixels_of(
-    points: Array, shape: tuple[int, ...], fov_y_degrees: float
+    points: Array, shape: tuple[int, ...], lens: Lens | float
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
     """Return row and column of points (N, 3), camera frame, and which are in an image, (N,) each.
 
@@ -220,9 +220,8 @@ def pixels_of(
     height, width = shape
     ahead = points[:, 2] < 0.0
     depth = np.where(ahead, -points[:, 2], 1.0)
-    pixel = pixel_size(height, fov_y_degrees)
-    column = np.floor(points[:, 0] / depth / pixel + width / 2.0)
-    row = np.floor(height / 2.0 - points[:, 1] / depth / pixel)
+    places = as_lens(lens).grid(height, width).places(points[:, 0], points[:, 1], depth)
+    column, row = map(np.floor, places)
     inside = ahead & (column >= 0) & (column < width) & (row >= 0) & (row < height)
     row, column = (np.where(inside, at, 0).astype(np.int64) for at in (row, column))
     return row, column, inside

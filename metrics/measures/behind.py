@@ -5,11 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-<<<<<<< HEAD
-from scenegen.camera import pixels_of
-=======
-from scenegen.camera import Lens, as_lens
->>>>>>> main
+from scenegen.camera import Lens, pixels_of
 
 Array = NDArray[Any]
 
@@ -39,15 +35,7 @@ def hidden_from(
     height, width = first_depth.shape
     rotation, origin = first_world_from_camera[:3, :3], first_world_from_camera[:3, 3]
     seen = (points - origin) @ rotation
-<<<<<<< HEAD
-    row, column, inside = pixels_of(seen, first_depth.shape, fov_y_degrees)
-=======
-    depth = -seen[:, 2]
-    ahead = np.where(depth > 0.0, depth, 1.0)
-    grid = as_lens(lens).grid(height, width)
-    column, row = map(np.floor, grid.places(seen[:, 0], seen[:, 1], ahead))
-    outside = (depth <= 0.0) | (column < 0) | (column >= width) | (row < 0) | (row >= height)
->>>>>>> main
+    row, column, inside = pixels_of(seen, first_depth.shape, lens)
     away = ((origin - points) * normals).sum(axis=1) <= 0.0
     seen_depth = np.where(np.isfinite(first_depth), first_depth, np.inf).astype(np.float64)
     padded = np.pad(seen_depth, 1, mode="edge")

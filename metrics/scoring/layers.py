@@ -140,14 +140,7 @@ def true_points(truth: RoomsFile, row: int) -> list[NDArray[Any]] | None:
     for draw in whole.DRAWS[1:]:
         points = (whole.drawn_points(triangles, row, draw) - place) @ rotation
         depth = -points[:, 2]
-<<<<<<< HEAD
-        line, column, inside = pixels_of(points, (height, width), room.fov_y_degrees)
-=======
-        places = room.lens.grid(height, width).places(points[:, 0], points[:, 1], depth)
-        column, line = (np.floor(place).astype(int) for place in places)
-        inside = (column >= 0) & (column < width) & (line >= 0) & (line < height)
-        line, column = np.where(inside, line, 0), np.where(inside, column, 0)
->>>>>>> main
+        line, column, inside = pixels_of(points, (height, width), room.lens)
         for i, j in np.ndindex(3, 3):
             start, end = starts[:, line + i, column + j], ends[:, line + i, column + j]
             deep = (start + whole.NEAR < depth) & (depth < end - whole.NEAR)
