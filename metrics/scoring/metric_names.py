@@ -437,7 +437,8 @@ TABLE: Sequence[Metric] = (
            baselines=(*_FLAT_OR_EMPTY, LEANING), **_INSIDE),
     _correlation("shape_correlation", "Shape correlation",
                  "correlation between predicted and true depth inside objects, after the"
-                 " least-squares plane of each object is subtracted from both.", lacking="bends", **_SURFACE),
+                 " least-squares plane of each object is subtracted from both.",
+                 lacking="bends", **_SURFACE),
     _share("shape_recall_0.02", "Shapes within 0.02",
            "fraction of objects with a `shape_error` below 0.02 scene units.",
            of="points", **_INSIDE),
