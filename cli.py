@@ -33,7 +33,7 @@ def iqtt() -> None:
 @click.group(cls=PackageCommands, modules=SCORES)
 @click.version_option(package_name="pix2shape-bench")
 def bench() -> None:
-    """Evaluate models: run them, import and score their predictions, compare the scores."""
+    """Evaluate models: run a model or import its predictions, then score and compare."""
 
 
 @click.group(

@@ -60,23 +60,24 @@ ALL = {
     "constant": Named(ROOMS, "a constant depth, the mean over the images of --train", needs=TRAIN),
     "mean-depth": Named(ROOMS, "the mean depth of --train at each pixel", needs=TRAIN),
     "empty-room": Named(ROOMS, "ground-truth walls and ground, no objects"),
-    "cut-out": Named(ROOMS, "ground-truth masks, flat, at the true distance of each object"),
+    "cut-out": Named(ROOMS, "flat objects with true masks, at the true distance of each object"),
     "picture-outline": Named(ROOMS, "a foreground mask from the image, at a constant height"),
-    "balls": Named(ROOMS, "a sphere for each component of the outline mask in the first view"),
-    "outline-regression": Named(ROOMS, "the outline mask, heights by a regression", needs=TRAIN),
-    "outline-relief": Named(ROOMS, "the outline mask, heights by trees", needs=TRAIN),
-    "nearest": Named(ROOMS, "the heights of the most similar image of --train", needs=TRAIN),
+    "balls": Named(ROOMS, "a sphere for each connected part of the foreground mask"),
+    "outline-regression": Named(ROOMS, "a foreground mask, with heights from a regression",
+                                needs=TRAIN),
+    "outline-relief": Named(ROOMS, "a foreground mask, with heights from trees", needs=TRAIN),
+    "nearest": Named(ROOMS, "the height map of the most similar image of --train", needs=TRAIN),
     "oracle": Named(ROOMS, "the ground truth, which scores perfectly"),
     "chance": Named(QUESTIONS, "random options"),
     "oracle-warp": Named(QUESTIONS, "true depth of rooms, warped into the other camera"),
-    "cubes": Named(CUBES, "images decoded to 3D cubes; nothing is learned"),
+    "cubes": Named(CUBES, "decodes images to 3D cubes; nothing is learned"),
     "outline": Named(QUESTIONS, "the most similar silhouette, without labels or 3D"),
-    "features": Named(QUESTIONS, "features of a frozen encoder, given by --features",
+    "features": Named(QUESTIONS, "features of a frozen encoder, from --features",
                       needs=("features",), takes=("train_features", *LABELS)),
     "outline-trees": Named(QUESTIONS, "trees on silhouette features", needs=TRAIN, takes=LABELS),
     "pix2shape": Named(BOTH, "Pix2Shape, trained with the losses of the paper", "pix2shape"),
     "pix2shape-compact": Named(BOTH, "Pix2Shape, trained with other losses", "pix2shape"),
-    "pix2shape-rays": Named(ROOMS, "Pix2Shape, given the walls, trained on several views",
+    "pix2shape-rays": Named(ROOMS, "Pix2Shape with true walls, trained on several views",
                             "pix2shape"),
     "pix2shape-views": Named(CUBES, "Pix2Shape with a separate encoder", "pix2shape"),
     "cnn": Named(QUESTIONS, "ResNets and a softmax over the options", "resnets.cnn"),
@@ -122,13 +123,14 @@ def _listed(names: Iterable[str]) -> str:
 @click.option(
     "--labels",
     type=click.IntRange(1, LARGEST),
-    help="Number of labelled questions of --train for outline-trees and features [all].",
+    help="Number of labelled questions of --train that outline-trees and features use [default:"
+    " all].",
 )
 @click.option(
     "--features",
     type=InputPath(),
-    help="For features: a .npy file of shape (Q, 1 + K, D), for the reference and the K options of"
-    " the Q questions of --data.",
+    help="Input of the baseline features: a .npy file of shape (Q, 1 + K, D). It has one vector for"
+    " the reference and for each of the K options, for all Q questions of --data.",
 )
 @click.option(
     "--train-features",
@@ -142,13 +144,13 @@ def _listed(names: Iterable[str]) -> str:
     type=click.IntRange(0, LARGEST),
     default=0,
     show_default=True,
-    help="Random seed of chance.",
+    help="Random seed of the baseline chance.",
 )
 @click.option(
     "--weights",
     type=WEIGHTS_PATH,
-    help="Weights of a trained baseline: a .safetensors file, or for pix2shape* the name of bundled"
-    " weights [the bundled weights for this kind of data].",
+    help="Weights of a trained baseline: a .safetensors file. The pix2shape baselines also take the"
+    " name of bundled weights [default: the bundled weights for this type of data].",
 )
 @OVERWRITE
 def baseline(
@@ -164,7 +166,7 @@ def baseline(
     allow_test_set: bool,
     overwrite: bool,
 ) -> None:
-    """Predict rooms or questions with a baseline, and write the predictions."""
+    """Run a baseline on rooms or questions, and write its predictions."""
     from baselines.training.data import refuse_test_set
     from scenegen.files.sets.shards import OpenFile
 
@@ -262,19 +264,19 @@ def _check_task(name: str, data: str) -> None:
     type=InputPath(),
     multiple=True,
     metavar="FILE...",
-    help="Training files of rooms or questions. Depth networks take several files.",
+    help="Training files of rooms or questions. Only depth networks take several files.",
 )
 @click.option("--out", type=OutputFolder(), required=True, help="Output folder of the run.")
 @click.option(
     "--labels",
     type=click.IntRange(0, LARGEST),
-    help="Number of labelled questions to use [the default of the baseline].",
+    help="Number of labelled questions to use [default: the setting of the baseline].",
 )
-@click.option("--seed", type=click.IntRange(0, LARGEST), help="Random seed [0].")
+@click.option("--seed", type=click.IntRange(0, LARGEST), help="Random seed [default: 0].")
 @click.option(
     "--iterations",
     type=click.IntRange(1, LARGEST),
-    help="Number of training steps [the default of the baseline].",
+    help="Number of training steps [default: the setting of the baseline].",
 )
 @click.option(
     "--set",
@@ -354,7 +356,10 @@ def _baseline(name: str) -> "Baseline":
 @click.command(epilog=f"{EXAMPLE}bench probe hf:facebook/dinov2-base --data iqtt --out dinov2")
 @click.argument("model", metavar="hf:NAME")
 @click.option(
-    "--data", type=InputPath(), required=True, help="Folder of a split, with its answer key."
+    "--data",
+    type=InputPath(),
+    required=True,
+    help="Folder of questions from `iqtt make-split`, with the answer key.",
 )
 @click.option("--out", type=OutputFolder(), required=True, help="Output folder, which must be new.")
 @click.option(
@@ -367,9 +372,9 @@ def _baseline(name: str) -> "Baseline":
 def probe(model: str, data: str, out: str, device: str, batch: int) -> None:
     """Measure how well each layer of a frozen encoder recognises a shape in two images.
 
-    For each layer, the response is the option with the highest cosine similarity to the reference;
-    nothing is trained. The output folder holds predictions and scores of each layer, and layers.png
-    with the curve of accuracy over layers.
+    For each layer, the response is the option with the highest cosine similarity to the reference.
+    Nothing is trained. The output folder contains the predictions and scores of each layer. Its
+    figure layers.png shows the accuracy of each layer.
     """
     needs_torch("bench probe", ("torch", "transformers"))
     from baselines import features

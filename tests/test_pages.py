@@ -10,7 +10,7 @@ from page_blocks import ROOT, blocks, missing_lines, run_block
 
 from metrics.submissions.reader import open_predictions
 
-RUN_ELSEWHERE = {"training-data.md", "tutorial.md", "vlm.md", "evaluate.md"}
+RUN_ELSEWHERE = {"training-data.md", "tutorial.md", "evaluate.md"}
 CLUSTER = {"scale.md"}  # needs a scheduler and its workers
 
 
@@ -118,15 +118,37 @@ def test_loaders_and_streams_give_every_row(tmp_path):
         assert [text for code, text in printed.items() if words in code] == [lines]
 
 
-@pytest.mark.slow
-def test_the_page_runs(tmp_path):
-    def smaller(code):
-        return code.replace("--size 256", "--size 64").replace("--train 10", "--train 10 --size 64")
+TASK = """
+import inspect_ai
+from inspect_ai.model import ModelOutput, ModelUsage, get_model
+from pix2shape_bench import iqtt
 
-    printed = [
-        run_block(language, title, smaller(code), tmp_path)
-        for language, title, code in blocks("vlm.md")
-    ]
-    rows = dict(line.split()[:2] for line in printed[1].splitlines() if len(line.split()) == 2)
+def always_b(*_):
+    output = ModelOutput.from_content("mockllm", "The answer is picture B.")
+    return output.model_copy(update={"usage": ModelUsage(input_tokens=1, output_tokens=1)})
+
+model = get_model("mockllm/model", custom_outputs=always_b)
+(log,) = inspect_ai.eval(iqtt("val-vlm"), model=model, log_dir="logs", display="none")
+for score in log.results.scores:
+    for name, metric in score.metrics.items():
+        print(name, metric.value)
+"""
+BEFORE = """
+iqtt make-split --train 10 --size 64 --val 12 --test 12 --out questions
+iqtt export questions/iqtt-val.h5 --format vlm --rotations 3 --size 64 --out val-vlm
+"""
+AFTER = """
+bench import --responses logs/*.eval --data questions/iqtt-val.h5 --method always-b --out b.h5
+bench score b.h5 --truth questions/iqtt-val.h5
+"""
+
+
+@pytest.mark.slow
+def test_the_task_of_a_folder_runs_in_inspect(tmp_path):
+    """The mock model needs no network."""
+    run_block("bash", "", BEFORE, tmp_path)
+    printed = run_block("python", "", TASK, tmp_path).splitlines()
+    rows = dict(line.split() for line in printed if len(line.split()) == 2)
     assert float(rows["circular_accuracy"]) == 0.0
     assert 0 <= float(rows["accuracy"]) <= 0.7
+    run_block("bash", "", AFTER, tmp_path)

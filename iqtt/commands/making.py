@@ -72,14 +72,14 @@ option = partial(click.option, show_default=True)
     "--secret-seed",
     type=InputPath(),
     metavar="FILE",
-    help="File with the seed of a private test set. The seed is stored in no output file.",
+    help="File with the seed of a private test set. No output file stores the seed.",
 )
 @option("--cubes", type=Range(int), default="8-11", help="Number of cubes of a shape.")
 @option(
     "--shapes",
     type=click.Choice(["chain", "tree"]),
     default="chain",
-    help="chain: self-avoiding chains of cubes; tree: branching shapes as well.",
+    help="chain: self-avoiding chains of cubes; tree: chains and branching shapes.",
 )
 @option(
     "--distractors",
@@ -98,8 +98,8 @@ option = partial(click.option, show_default=True)
     former="--answers",
     type=int,
     default=3,
-    help="Number of options per question, 3 or 2. One option is correct. Questions about rooms have"
-    " 3.",
+    help="Number of options per question, 3 or 2. One option is correct. Questions about rooms"
+    " always have 3.",
 )
 @click.option(
     "--angle",
@@ -167,8 +167,8 @@ option = partial(click.option, show_default=True)
     "--shard-size",
     type=int,
     default=10_000,
-    help="Maximum number of questions per file. Larger parts are split into shards that read as one"
-    " file.",
+    help="Maximum number of questions per file. Larger parts are split into several files (shards),"
+    " which can be read as one file.",
 )
 @options.SCHEDULER
 @options.DEVICE
@@ -191,8 +191,8 @@ def make_split(
 
     Each question has a reference and options. One option shows the shape of the reference. All
     cubes of a shape are visible in every image. No shape and no mirror image of a shape is shared
-    between training, validation and test. Re-run the same command to resume an interrupted run with
-    shards.
+    between training, validation and test. To resume an interrupted run that writes several files
+    (shards), run the same command again.
     """
     from iqtt.files import make
     from iqtt.files.split import ALL_FILES

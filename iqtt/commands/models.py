@@ -9,21 +9,20 @@ from scenegen.command_line.paths import InputPath
 # fmt: off
 model_options = together(  # those of `iqtt.vlm.rows.Asked`
     click.option("--answer-key", "answers", cls=Renamed, former="--answers", type=InputPath(),
-                 help="Answer key of a test file. The key also holds the cubes to draw"
-                 " [default: the one next to FILE]."),
+                 help="Answer key of a test file. The answer key also contains the cubes, from"
+                 " which the images are rendered [default: the answer key next to FILE]."),
     click.option("--with-answer-key", "with_answers", cls=Renamed, former="--with-answers",
                  is_flag=True,
                  help="Include the answer key of test questions in the output, so that Inspect can"
-                 " score."),
+                 " compute scores."),
     click.option("--layout", type=click.Choice(["composed", "separate"]), default="composed",
-                 show_default=True, help="composed: one image per question; separate: one image"
-                                         " per reference and"
-                 " option."),
+                 show_default=True, help="composed: one image shows the reference and all options;"
+                 " separate: the reference and each option have separate images."),
     click.option("--rotations", type=click.IntRange(1, 3), default=1, show_default=True,
-                 help="Number of option orders in which each question is asked: 1, or the number of"
-                 " options (CircularEval)."),
+                 help="Number of option orders in which each question is asked. CircularEval"
+                 " accuracy needs as many orders as there are options."),
     click.option("--size", type=click.IntRange(SMALLEST, LARGEST), default=SIZE, show_default=True,
-                 help="Shorter side of each image, in pixels."),
+                 help="Shorter side of the image of the reference or of an option, in pixels."),
     click.option("--items", type=Items(), help="Questions to use [default: all]."),
 )
 # fmt: on

@@ -86,7 +86,7 @@ def info(file: str) -> None:
     "--cubes",
     type=InputPath(),
     metavar="SHAPES.json",
-    help="Audit the questions of a JSON file of cubes and rotations instead.",
+    help="Audit the questions of a JSON file with cubes and rotations instead of SPLIT.",
 )
 @option("--json", "json_path", type=OutputPath(), help="Write all numbers to a JSON file.")
 @option("--markdown", is_flag=True, help="Print the tables as Markdown.")
@@ -97,7 +97,7 @@ def info(file: str) -> None:
     former="--probed",
     type=click.IntRange(0),
     default=20_000,
-    help="Maximum number of questions that the shortcut classifiers are run on.",
+    help="Maximum number of questions for the shortcut classifiers.",
 )
 @options.SCHEDULER
 @options.OVERWRITE
@@ -114,12 +114,12 @@ def audit(
 ) -> None:
     """Check that questions are correct, and search them for shortcuts.
 
-    SPLIT is a question file, a folder of question files (also of the released 3D-IQTT files), or a
-    folder of such folders.
+    SPLIT is a question file, a folder of question files, or a folder of such folders. The command
+    also reads the released 3D-IQTT files.
 
-    Proofs recompute each property of the questions with code that is independent of the generator.
-    Shortcut classifiers try to select the correct option without comparing shapes. The exit code is
-    1 if a proof fails, or if there are no questions.
+    Proofs compute each property of the questions again, with code that is independent of the
+    generator. Shortcut classifiers try to select the correct option without comparing shapes. The
+    exit code is 1 if a proof fails, or if there are no questions.
     """
     from iqtt.audit import report
     from iqtt.audit.audit import audit as audit_files
@@ -197,11 +197,11 @@ def floors(
 ) -> None:
     """Measure the accuracy of 2D-only baselines for the settings of SPLIT.h5.
 
-    The command makes new questions about shapes of the training split, which takes minutes, and
-    answers them with all shortcut classifiers of `iqtt audit` that use the images alone. For
-    questions about rooms, these classifiers also get the true masks of objects. The best
-    accuracy becomes the baseline of `bench score --baselines`. The baselines of the
-    presets are part of the package.
+    The command makes new questions about shapes of the training split, which takes minutes. All
+    shortcut classifiers of `iqtt audit` that use only images answer these questions. For questions
+    about rooms, they also get the true masks of objects. The best accuracy is the baseline. Pass
+    the output file to `bench score --baselines`. This package contains the baselines of the
+    presets.
     """
     from iqtt.files.reader import open_tables
     from iqtt.floor_probes import floor_specs, measure_floors

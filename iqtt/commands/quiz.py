@@ -18,7 +18,7 @@ option = partial(click.option, show_default=True)
 @click.argument("file", type=InputPath(), metavar="QUESTIONS.h5")
 @option("--out", type=OutputPath(), default="quiz.html", help="Output page.")
 @option("--questions", type=int, default=20, help="Number of scored questions. All participants"
-                                                  " get the same.")
+                                                  " get the same questions.")
 @option("--practice", type=int, default=2,
         help="Number of practice questions, which come first and give feedback. The paper used 1.")
 @option("--seed", type=click.IntRange(0, LARGEST), default=0, help="Seed of the choice of"
@@ -33,12 +33,12 @@ def quiz(
     file: str, out: str, questions: int, practice: int, seed: int, contact: str, post: str,
     overwrite: bool,
 ) -> None:
-    """Write one HTML page that asks people the questions of QUESTIONS.h5, without a server.
+    """Write an HTML page on which people answer the questions of QUESTIONS.h5.
 
-    Open the page locally, or upload it to any web host. Each participant answers a few practice
-    questions, then the scored questions in random order. At the end, the browser saves the
-    responses as a JSON file for `bench import --quiz`. The page holds the correct options of the
-    practice questions only.
+    The page works without a server: open the file, or upload it to any web host. Each participant
+    answers a few practice questions, then the scored questions in random order. At the end, the
+    browser saves the responses as a JSON file for `bench import --quiz`. The page contains the
+    correct options of the practice questions only.
     """
     from iqtt.quiz.page import Study, write_quiz
 

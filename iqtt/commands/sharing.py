@@ -22,7 +22,7 @@ from scenegen.rooms.export.formats import DATA_FORMATS
     cls=Renamed,
     former="--with-answers",
     is_flag=True,
-    help="Release the answer key of the test questions as well, and the seed if the file has it.",
+    help="Also list the answer key of the test questions, and the seed if a file has it.",
 )
 @publication_options(title="the name of the folder", license_="CC-BY-4.0")
 @OVERWRITE
@@ -37,8 +37,9 @@ def card(
 ) -> None:
     """Write a data card for the split in FOLDER, with the metadata header of Hugging Face.
 
-    Publish the card with the files that it lists. The answer key of the test questions is not
-    listed, and a file that reveals a correct option of a test question is an error.
+    The card lists the files to publish with it. The answer key of the test questions is not in the
+    list. If another file reveals a correct option of a test question, the command stops with an
+    error.
     """
     needs("iqtt card", SHARE, "share")
     from iqtt.sharing.published import open_split
@@ -60,8 +61,8 @@ def card(
 @click.argument("file", type=InputPath())
 @click.option("--format", "form", type=click.Choice([*DATA_FORMATS, "vlm"]),
               required=True,
-              help="parquet, webdataset: for data loaders; vlm: for vision-language models, in the"
-              " layouts of Parquet, VLMEvalKit and lmms-eval.")
+              help="parquet, webdataset: files for data loaders; vlm: files of prompts for"
+              " vision-language models, for Inspect, VLMEvalKit and lmms-eval.")
 @click.option("--part", type=click.Choice(["labeled", "unlabeled"]),
               help="Part of a training file.")
 @click.option("--out", type=OutputFolder(),

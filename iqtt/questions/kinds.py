@@ -34,7 +34,7 @@ QUESTION_KINDS = {  # `mixed` draws from them in this order
     # With two options a `mirror` question would be a `mirror-pair` question.
     "mirror": QuestionKind("the mirror image and a shape with one cube moved", options=(3,)),
     "matched": QuestionKind("different shapes with similar silhouettes"),
-    "mirror-pair": QuestionKind("the mirror image only"),
+    "mirror-pair": QuestionKind("the mirror image, in each wrong option"),
 }
 ROOM_KINDS = {  # of furnished rooms
     "moved": QuestionKind("one object at other places", options=(3,)),

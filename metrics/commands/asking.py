@@ -24,7 +24,7 @@ from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder
 @click.option("--base-url", metavar="URL",
               help="URL of the server [default: the URL of the provider].")
 @click.option("--log-dir", type=OutputFolder(), default="logs", show_default=True,
-              help="Folder of the Inspect logs. Re-run the same command to resume from them.")
+              help="Folder of the Inspect logs. Re-run the same command to resume from these logs.")
 @click.option("--out", type=NewHdf5(), required=True, help="Output file of predictions.")
 @click.option("--blind", "control", cls=Renamed, former="--control", is_flag=True,
               help="Blind control: leave out the reference, so that models can only guess.")
@@ -35,7 +35,7 @@ from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder
 @click.option("--timeout", type=click.IntRange(1, 3600), default=120, show_default=True,
               help="Maximum time per reply, in seconds.")
 @click.option("--tries", type=click.IntRange(1, 100), default=6, show_default=True,
-              help="Maximum number of attempts per question, with increasing pauses.")
+              help="Maximum number of attempts per question. The pauses between attempts increase.")
 @click.option("--concurrency", type=click.IntRange(1, 256), default=4, show_default=True,
               help="Number of concurrent requests.")
 @model_options
@@ -47,10 +47,10 @@ def ask(
 ) -> None:
     """Ask a vision-language model the questions of FILE, and write its responses as predictions.
 
-    The images are rendered again from the cubes of FILE, in sRGB, with letters on the options.
-    Inspect sends the requests and logs every reply; `inspect view` shows the log. Failed requests
-    are left out of the output. Re-run the same command to repeat the failed requests. A reply
-    without a letter counts as no response.
+    The images are rendered again from the cubes of FILE, in sRGB, with letters on the options. The
+    package Inspect sends the requests and logs every reply; `inspect view` shows the log. Failed
+    requests are left out of the output. Re-run the same command to repeat the failed requests. If
+    a reply states no answer, `bench score` counts it as wrong.
     """
     needs("bench ask", ("inspect_ai",), "vlm")
     from iqtt.vlm.rows import Asked, count_rows

@@ -16,7 +16,7 @@ from scenegen.command_line.paths import InputPath, OutputPath
     "  bench figure mine.h5 other.h5 --truth rooms.h5 --items 0,5 --out grid.pdf"
 )
 @click.argument("files", nargs=-1, required=True, type=InputPath(), metavar="FILES...")
-@click.option("--out", type=OutputPath(), required=True, help="Output figure: .pdf, .svg, .png.")
+@click.option("--out", type=OutputPath(), required=True, help="Output file: .pdf, .svg or .png.")
 @click.option(
     "--metric",
     "score",
@@ -28,12 +28,15 @@ from scenegen.command_line.paths import InputPath, OutputPath
 @click.option(
     "--by",
     type=click.Choice(["angle", "kind", "size"]),
-    help="Group by angle, by size of objects, or by kind: distractor type, or category of objects.",
+    help="Draw one value per group of images or questions. angle: by view or rotation angle; size:"
+    " by size of the object; kind: by distractor type, or by category of the object.",
 )
 @click.option(
     "--truth", type=InputPath(), help="File of rooms. FILES are then predictions of this file."
 )
-@click.option("--items", type=Items(), help="Images of the grid, with --truth [default: 0-3].")
+@click.option(
+    "--items", type=Items(), help="Images to show in the grid, with --truth [default: 0-3]."
+)
 @click.option(
     "--width",
     type=click.Choice(["column", "page"]),
@@ -52,8 +55,8 @@ def figure(
 ) -> None:
     """Draw a figure for a paper, with embedded fonts, at the width of a column or a page.
 
-    FILES are score files, whose values are drawn with confidence intervals and baselines. With
-    --truth, FILES are predictions, and the figure is a grid of images with depth and error.
+    FILES are score files. The figure shows their values with confidence intervals and baselines.
+    With --truth, FILES are predictions, and the figure is a grid of images with depth and error.
     """
     from metrics.score_file import read_scores
     from metrics.scoring.aligned import aligned

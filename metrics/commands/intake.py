@@ -47,7 +47,7 @@ ALIGNMENTS = ("none", "median_scale", "scale", "scale_shift")
 DEPTH_KINDS = ("depth", "disparity", "distance")
 DATA = click.option(
     "--data", "truth", type=InputPath(), required=True, metavar="ROOMS.h5",
-    help="File of rooms or questions to predict.",
+    help="File of rooms or questions that the predictions are for.",
 )  # fmt: skip
 OUT = click.option(
     "--out", type=NewHdf5(), required=True, metavar="PREDICTIONS.h5", help="Output file."
@@ -58,7 +58,7 @@ METHOD = click.option(
 RUN = click.option(
     "--run", "run_name", default="", help="Name of the training run, such as its seed."
 )
-NOTES = click.option("--notes", default="", help="Note to store in the file.")
+NOTES = click.option("--notes", default="", help="Note to store in the output file.")
 FRAME = click.option(
     "--frame", type=click.Choice(["opencv", "opengl"]), default="opencv", show_default=True,
     help="Axes of points and normals. opencv: x right, y down, z forward; opengl: x right, y up, z"
@@ -66,7 +66,8 @@ FRAME = click.option(
 )  # fmt: skip
 MISSING = click.option(
     "--missing", type=click.Choice(["refuse", "nearest"]), default="refuse", show_default=True,
-    help="Pixels without a value. refuse: report an error; nearest: copy the nearest valid pixel.",
+    help="Pixels without a predicted value. refuse: report an error; nearest: copy the nearest"
+    " valid pixel.",
 )  # fmt: skip
 
 
@@ -79,14 +80,15 @@ def reading_options(*kinds: str) -> Callable[[Command], Command]:
             help="Type of the values. depth: planar depth; disparity: 1 / depth, larger for closer"
             " pixels; distance: distance along the ray" + points + "."),
         click.option("--unit", type=click.Choice(["m", "cm", "mm"]),
-                     help="Unit of the values. One scene unit counts as 1 m."),
+                     help="Unit of the values. 1 m is one scene unit."),
         click.option("--scale", type=Factor(),
-                     help="Factor from stored values to metres, such as 1/256; for disparity, to"
-                     " 1 / metres."),
+                     help="Factor that converts stored values to metres, such as 1/256. For"
+                     " disparity, it converts to 1 / metres."),
         click.option("--invalid", type=float, multiple=True,
                      help="Stored value that marks invalid pixels, such as 0. Repeatable."),
         click.option("--normals", metavar="FILES",
-                     help="Normals, in the formats of --depth. Integers are mapped to -1 to 1."),
+                     help="Files of normals, in the formats of --depth. Integer values are mapped"
+                     " to the range -1 to 1."),
         FRAME,
         click.option("--array", help="Name of the array in NPZ files, or of the channel in EXR"
                                      " files."),
@@ -114,20 +116,23 @@ def read_as(
 @click.command("import", epilog=f"{EXAMPLE}bench import --depth 'out/*.png' --unit mm"
                                 " --invalid 0 --data rooms.h5 --out mine.h5")
 @click.option("--depth", "pattern", metavar="FILES",
-              help="Predictions: a folder, a quoted pattern such as 'out/*.png', or one NPY or NPZ"
-              " file with all images. Formats: PNG, TIFF, EXR, PFM, NPY and NPZ.")
+              help="Predicted depth: a folder, a quoted pattern such as 'out/*.png', or one NPY or"
+              " NPZ file for all images. Formats: PNG, TIFF, EXR, PFM, NPY and NPZ.")
 @click.option("--layers", metavar="FILES",
               help="Predictions of all surfaces along each ray: NPY or NPZ files with depths (h, w,"
-              " L) or points (h, w, L, 3), nearest first, NaN behind the last layer.")
+              " L) or points (h, w, L, 3). The nearest layer comes first. Values behind the last"
+              " layer are NaN.")
 @click.option("--meshes", metavar="FILES",
-              help="Predictions of whole objects: a GLB, PLY or OBJ file per image, or a folder of"
-              " them per image such as 'out/*/*.glb', in the frame of the camera.")
+              help="Predictions of whole objects, in the camera frame: one GLB, PLY or OBJ file per"
+              " image, or one folder of such files per image, as in 'out/*/*.glb'.")
 @reading_options(*DEPTH_KINDS, "points")
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
-              help="Alignment that the predictions need: what the method cannot determine [default:"
-              " none; scale_shift for disparity]. With none or scale, disparity is 1 / depth.")
+              help="Alignment to the ground truth that the predictions need, such as scale for"
+              " predictions up to a scale [default: none; scale_shift for disparity]. With none or"
+              " scale, disparity is 1 / depth without a shift.")
 @click.option("--confidence", metavar="FILES",
-              help="Confidence per pixel, in the formats of --depth and on any scale.")
+              help="Files with the confidence of each pixel, in the formats of --depth. Any scale"
+              " is allowed.")
 @click.option("--confidence-is", type=click.Choice(["confidence", "error"]), default="confidence",
               show_default=True, help="Meaning of larger values of --confidence. confidence: more"
               " certain; error: a larger expected error.")
@@ -138,8 +143,8 @@ def read_as(
               " is scored; first_view: the first view of the scene; no_view: no image.")
 @click.option("--responses", "answers", cls=Renamed, former="--answers", type=InputPath(),
               metavar="FILE",
-              help="Responses to questions instead of --depth: .csv, .json or .jsonl, or the log of"
-              " a harness: Inspect (.eval), lmms-eval (.jsonl), VLMEvalKit (.tsv, .xlsx).")
+              help="File with responses to questions, instead of --depth: .csv, .json or .jsonl, or"
+              " the log of Inspect (.eval), lmms-eval (.jsonl) or VLMEvalKit (.tsv, .xlsx).")
 @click.option("--quiz", "people", metavar="FILES",
               help="Responses of people instead of --depth: the JSON files that the page of `iqtt"
               " quiz` saves, as a folder or a quoted pattern. --out is then a folder with one"
@@ -267,29 +272,32 @@ def _print_hints(out: str, data: Any) -> None:
 @METHOD
 @RUN
 @NOTES
-@click.option("--device", help="Argument of the model's load(), such as cuda.")
-@click.option("--dtype", help="Argument of the model's load(), such as bfloat16.")
+@click.option("--device", help="Device of the model, such as cuda. In a Python file, load() takes"
+                               " it as an argument.")
+@click.option("--dtype", help="Data type of the model, such as bfloat16. In a Python file, load()"
+                              " takes it as an argument.")
 @click.option("--python", type=InputPath(), metavar="PROGRAM",
               help="Python interpreter of another environment to run the model in, such as"
               " ~/envs/da3/bin/python. The environment needs Python 3.9 or newer and NumPy, but not"
               " this package.")
 @click.option("--batch", type=click.IntRange(1, 4096),
-              help="Images per call of the model's infer_batch, also an argument of its load()"
-              " [default: 8].")
+              help="Number of images per call of infer_batch(). In a Python file, load() can take"
+              " it as an argument [default: 8].")
 @click.option("--intrinsics", is_flag=True,
-              help="Give the model the true camera intrinsics. The output file records this.")
+              help="Pass the true camera matrix to the model. The output file records this.")
 @ENCODING
 @click.option("--exposure", type=Factor(), default=1.0, show_default=True,
-              help="Factor on the radiance of the input images. A result above 1 is an error.")
+              help="Factor that multiplies the radiance of the input images. Values above 1 are an"
+              " error.")
 @click.option("--key", help="Key of the model output to use [default: the first of the keys"
               " above that the model returns].")
 @FRAME
 @MISSING
 @click.option("--resume", "keep", flag_value="resume",
-              help="Keep finished predictions although the model, its weights or options have"
-                   " changed.")
-@click.option("--restart", "keep", flag_value="restart", help="Discard finished predictions, and"
-                                                              " start again.")
+              help="Keep the predictions of an interrupted run, even if the model, its weights or"
+                   " the options have changed.")
+@click.option("--restart", "keep", flag_value="restart",
+              help="Discard the predictions of an interrupted run, and start again.")
 @click.option("--timeout", type=click.FloatRange(0, min_open=True), metavar="SECONDS",
               help="Abort the run if one call of the model takes longer.")
 @click.option("--traceback", is_flag=True, help="Show the full traceback of an error in the model.")
@@ -300,22 +308,25 @@ def run(
     intrinsics: bool, curve: str, exposure: float, key: str | None, frame: Any, missing: Any,
     keep: str | None, timeout: float | None, traceback: bool, overwrite: bool,
 ) -> None:
-    """Run a model on every image of a file and write its predictions.
+    """Run a model on every image of a file, and write the predictions.
 
-    MODEL is a public depth model, as hf:NAME (loaded by transformers) or moge:NAME (MoGe), or a
-    Python file.
+    MODEL is a Python file or a public depth model. transformers loads hf:NAME, and MoGe loads
+    moge:NAME.
 
-    For rooms, the file defines infer(image, intrinsics=None), which returns a dict with one of the
-    keys below. For questions, it defines infer(reference, answers), which returns the index of an
-    option or one score per option. infer may also be a method of a class or of the object that
-    load() returns. A class of MoGe's evaluation works as well; OPTIONS after -- are passed to its
-    load(). docs/evaluate.md has examples.
+    For rooms, the Python file defines infer(image). The image is an RGB array (H, W, 3), uint8.
+    infer returns a dict with one of the keys below. With --intrinsics, the call is infer(image,
+    intrinsics). For questions, the file defines infer(reference, answers), which returns the index
+    of an option or one score per option.
+
+    Instead of the function infer, the file can define a class with the method infer, or a function
+    load() that returns an object with this method. MODEL can also be a file of MoGe's evaluation.
+    OPTIONS after -- are passed to its load(). docs/evaluate.md has examples.
 
     \b
-    points_metric, depth_metric: metres; scene units in box rooms
-    points_scale_invariant, depth_scale_invariant: up to a factor
-    points_affine_invariant, depth_affine_invariant: up to a factor and a shift
-    disparity_affine_invariant: 1 / depth, up to a factor and a shift
+    points_metric, depth_metric: in metres; in box rooms, in scene units
+    points_scale_invariant, depth_scale_invariant: up to a scale
+    points_affine_invariant, depth_affine_invariant: up to scale and shift
+    disparity_affine_invariant: 1 / depth, up to scale and shift
     layers_metric, layers_scale_invariant, layers_affine_invariant: depths of all surfaces along
     each ray, (h, w, L), or points (h, w, L, 3)
 

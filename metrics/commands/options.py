@@ -10,7 +10,7 @@ SEED = click.option(
     type=click.IntRange(0, LARGEST),
     default=0,
     show_default=True,
-    help="Seed of the bootstrap.",
+    help="Random seed of the bootstrap.",
 )
 # Of `measures.alignment`, which loads numpy: what may be fitted to the truth of each image.
 FITS = (

@@ -45,7 +45,8 @@ def _list() -> None:
 def make(name: str, out: str, workers: int) -> None:
     """Make a named benchmark, and check that its ground truth equals the published one.
 
-    Existing files are kept and checked. Re-run the same command to resume an interrupted run.
+    Files that already exist are kept and checked. Re-run the same command to resume an interrupted
+    run.
     """
     from metrics.scoring import known_tests
     from scenegen.common.names import check_choice

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 ALIGN = click.option(
     "--align",
     type=click.Choice(FITS),
-    help="Alignment to the ground truth of each image, for all methods [default: the loosest"
-    " alignment that a method declares].",
+    help="Alignment that is fitted to the ground truth of each image, the same for all methods"
+    " [default: the loosest alignment that a method declares].",
 )
 TRUTH = click.option(
     "--truth",
@@ -49,7 +49,7 @@ def _scores_of(paths: tuple[str, ...], truth: str | None, **settings: Any) -> "l
     epilog=EXAMPLE + "bench compare theirs.h5 mine.h5 --truth rooms.h5\n"
     "  bench compare baseline.json mine.json --metric chamfer"
 )
-@click.argument("scores", nargs=-1, required=True, type=InputPath(), metavar="REFERENCE OTHER...")
+@click.argument("scores", nargs=-1, required=True, type=InputPath(), metavar="FIRST OTHER...")
 @TRUTH
 @click.option(
     "--metric", "metrics", multiple=True,
@@ -65,7 +65,8 @@ def _scores_of(paths: tuple[str, ...], truth: str | None, **settings: Any) -> "l
 @click.option(
     "--allow-incomparable",
     is_flag=True,
-    help="Also compare scores that are not comparable, over the items that all files have.",
+    help="Also compare scores of different parts of a test set, over the images or questions that"
+    " all files have.",
 )
 @OVERWRITE
 def compare(
@@ -78,11 +79,12 @@ def compare(
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Compare methods with a reference, paired by image or question, and under one alignment.
+    """Compare the scores of each OTHER method with the scores of the FIRST method.
 
-    Each argument is a score file of `bench score --json`, or a submission, which is scored first.
-    The output lists differences with confidence intervals and significance tests, and the smallest
-    difference that the test set can detect.
+    FIRST and OTHER are score files of `bench score --json`, or submissions, which are scored first.
+    The comparison is paired by image or question. All methods get the same alignment. The output
+    lists the differences (OTHER minus FIRST) with confidence intervals, verdicts, significance
+    tests, and the smallest difference that the test set can detect.
     """
     from metrics.scoring.aligned import aligned
     from metrics.views.compare.compare import compare as compare_files
@@ -127,9 +129,9 @@ def compare(
 @click.option(
     "--label",
     default="",
-    help=r"Label of the first LaTeX table, for \ref. Further tables append a number.",
+    help=r"Label of the first LaTeX table, for \ref. The labels of further tables add a number.",
 )
-@click.option("--out", type=OutputPath(), help="Output file [default: print].")
+@click.option("--out", type=OutputPath(), help="Output file [default: print the tables].")
 @ALIGN
 @click.option("--no-paper", is_flag=True, help="Leave out the results of the Pix2Shape paper.")
 @OVERWRITE
@@ -146,12 +148,14 @@ def leaderboard(
     no_paper: bool,
     overwrite: bool,
 ) -> None:
-    """Rank methods, in one table per test set and under one alignment.
+    """Rank methods, in one table per test set. All methods of a table get the same alignment.
 
     Each METHOD is a score file of `bench score --json`, or a submission, which is scored first.
-    The first main metric ranks: shape_error for box rooms, hidden surfaces for methods that get the
-    first view only, abs_rel for interiors, and skill for questions. Baselines, and the results that
-    the paper reports on its own data, are listed without a rank.
+    Methods are ranked by their first main metric: shape_error for box rooms, abs_rel for interiors
+    and sensor data, solid_iou for layers and meshes, and accuracy for questions. In box rooms with
+    several views, methods that get only the first view are ranked by behind_depth_error. Baselines
+    are listed without a rank, and so are the results that the Pix2Shape paper reports on other
+    data.
     """
     from metrics.views.leaderboard import leaderboard as rank
     from metrics.views.leaderboard import to_html

@@ -30,16 +30,19 @@ TRUTH = click.option(
     "--json",
     "json_path",
     type=OutputPath(),
-    help="Write a score file, with the scores of every item.",
+    help="Write a score file, with the scores of every image or question.",
 )
 @click.option(
-    "--csv", "csv_path", type=OutputPath(), help="Write a table with the scores of every item."
+    "--csv",
+    "csv_path",
+    type=OutputPath(),
+    help="Write a CSV table with the scores of every image or question.",
 )
 @click.option(
     "--html",
     "html_path",
     type=OutputPath(),
-    help="Write a report page: main metrics, example images, curves, all numbers.",
+    help="Write a report page: main metrics, example images, charts, all metrics.",
 )
 @click.option(
     "--compare-with",
@@ -49,10 +52,14 @@ TRUTH = click.option(
     multiple=True,
     type=InputPath(),
     metavar="SCORES.json",
-    help="Score file on the same ground truth, to add to the page of --html. Repeatable.",
+    help="Score file of another method on the same ground truth. Its scores are added to the page"
+    " of --html. Repeatable.",
 )
 @click.option(
-    "--all", "whole", is_flag=True, help="Print all metrics and groups, not only the main metrics."
+    "--all",
+    "whole",
+    is_flag=True,
+    help="Print all metrics instead of the main metrics, and scores by group, such as by view.",
 )
 @MARKDOWN
 @SEED
@@ -67,21 +74,21 @@ TRUTH = click.option(
     former="--floors",
     type=InputPath(),
     metavar="FLOORS.json",
-    help="Accuracies of 2D-only baselines on questions, from `iqtt floors` [default: those of the"
-    " package].",
+    help="File of `iqtt floors` with the accuracies of 2D-only baselines on questions [default: the"
+    " file in this package].",
 )
 @click.option(
     "--allow-partial",
     is_flag=True,
-    help="Score only the images or questions that are predicted. The scores are then not ranked.",
+    help="Allow predictions of a part of the images or questions. The scores are then not ranked.",
 )
 @click.option(
     "--non-finite",
     type=click.Choice(["error", "penalise"]),
     default="error",
     show_default=True,
-    help="error: refuse values that are not finite; penalise: score them as the worst possible"
-    " value. Penalised scores are not ranked.",
+    help="Predicted values that are not finite. error: refuse them; penalise: give the image the"
+    " worst possible scores. Penalised scores are not ranked.",
 )
 @click.option(
     "--processes",
@@ -92,20 +99,22 @@ TRUTH = click.option(
     "--protocol",
     default="",
     metavar="NAME",
-    help="Evaluation protocol of measured ground truth: a name of docs/real-data.md, or all for a"
-    " table of every protocol that applies [default: declared].",
+    help="Evaluation protocol for sensor ground truth: a name from docs/real-data.md. all: print"
+    " the scores under every protocol that applies [default: declared].",
 )
 @click.option(
     "--align",
     type=click.Choice(FITS),
-    help="Alignment to the ground truth of each image before scoring, with at least as many free"
-    " parameters as the declared alignment [default: the declared alignment].",
+    help="Alignment that is fitted to the ground truth of each image before scoring. It needs at"
+    " least as many free parameters as the alignment that the submission declares [default: the"
+    " declared alignment].",
 )
 @click.option(
     "--figure",
     "figure_path",
     type=OutputPath(),
-    help="Write a figure of --protocol all: .pdf, .svg, .png.",
+    help="Write a figure with the scores under every protocol. Needs --protocol all. Formats:"
+    " .pdf, .svg, .png.",
 )
 @SCHEDULER
 @OVERWRITE
@@ -217,7 +226,7 @@ def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
 @TRUTH
 @click.option(
     "--scores", "scores_path", type=InputPath(),
-    help="Score file of PREDICTIONS, from `bench score --json` [default: PREDICTIONS is scored].",
+    help="Score file of PREDICTIONS, from `bench score --json` [default: compute the scores].",
 )  # fmt: skip
 @click.option(
     "--items", type=Items(),
@@ -233,10 +242,10 @@ def view(
     out: str | None,
     overwrite: bool,
 ) -> None:
-    """Write a recording of predictions and ground truth of rooms for the 3D viewer Rerun.
+    """Write a file for the 3D viewer Rerun that shows predictions next to the ground truth.
 
-    Each timeline sorts the scenes by one metric, worst first. The colour of a predicted point is
-    its depth error.
+    Each timeline sorts the scenes by one metric, worst first. The colour of a predicted point shows
+    the depth error of the point.
     """
     needs("bench view", ("rerun",), "view")
     from metrics.measured.reader import Images

@@ -20,25 +20,28 @@ LAYOUTS = ("moge", "nyu", "nyu-raw", "kitti", "diode", "hypersim", "sintel")
                       " --invalid 0 --out mine.h5")
 @click.option("--images", metavar="FILES", help="Images: a folder, or a quoted pattern.")
 @click.option("--depth", metavar="FILES",
-              help="Depth of the images, at the same size: PNG, TIFF, EXR, PFM, NPY or NPZ.")
+              help="Depth of the images, in the size of the images: PNG, TIFF, EXR, PFM, NPY or"
+                   " NPZ.")
 @reading_options(*DEPTH_KINDS)
 @click.option("--focal-baseline", type=Factor(), metavar="N",
-              help="For disparity in pixels: focal length in pixels x baseline in metres. Depth is"
-              " N / disparity.")
+              help="For disparity in pixels: the focal length in pixels times the baseline in"
+              " metres. Depth is N / disparity.")
 @click.option("--disparity-offset", type=float, default=0.0, metavar="PIXELS",
               help="Offset that is added to the disparity, such as the difference between the"
-              " principal points.")
+              " principal points of the two cameras.")
 @click.option("--intrinsics", type=InputPath(), metavar="K.json",
-              help="Camera matrix in pixels, with the first pixel centre at 0.5, or a JSON object"
-              " with one matrix per image name.")
+              help="JSON file with the camera matrix of all images, or with one matrix per image"
+              " name. Matrices are in pixels, with the centre of the first pixel at 0.5.")
 @click.option("--groups", type=InputPath(), metavar="GROUPS.csv",
-              help="Lines `image,group`. Frames of the same scene or drive form a group.")
-@click.option("--mask", metavar="FILES", help="Masks that are 0 at pixels to ignore.")
-@click.option("--layout", type=click.Choice(LAYOUTS), help="Layout of a public data set, as"
-                                                           " downloaded.")
+              help="CSV file with lines `image,group`. Images of one scene or drive form a group.")
+@click.option("--mask", metavar="FILES", help="Mask images. Pixels with the value 0 are ignored.")
+@click.option("--layout", type=click.Choice(LAYOUTS), help="Public data set that --data contains,"
+                                                           " as downloaded.")
 @click.option("--data", type=InputPath(), metavar="FOLDER", help="Folder or file of the public"
                                                                  " data set.")
-@click.option("--split", type=InputPath(), help="splits.mat of NYU, or a list of KITTI frames.")
+@click.option("--split", type=InputPath(),
+              help="Images of the public data set to use: splits.mat of NYU, or a list of KITTI"
+                   " frames.")
 @click.option("--source", default="", help="Source of the data, stored in the file.")
 @click.option("--license", "licence", default="", help="Licence of the data, stored in the file.")
 @click.option("--out", type=NewHdf5(), required=True, metavar="TRUTH.h5", help="Output file.")
@@ -49,10 +52,10 @@ def truth(
     source: str, licence: str, focal_baseline: float | None, disparity_offset: float, out: str,
     overwrite: bool, **numbers: Any,
 ) -> None:
-    """Make a file of measured ground truth, from image and depth files or from a public data set.
+    """Make a file of sensor ground truth, from image and depth files or from a public data set.
 
-    `bench import`, `run`, `validate`, `score`, `compare` and `leaderboard` take this file like a
-    file of rooms.
+    `bench import`, `run`, `validate`, `score`, `compare` and `leaderboard` accept this file in
+    place of a file of rooms.
     """
     from metrics.intake.truth_files import (
         Beside,
@@ -109,7 +112,7 @@ def truth(
 @click.command(epilog=f"{EXAMPLE}bench info mine.h5")
 @click.argument("file", type=InputPath())
 def info(file: str) -> None:
-    """Print the contents of a file of measured ground truth: sizes, depths, groups, source."""
+    """Print what a file of sensor ground truth contains: image sizes, depths, groups, source."""
     from metrics.measured.describe import describe
 
     click.echo(describe(file))
@@ -130,8 +133,8 @@ def info(file: str) -> None:
 def corrupt(data: str, kind: str, severity: int, seed: int, out: str, overwrite: bool) -> None:
     """Write a copy of a file with corrupted images and the same ground truth.
 
-    Run a model on both files, score both predictions against ROOMS.h5, and compare the two score
-    files. The difference is the drop in performance, paired by image.
+    Run a model on both files, and compare both predictions with `bench compare --truth ROOMS.h5`.
+    The difference is the drop in performance.
     """
     from metrics.corruptions import write_corrupted
     from metrics.measured.reader import open_images

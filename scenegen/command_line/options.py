@@ -161,11 +161,11 @@ class Reflectance(Color):
 # fmt: off
 WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
                        show_default="one per processor, up to 16",
-                       help="Rendering processes. Each uses about 0.4 GiB of memory, or 1.3 GiB for"
-                       " interiors.")
+                       help="Number of rendering processes. Each uses about 0.4 GiB of memory, or"
+                       " 1.3 GiB for interiors.")
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS",
                          help="Address of a Dask scheduler that distributes the work, such as"
-                         " tcp://host:8786; local starts a cluster on this machine.")
+                         " tcp://host:8786. The value local starts a cluster on this machine.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,
@@ -186,7 +186,7 @@ SIZE = click.option("--size", type=Size(), default="128", show_default=True,
 SEED = click.option("--seed", type=int, default=0, show_default=True,
                     help="Random seed.")
 UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True,
-                  help="Axis of the meshes that points up; y in ShapeNet.")
+                  help="Axis of the meshes that points up. In ShapeNet, it is y.")
 CACHE_DIR = click.option("--cache-dir", type=OutputFolder(),
                          help="Folder that caches cleaned meshes [the user's cache].")
 ASSETS = together(  # files of others that images of interiors are rendered with
@@ -199,9 +199,9 @@ ASSETS = together(  # files of others that images of interiors are rendered with
 )
 MESHES = together(  # the folder of meshes that objects are taken from
     click.option("--shapenet-root", type=InputPath(within=MESH_FILES),
-                 help="Folder of ShapeNetCore 1 or 2, to take meshes from."),
+                 help="Folder of ShapeNetCore 1 or 2 with the meshes of objects."),
     click.option("--objects-root", type=InputPath(within=MESH_FILES),
-                 help="Folder to take meshes from, with one sub-folder per category."),
+                 help="Folder with the meshes of objects, in one sub-folder per category."),
     UP,
     CACHE_DIR,
 )

@@ -13,11 +13,12 @@ from scenegen.command_line.paths import InputPath
 @click.argument("folder", type=InputPath())
 @click.pass_context
 def check(ctx: click.Context, folder: str) -> None:
-    """Cross-check depth, cameras, normals and images of FOLDER, in the layout of another tool.
+    """Check whether depth, cameras, normals and images of FOLDER agree with each other.
 
-    Layouts are nerfstudio, COLMAP (text), BOP, MoGe and Hypersim. Known faults are named with their
-    size: distance along the ray for planar depth, wrong focal length, principal point or unit,
-    inverse poses, wrong axes, mirrored maps. The exit code is 1 if there is a fault.
+    FOLDER has the layout of nerfstudio, COLMAP (text), BOP, MoGe or Hypersim. The command prints
+    the name and the size of common faults: distance along the ray instead of planar depth, wrong
+    focal length, wrong principal point, wrong unit, inverse poses, wrong axes, mirrored maps. The
+    exit code is 1 if there is a fault.
     """
     from scenegen.checking.folders import check_folder
 

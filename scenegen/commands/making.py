@@ -56,41 +56,39 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
 @click.option("--out", type=NewHdf5(), default="rooms.h5", show_default=True,
               help="Output file, or a URL such as s3://bucket/rooms.h5.")
 @click.option("--preset", default="shapes", show_default=True, shell_complete=_presets,
-              help="Preset to take the defaults from. `scenegen presets` lists the presets.")
+              help="Preset that sets the defaults. `scenegen presets` lists the presets.")
 @SEED
 @click.option("--size", type=Size(), help="Image size in pixels [128; 256 for interiors].")
 @click.option("--shapes", type=Names(), help="Basic shapes to sample from, such as box,sphere"
                                              " [all].")
 @click.option("--classes", type=Names(), help="Object categories to sample from, such as mug,bowl.")
 @click.option("--object-split", type=click.Choice(["all", "train", "val", "test"]),
-              help="Object instances to sample from: those of one split, or all. For training"
-                   " data, use"
-              " train: the published benchmarks use test [all].")
+              help="Split of the object instances to sample from. Use train for training data,"
+              " because the published benchmarks use test [all].")
 @MESHES
 @click.option("--reflectance", type=Reflectance(),
               help="Reflectance of the objects, and of the room if --room-reflectance is not given."
               " own: meshes from a folder keep their own colours, multiplied by 0.8 [0.8].")
 @click.option("--fov", type=Range(float),
-              help="Field of view of a square image in degrees. With a range such as 20-60, each"
-                   " scene"
-              " samples its own [28].")
+              help="Field of view of a square image in degrees. With a range such as 20-60, a"
+              " field of view is sampled for each scene [28].")
 @setting_options()
 @ASSETS
 @IMAGE_DTYPE
 @COMPRESSION
 @click.option("--batch", type=int, default=64, show_default=True,
-              help="Images that a process renders at once. Larger batches use more memory.")
+              help="Number of images that a process renders at once. Larger batches use more"
+              " memory.")
 @WORKERS
 @click.option("--shard-size", type=int, default=10_000, show_default=True,
-              help="Maximum number of scenes per file. Larger data sets are split into shards next"
-                   " to"
-              " --out, and --out reads as one file.")
+              help="Maximum number of scenes per file. Larger data sets are split into several"
+              " files (shards) next to --out, which can be read as one file.")
 @SCHEDULER
 @DEVICE
 @click.option("--hold-out-truth", cls=Renamed, former="--withhold-truth", is_flag=True,
-              help="Write images, cameras and row numbers to --out, for release, and the full data"
-              " with the ground truth to rooms-truth.h5 next to --out. Choose a large --seed that"
-              " cannot be guessed.")
+              help="Write a file to release and a file to keep. --out has images and cameras only."
+              " rooms-truth.h5, next to --out, also has the ground truth. Choose a large --seed"
+              " that cannot be guessed.")
 @OVERWRITE
 def render(
     count: int,
@@ -107,11 +105,11 @@ def render(
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Render rooms with objects, with exact ground truth, to an HDF5 file.
+    """Render rooms with objects to an HDF5 file, with exact ground truth.
 
     Each image is stored with its depth, normals, object ids, camera, lights and scene description.
-    Defaults are in square brackets; a preset can change them. Re-run the same command to resume an
-    interrupted run that writes several shards.
+    Defaults are in square brackets. A preset can change them. To resume an interrupted run that
+    writes several files (shards), run the same command again.
     """
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source

@@ -48,7 +48,7 @@ def preview(
     seed: int,
     overwrite: bool,
 ) -> None:
-    """Draw images of FILE in one contact sheet, each with depth, normals and object ids."""
+    """Draw images of FILE with their depth, normals and object ids, as one image."""
     from scenegen.files.pictures import pick_rows, save_picture
     from scenegen.rooms.preview import contact_sheet
     from scenegen.rooms.reader import RoomsFile
@@ -63,7 +63,7 @@ def preview(
 @click.command(epilog=f"{EXAMPLE}scenegen info rooms.h5")
 @click.argument("file", type=InputPath())
 def info(file: str) -> None:
-    """Print the contents of a file of rooms: settings, value ranges, units, sizes, versions."""
+    """Print settings, value ranges, units, sizes and versions of a file of rooms."""
     from scenegen.rooms.info import describe
 
     click.echo(describe(file))
@@ -94,9 +94,9 @@ def verify(
 ) -> None:
     """Check the content hashes and values of every image of a file, and render some images again.
 
-    Images that are rendered again must agree bit for bit, or within a stated tolerance if other
-    versions of Mitsuba, Dr.Jit or LLVM rendered the file. A file without ground truth is checked
-    for its content hashes only. The exit code is 1 if a check fails.
+    Images that are rendered again must equal the stored images bit for bit. If other versions of
+    Mitsuba or Dr.Jit rendered the file, they must agree within the printed tolerance. If the file
+    has no ground truth, only content hashes are checked. The exit code is 1 if a check fails.
     """
     from scenegen.objects.sources import file_objects
     from scenegen.rendering.pictures.places import ASSETS as PLACES
@@ -162,19 +162,19 @@ def _check_images(path: Path, spec: "Request") -> None:
     type=click.FloatRange(0, min_open=True),
     default=1.0,
     show_default=True,
-    help="Factor on the radiance in images and PLY files, to avoid clipping.",
+    help="Factor by which the radiance in images and PLY files is multiplied.",
 )
 @click.option(
     "--depth-unit",
     type=click.FloatRange(0, min_open=True),
-    help="Scene units per step of the 16-bit depth in PNG files; not for moge [1e-4; 1e-3, which is"
-    " 1 mm, for interiors].",
+    help="Scene units per step of the 16-bit depth in PNG files, except for moge [1e-4; for"
+    " interiors 1e-3, which is 1 mm].",
 )
 @click.option(
     "--out",
     type=OutputFolder(),
-    help="Output folder [the current folder for exr, png, ply and obj; else a new folder, such as"
-    " rooms-parquet].",
+    help="Output folder [for exr, png, ply and obj the current folder; for other formats a new"
+    " folder, such as rooms-parquet].",
 )
 @click.option(
     "--rows-per-file",
@@ -206,8 +206,8 @@ def export(
 ) -> None:
     """Export images of a file with their ground truth to the formats of other tools.
 
-    Values that do not fit the encoding are an error, which names the option to change. --device
-    is the device on which bop renders the masks of whole objects.
+    If a value does not fit the encoding, the command stops with an error that names the option to
+    change. --device is for the format bop, which renders the masks of whole objects.
     """
     if every and items is not None:
         raise click.UsageError("--all and --items exclude each other: use one of them")

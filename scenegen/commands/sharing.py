@@ -43,7 +43,7 @@ def card(
 ) -> None:
     """Write a data card for files of rooms, with the metadata header of Hugging Face.
 
-    Publish the card in one folder with the files, or with the Parquet files of `scenegen export`.
+    The card belongs in the same folder as the files, or as the Parquet files of `scenegen export`.
     From Parquet files, Hugging Face generates Croissant metadata.
     """
     needs("scenegen card", SHARE, "share")

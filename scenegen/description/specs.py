@@ -114,11 +114,13 @@ class RoomSpec:
     listing: str = setting("")
     views: tuple[float, ...] = setting(
         (0.0,),
-        "Views of each scene: degrees of rotation about the vertical axis from the first view,"
-        " such as 0,5,35,55,80",
+        "Views of each scene, as degrees of rotation of the camera about the vertical axis, such"
+        " as 0,5,35,55,80",
     )
     spp: int = setting(
-        1, "Colour samples per pixel; with --shading path, 64 by default", limits=(1, 1024)
+        1,
+        "Number of colour samples per pixel. With --shading path, the default is 64",
+        limits=(1, 1024),
     )
     image_dtype: str = setting("uint8", choices=IMAGE_DTYPES)
     min_visible_pixels: int = setting(
@@ -130,23 +132,23 @@ class RoomSpec:
     fov_spread_degrees: float = setting(0.0, later=True)
     principal_point: tuple[float, float] = setting(
         (0.5, 0.5),
-        "Principal point x,y as fractions of width and height from the upper left corner, such as"
-        " 0.3,0.6: the images are crops of larger ones",
+        "Principal point x,y, such as 0.3,0.6: fractions of width and height from the upper left"
+        " corner. With other values than 0.5,0.5, images look like crops of larger images",
         later=True, shown="0.5,0.5",
     )  # fmt: skip
     pixel_aspect: float = setting(
-        1.0, "Width of a pixel over its height", limits=(0.25, 4.0), later=True
+        1.0, "Width of a pixel divided by its height", limits=(0.25, 4.0), later=True
     )
     projection: str = setting(
         "perspective",
-        "equirectangular: panoramas of interiors, 360 x 180 degrees, whose depth is the distance"
-        " along the ray; twice as wide as high",
+        "equirectangular: panoramas of interiors, 360 x 180 degrees. Their depth is the distance"
+        " along the ray, and --size must be twice as wide as high",
         choices=("perspective", "equirectangular"), later=True,
     )  # fmt: skip
     stereo: float = setting(
         0.0,
-        "Baseline of stereo pairs in scene units (metres in interiors), such as 0.065: each view"
-        " gets a second image, from a camera further to the right. 0 renders no pairs",
+        "Baseline of stereo pairs in scene units (metres in interiors), such as 0.065. Each view"
+        " gets a second image from a camera to the right. With 0, there are no pairs",
         limits=(0.0, 0.25), later=True,
     )  # fmt: skip
     truth: tuple[str, ...] = setting(
@@ -269,14 +271,14 @@ class DatasetSpec(RoomSpec):
         " slower",
         choices=("paper", "path"),
     )
-    shadows: bool = setting(False, "Cast shadows of objects", option="shadows/--no-shadows")
+    shadows: bool = setting(False, "Objects cast shadows", option="shadows/--no-shadows")
     allow_cropped: bool = setting(False, "Allow objects that the image border crops")
     camera_radius: float = setting(1.5, "Distance of the cameras from the target, in scene units")
     camera_target: Vector3 = setting((0.3, 0.3, 0.3))
     light_radius: float = setting(2.5, "Distance of the lights from the target, in scene units")
     light_level: float = setting(
         0.95,
-        "Radiance of a white surface at the target that faces every light",
+        "Radiance of a white surface that is at the target and faces every light",
         limits=(0.0, 100.0),
     )
     ambient: Vector3 = setting((0.1, 0.1, 0.1), "Ambient light L_a")
@@ -292,7 +294,7 @@ class DatasetSpec(RoomSpec):
     room_reflectance: Vector3 = setting((0.8, 0.8, 0.8), "Reflectance of ground and walls")
     random_reflectance: bool = setting(
         False,
-        "Random reflectance for each object, or the same for all objects",
+        "Each object has a random reflectance, or all objects have the same",
         option="random-reflectance/--same-reflectance",
     )
     specular: tuple[float, float] = setting(
@@ -364,7 +366,7 @@ class InteriorSpec(RoomSpec):
     )  # fmt: skip
     hours: tuple[float, float] = setting(
         (7.0, 21.0),
-        "Hours of the day in interiors. Outside is dark after 18",
+        "Range of the hour of the day in interiors. It is dark outside after 18 h",
         limits=(0.0, 24.0),
         later=True,
     )

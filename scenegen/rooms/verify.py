@@ -112,7 +112,7 @@ def verify_withheld(
     digests, _ = read_all(rooms, step, lambda block, row: (), progress)
     wrong = content_problems(rooms.opened, digests, whole=False)
     layout = f"{len(rooms)} images, format {rooms.attributes['format_version']}"
-    truth = f"held out in {truth_path(rooms.path).name}, so nothing else is checked"
+    truth = f"in {truth_path(rooms.path).name}, so nothing else is checked"
     return [
         listed_check("layout", layout, rooms.problems(whole=False)),
         listed_check("content", "all values match their SHA-256", wrong),
@@ -139,7 +139,11 @@ def _sampled_again(rooms: RoomsFile, rows: Sequence[int], objects: Objects) -> C
             same = False
         if not same:
             wrong.append(f"row {row}")
-    detail = ", ".join(wrong) + " differ" if wrong else f"{len(rows)} images, from the seed"
+    detail = (
+        ", ".join(wrong) + " differ"
+        if wrong
+        else f"the seed gives the stored scenes ({len(rows)} images)"
+    )
     return Check("drawn again from the seed", not wrong, detail)
 
 
@@ -184,8 +188,8 @@ def _rendered_again(rooms: RoomsFile, rows: Sequence[int], device: str, objects:
             ]
         if differs:
             wrong.append(f"row {row} ({', '.join(differs)})")
-    within = f"within tolerances (depth {DEPTH_TOLERANCE:g}, ids equal but at edges)"
-    what = f"{off} of {len(rows)} images {within}" if off else "bit for bit"
+    within = f"within tolerances (depth {DEPTH_TOLERANCE:g}; ids equal except at edges)"
+    what = f"{off} of {len(rows)} images {within}" if off else "equal bit for bit"
     detail = "differ: " + ", ".join(wrong) if wrong else f"{len(rows)} images, {what}"
     remark = f" (the file's {'; '.join(others)})" if others else ""
     return Check("rendered again", not wrong, detail + remark)

@@ -91,7 +91,7 @@ def visibility(tables: Sequence[AuditTable]) -> Proof:
     needed = [table.spec.min_cube_pixels if table.spec else 0 for table in tables]
     return judge(
         "visibility",
-        f"at least {max(needed)} visible pixels per cube; no silhouette exceeds its cubes",
+        f"at least {max(needed)} visible pixels per cube; no silhouette is larger than its cubes",
         tables,
         [
             ((few < enough) | (table.silhouette > most)).any(axis=1)

@@ -142,7 +142,7 @@ def mirror_images(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pro
         wrong.append(angle < least - 1e-6)
     return judge(
         "mirror images",
-        "the two mirror images differ in view as much as the options must",
+        "the views of the two mirror images differ by at least the minimum angles",
         tables,
         wrong,
         lambda t, row: "they are seen from nearly the same side",

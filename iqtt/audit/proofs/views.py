@@ -76,8 +76,8 @@ def lines_of_sight(tables: Sequence[AuditTable], shapes: Sequence[Shapes]) -> Pr
     sights = [_right_apart(table, s)[1] for table, s in zip(tables, shapes, strict=True)]
     return judge(
         "lines of sight",
-        f"viewing directions of reference and correct option differ by at least {max(least):g}"
-        " degrees, also from opposite directions",
+        f"viewing directions of reference and correct option are at least {max(least):g} degrees"
+        " apart; opposite directions count as equal",
         tables,
         [
             (s.place >= 0) & ~(angle >= low - LEAST_DEGREES)

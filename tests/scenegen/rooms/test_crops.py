@@ -7,6 +7,8 @@ import pytest
 
 from scenegen import open_rooms
 from scenegen.common.errors import SpecError
+from scenegen.objects.basic_shapes import unit_shape
+from scenegen.objects.scene_mesh import world_from_object
 from scenegen.rooms.export.folder import export_folder
 from scenegen.rooms.verify import verify_file
 from scenegen.rooms.withheld import withhold_truth
@@ -44,6 +46,24 @@ def test_points_are_where_the_matrix_puts_them(path):
             hit = room.object_id >= 0
             np.testing.assert_allclose((places[..., 0] / places[..., 2])[hit], columns[hit])
             np.testing.assert_allclose((places[..., 1] / places[..., 2])[hit], rows[hit])
+
+
+def test_objects_are_inside_the_image(path):
+    with open_rooms(path) as rooms:
+        for room in rooms[::2]:  # those of left eyes
+            for item in room.scene.objects:
+                placed = world_from_object(item.position, item.rotation, item.scale)
+                placed = np.linalg.inv(room.world_from_camera) @ placed
+                points = unit_shape(item.name).triangles.reshape(-1, 3)
+                x, y, z = (
+                    matrix(room)
+                    @ np.diag([1, -1, -1])
+                    @ (placed[:3, :3] @ points.T + placed[:3, 3:])
+                )
+                assert (x > -z).all()
+                assert (x < z * (WIDTH + 1)).all()
+                assert (y > -z).all()
+                assert (y < z * (HEIGHT + 1)).all()
 
 
 def test_disparity_follows_from_the_horizontal_focal_length(path):

@@ -25,6 +25,7 @@ from scenegen.rendering.renderer import render
 
 Array = NDArray[Any]
 ROOMS = 40
+CROPS = {"principal_point": (0.35, 0.3), "pixel_aspect": 1.2, "allow_cropped": True}
 FAMILY_PRESETS = [
     name
     for name, it in PRESETS.items()
@@ -49,9 +50,7 @@ def cast(batch: SceneBatch, row: int) -> tuple[Array, Array, Array]:
         triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3), process=False
     )
     camera, size = batch.world_from_camera[row], (batch.spec.height, batch.spec.width)
-    rays = (
-        pixel_directions(*size, float(batch.fov_y_degrees[row])).reshape(-1, 3) @ camera[:3, :3].T
-    )
+    rays = pixel_directions(*size, batch.lens(row)).reshape(-1, 3) @ camera[:3, :3].T
     points, hit, faces = RayMeshIntersector(mesh).intersects_location(
         np.broadcast_to(camera[:3, 3], rays.shape), rays, multiple_hits=False
     )
@@ -109,11 +108,13 @@ def hard_meshes(root: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("preset", "rooms"),
-    [("shapenet", 4), *(pytest.param(name, 40, marks=pytest.mark.slow) for name in FAMILY_PRESETS)],
-)
-def test_rooms_of_families_agree(preset: str, rooms: int) -> None:
-    spec = replace(preset_spec(preset), min_visible_pixels=0)
+    ("preset", "rooms", "more"),
+    [("shapenet", 4, {}),
+     *(pytest.param(name, 40, {}, marks=pytest.mark.slow) for name in FAMILY_PRESETS),
+     pytest.param("shapenet", 40, CROPS, marks=pytest.mark.slow)],
+)  # fmt: skip
+def test_rooms_of_families_agree(preset: str, rooms: int, more: dict[str, Any]) -> None:
+    spec = replace(preset_spec(preset), min_visible_pixels=0, **more)
     objects = objects_of(spec)
     wrong = list(wrong_pixels(spec, objects, some_scenes(spec, objects, rooms)))
     assert len(wrong) == rooms
