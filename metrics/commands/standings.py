@@ -112,7 +112,7 @@ def compare(
 @TRUTH
 @click.option(
     "--metric", "metrics", multiple=True,
-    help="Metric to show. Repeatable. Methods are ranked by the first one [default: the main"
+    help="Metric to show. Repeatable. Methods are ranked by the first --metric [default: the main"
     " metrics].",
 )  # fmt: skip
 @click.option(

@@ -79,15 +79,15 @@ TRUTH = click.option(
 @click.option(
     "--allow-partial",
     is_flag=True,
-    help="Allow predictions of a part of the images or questions. The scores are then not ranked.",
+    help="Allow predictions of a part of the images or questions. Partial scores are not ranked.",
 )
 @click.option(
     "--non-finite",
     type=click.Choice(["error", "penalise"]),
     default="error",
     show_default=True,
-    help="Predicted values that are not finite. error: refuse them; penalise: give the image the"
-    " worst possible scores. Penalised scores are not ranked.",
+    help="What to do with predicted values that are not finite. error: refuse the file; penalise:"
+    " give the image the worst possible scores. Penalised scores are not ranked.",
 )
 @click.option(
     "--processes",
