@@ -16,7 +16,7 @@ from iqtt.files.reader import answers_beside, open_questions
 from iqtt.perspective.columns import RoomTruth
 from iqtt.perspective.specs import PerspectiveSpec
 from metrics.prediction_writer import write_answers
-from scenegen.camera import Lens, back_project, transform_points
+from scenegen.camera import back_project, pixels_of, transform_points
 from scenegen.common.errors import FileFormatError
 from scenegen.common.threads import one_thread
 from scenegen.description.scenes import SceneSpec
@@ -85,13 +85,9 @@ def _before(depth: Array, other: Array, other_from_camera: Array, fov: float) ->
     """
     from scipy.ndimage import minimum_filter
 
-    height, width = depth.shape
     points = transform_points(other_from_camera, back_project(depth, fov)).reshape(-1, 3)
-    far = -points[:, 2]
-    points, far = points[far > 0.1], far[far > 0.1]  # NaN is not
-    places = Lens(fov).grid(height, width).places(points[:, 0], points[:, 1], far)
-    x, y = (np.floor(place).astype(int) for place in places)
-    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    points = points[points[:, 2] < -0.1]  # NaN is not
+    row, column, inside = pixels_of(points, depth.shape, fov)
     nearest = minimum_filter(np.where(np.isfinite(other), other, np.inf), 3)
-    before = far[inside] < (1 - TOLERANCE) * nearest[y[inside], x[inside]]
+    before = (-points[:, 2] < (1 - TOLERANCE) * nearest[row, column])[inside]
     return float(before.mean()) if inside.any() else 1.0

@@ -210,6 +210,23 @@ def back_project(depth: Array, lens: Lens | float) -> NDArray[np.float64]:
     return np.asarray(directions * known[..., None])
 
 
+def pixels_of(
+    points: Array, shape: tuple[int, ...], lens: Lens | float
+) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]:
+    """Return row and column of points (N, 3), camera frame, and which are in an image, (N,) each.
+
+    The image has the shape (H, W). Row and column are 0 for points that are not in it.
+    """
+    height, width = shape
+    ahead = points[:, 2] < 0.0
+    depth = np.where(ahead, -points[:, 2], 1.0)
+    places = as_lens(lens).grid(height, width).places(points[:, 0], points[:, 1], depth)
+    column, row = map(np.floor, places)
+    inside = ahead & (column >= 0) & (column < width) & (row >= 0) & (row < height)
+    row, column = (np.where(inside, at, 0).astype(np.int64) for at in (row, column))
+    return row, column, inside
+
+
 def transform_points(matrix: Array, points: Array) -> NDArray[np.float64]:
     """Apply a (4, 4) `to_from` transform to points (..., 3)."""
     return transform_vectors(matrix, points) + matrix[:3, 3]

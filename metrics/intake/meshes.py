@@ -18,7 +18,7 @@ from metrics.measures.surfaces.whole import drawn_points
 from metrics.submissions.hints.frames import AXES, frame_text
 from metrics.submissions.layout import Shown
 from metrics.submissions.writer import RoomPredictionWriter
-from scenegen.camera import Lens
+from scenegen.camera import Lens, pixels_of
 from scenegen.common.errors import SpecError
 from scenegen.objects.meshes import limits
 from scenegen.objects.meshes.errors import BadMeshError, check_most
@@ -174,10 +174,5 @@ def _better_frame(rooms: RoomsFile, tried: list[tuple[int, Array]]) -> str:
 
 def _share_on_objects(points: Array, object_id: Array, lens: Lens) -> float:
     """Return the share of points in the camera frame that are seen where objects are."""
-    height, width = object_id.shape
-    ahead = points[points[:, 2] < 0]
-    places = lens.grid(height, width).places(ahead[:, 0], ahead[:, 1], -ahead[:, 2])
-    column, row = map(np.floor, places)
-    inside = (column >= 0) & (column < width) & (row >= 0) & (row < height)
-    at = object_id[row[inside].astype(int), column[inside].astype(int)]
-    return np.count_nonzero(at > 0) / len(points)
+    row, column, inside = pixels_of(points, object_id.shape, lens)
+    return np.count_nonzero(inside & (object_id[row, column] > 0)) / len(points)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenegen.camera import Lens, as_lens
+from scenegen.camera import Lens, pixels_of
 
 Array = NDArray[Any]
 
@@ -35,19 +35,14 @@ def hidden_from(
     height, width = first_depth.shape
     rotation, origin = first_world_from_camera[:3, :3], first_world_from_camera[:3, 3]
     seen = (points - origin) @ rotation
-    depth = -seen[:, 2]
-    ahead = np.where(depth > 0.0, depth, 1.0)
-    grid = as_lens(lens).grid(height, width)
-    column, row = map(np.floor, grid.places(seen[:, 0], seen[:, 1], ahead))
-    outside = (depth <= 0.0) | (column < 0) | (column >= width) | (row < 0) | (row >= height)
+    row, column, inside = pixels_of(seen, first_depth.shape, lens)
     away = ((origin - points) * normals).sum(axis=1) <= 0.0
     seen_depth = np.where(np.isfinite(first_depth), first_depth, np.inf).astype(np.float64)
     padded = np.pad(seen_depth, 1, mode="edge")
     farthest = np.maximum.reduce(
         [padded[i : i + height, j : j + width] for i, j in np.ndindex(3, 3)]
     )
-    at = np.where(outside, 0, row).astype(int), np.where(outside, 0, column).astype(int)
-    return np.asarray(outside | away | (depth > farthest[at] + MARGIN))
+    return np.asarray(~inside | away | (-seen[:, 2] > farthest[row, column] + MARGIN))
 
 
 def behind_scores(errors: Array, nearest: Array | None = None) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import refuse_pixels
 from metrics.submissions.truths import TrueView
-from scenegen.camera import pixel_directions, pixel_size
+from scenegen.camera import pixel_directions, pixel_size, pixels_of
 from scenegen.common.errors import SceneGenError
 from scenegen.files.content import row_digest
 from scenegen.rooms.reader import RoomsFile
@@ -105,7 +106,7 @@ def read_true_layers(truth: RoomsFile, row: int, view: TrueView) -> TrueLayers:
     return TrueLayers(scored, rays, pixel, bodies[scored], *layers, digests)
 
 
-def true_points(truth: RoomsFile, row: int) -> list[Array] | None:
+def true_points(truth: RoomsFile, row: int) -> list[NDArray[Any]] | None:
     """Return two draws of points of a row's objects, camera frame; None without their meshes.
 
     Points inside of solids, such as those of parts that overlap, are left out. They are those that
@@ -122,10 +123,11 @@ def true_points(truth: RoomsFile, row: int) -> list[Array] | None:
     meshes = []
     for item in room.scene.objects:
         pose = world_from_object(item.position, item.rotation, item.scale)
-        meshes.append(objects.shape(item.shape).triangles @ pose[:3, :3].T + pose[:3, 3])
+        corners = objects.shape(item.shape).triangles.reshape(-1, 3)
+        meshes.append(corners @ pose[:3, :3].T + pose[:3, 3])
     if not meshes:
         return None
-    triangles = np.concatenate(meshes)
+    triangles = np.concatenate(meshes).reshape(-1, 3, 3)
     rotation, place = room.world_from_camera[:3, :3], room.world_from_camera[:3, 3]
     height, width = room.depth.shape
     layers = (room.truth[f"layers/{x}"] for x in ("depth", "entering"))
@@ -138,10 +140,7 @@ def true_points(truth: RoomsFile, row: int) -> list[Array] | None:
     for draw in whole.DRAWS[1:]:
         points = (whole.drawn_points(triangles, row, draw) - place) @ rotation
         depth = -points[:, 2]
-        places = room.lens.grid(height, width).places(points[:, 0], points[:, 1], depth)
-        column, line = (np.floor(place).astype(int) for place in places)
-        inside = (column >= 0) & (column < width) & (line >= 0) & (line < height)
-        line, column = np.where(inside, line, 0), np.where(inside, column, 0)
+        line, column, inside = pixels_of(points, (height, width), room.lens)
         for i, j in np.ndindex(3, 3):
             start, end = starts[:, line + i, column + j], ends[:, line + i, column + j]
             deep = (start + whole.NEAR < depth) & (depth < end - whole.NEAR)
@@ -151,7 +150,7 @@ def true_points(truth: RoomsFile, row: int) -> list[Array] | None:
 
 
 def score_layers(
-    predicted: PredictedView, truth: TrueLayers, surfaces: list[Array] | None = None
+    predicted: PredictedView, truth: TrueLayers, surfaces: list[NDArray[Any]] | None = None
 ) -> dict[str, float]:
     """Return every score of predicted layers (H, W, L), fitted to the visible surfaces of objects.
 
@@ -204,7 +203,7 @@ def _fit(predicted: PredictedView, truth: TrueLayers) -> tuple[float, float]:
 
 
 def worst_of_layers(
-    predicted: PredictedView, truth: TrueLayers, surfaces: list[Array] | None = None
+    predicted: PredictedView, truth: TrueLayers, surfaces: list[NDArray[Any]] | None = None
 ) -> dict[str, float]:
     """Return the worst value of each score that an image has."""
     points = None if predicted.surface_points is None else np.full((1, 3), -1.0)

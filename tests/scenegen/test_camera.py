@@ -7,7 +7,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from scenegen.camera import Camera, back_project, intrinsics, pixel_directions
+from scenegen.camera import Camera, back_project, intrinsics, pixel_directions, pixels_of
 from scenegen.common.errors import SpecError
 
 COORDINATE = st.floats(-9.0, 9.0)
@@ -113,3 +113,13 @@ def test_every_image_has_the_diagonal_of_a_square_one(height: int, width: int, f
     diagonal = math.hypot(half, half * width / height)
     square = math.tan(math.radians(fov) / 2) * math.sqrt(2)
     assert diagonal == pytest.approx(square, rel=1e-9)
+
+
+@given(height=SIDE, width=SIDE, fov=FOV)
+def test_pixels_of_points_are_those_that_show_them(height: int, width: int, fov: float) -> None:
+    points = back_project(np.full((height, width), 2.0), fov).reshape(-1, 3)
+    row, column, inside = pixels_of(points, (height, width), fov)
+    np.testing.assert_array_equal(row * width + column, np.arange(height * width))
+    assert inside.all()
+    for others in (-points, points + np.array([1000, 0, 0])):
+        assert not np.any(pixels_of(others, (height, width), fov))

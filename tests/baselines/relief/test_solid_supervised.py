@@ -14,7 +14,9 @@ from refusals import refused
 from baselines.relief.network import Card, Settings
 from baselines.relief.solid_supervised import BASELINE, lessons_of, read_solids, views_of
 from baselines.training.baseline import train, write_submission
+from baselines.training.checkpoint import bundled, load_weights
 from baselines.training.data import TrainingFiles
+from metrics.scoring.evaluate import score
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile
 from scenegen.rooms.withheld import withhold_truth
@@ -77,3 +79,15 @@ def test_files_without_layers_or_truth_are_refused(layered, turned_path, tmp_pat
     network = BASELINE.method.network(Card("x", SMALL))
     with RoomsFile(bare) as rooms, refused(SpecError, "bare.h5"):
         views_of(network, Card("x", SMALL), rooms)
+
+
+def test_bundled_weights_beat_the_shortcuts(make_rooms, tmp_path):
+    """On unseen rooms; docs/solids.md has the skill of 300 images."""
+    path = bundled(BASELINE.files, BASELINE.method)
+    assert path.stat().st_size < 2_000_000
+    card = load_weights(path, BASELINE.method)[1]
+    assert card.iteration == card.settings.iterations
+    rooms = make_rooms(tmp_path / "r.h5", 12, height=64, width=64, seed=77, truth=("layers",))
+    write_submission(BASELINE, rooms, tmp_path / "p.h5")
+    skill = score([tmp_path / "p.h5"], rooms).skills["solid_iou"]
+    assert skill.value > 0

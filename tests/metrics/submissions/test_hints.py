@@ -29,9 +29,10 @@ def smooth(seed, shape, width, size):
     return size * values / values.std()
 
 
-def test_rooms_of_another_file_get_no_hint(hints, make_rooms, tmp_path):
+@pytest.mark.parametrize("count", [80, pytest.param(300, marks=pytest.mark.slow)])
+def test_rooms_of_another_file_get_no_hint(count, hints, make_rooms, tmp_path):
     """Rooms, and good ones, but others: among many there is always one that is like them."""
-    truth, path = (make_rooms(tmp_path / f"{seed}.h5", 300, seed=seed) for seed in (98, 99))
+    truth, path = (make_rooms(tmp_path / f"{seed}.h5", count, seed=seed) for seed in (98, 99))
     with h5py.File(path) as file:
         assert hints(file["depth"][()], file["normal"][()], truth=truth) == []
 

@@ -24,14 +24,11 @@ RENDER_MISTAKES = [
     ("--shapenet-root . --objects-root .", "--shapenet-root and --objects-root", "one of them"),
     ("--shapenet-root . --up z", "up: found 'z'", "expected 'y' with --shapenet-root"),
     ("--objects-root nosuch", "nosuch: no such folder"),
-    ("--out .", "is a folder"),
-    ("--out ''", "empty path"),
     ("--out /proc/x.h5", "/proc"),
     (f"--out {'a' * 300}.h5", "too long"),
 ]
 PREVIEW_MISTAKES = [
     ("--items 0-500", "items: found 8", "0 to 7"),
-    (f"--items {'9' * 30}", "items: found 999", "0 to 7"),
     ("--items 0 --random 2", "items", "random", "one of them"),
     ("--out s.xyz", "'s.xyz'", "sheet.png"),
 ]
@@ -41,12 +38,10 @@ EXPORT_MISTAKES = [
     ("--out /proc", "/proc"),
     ("--objects-root .", "objects: found the folder .", "built in"),
 ]
-VERIFY_MISTAKES = [("--objects-root .", "objects: found the folder .", "built in")]
 MISTAKES = [
     *((RENDER, *case) for case in RENDER_MISTAKES),
     *((("preview", "FILE"), *case) for case in PREVIEW_MISTAKES),
     *((("export", "FILE", "--items", "0", "--format", "obj"), *case) for case in EXPORT_MISTAKES),
-    *((("verify", "FILE"), *case) for case in VERIFY_MISTAKES),
 ]
 
 
