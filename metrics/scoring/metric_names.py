@@ -295,11 +295,13 @@ TABLE: Sequence[Metric] = (
     _error("hausdorff_reverse", "Hausdorff, reverse",
            "largest distance from the true surface to the predicted points.", **_SURFACE),
     _error("hausdorff_95", "Hausdorff, 95%",
-           "larger of the 95th percentiles of the distances from predicted points to the true"
-           " surface and from there to predicted points.", **_SURFACE),
+           "larger of two 95th percentiles: of the distances from predicted points to the true"
+           " surface, and of the distances from the true surface to the predicted points.",
+           **_SURFACE),
     _share(F_SCORE, "F-score",
-           "harmonic mean of precision (predicted points nearer than the threshold, in scene units,"
-           " to the true surface) and recall (true surface nearer than that to a predicted point).",
+           "harmonic mean of precision and recall. Precision is the fraction of predicted points"
+           " whose distance to the true surface is below the threshold, in scene units. Recall is"
+           " the fraction of the true surface whose distance to the predicted points is below it.",
            **_SURFACE),
     _error("paper_chamfer", "Chamfer, as in the paper",
            "mean distance from the predicted points to the nearest true point, plus that from the"
@@ -319,8 +321,8 @@ TABLE: Sequence[Metric] = (
            "ratio", headline={"measured": 1, "interiors": 1}, printed=1, baselines=_NO_SHAPE,
            **_DEPTH),
     _error("silog", "SILog",
-           "standard deviation of ln predicted - ln true depth, times 100; predicted depths up to"
-           " 0.001 count as 0.001 and are left out of the subtracted mean.", "100 ln",
+           "100 times the standard deviation of ln(predicted depth) - ln(true depth). Predicted"
+           " depths below 0.001 are replaced by 0.001 and are left out of the mean.", "100 ln",
            headline={"measured": 4}, **_BLINDLY, **_DEPTH),
     _share("delta_1", "delta 1",
            "fraction of pixels whose predicted and true depth differ by a factor below 1.25.",
@@ -336,51 +338,56 @@ TABLE: Sequence[Metric] = (
     _error("sq_rel", "SqRel", "mean squared difference of depth divided by true depth.",
            **_ANYWHERE),
     _error("rmse_log", "RMSE-log",
-           "root mean square of ln predicted - ln true depth; depths up to 0.001 count as 0.001.",
+           "root mean square of ln(predicted depth) - ln(true depth); predicted depths below 0.001"
+           " are replaced by 0.001.",
            "ln", is_root=True, **_ANYWHERE),
     _error("log10", "log10",
-           "mean absolute difference of log10 depth; depths up to 0.001 count as 0.001.",
+           "mean absolute difference of log10 of depth; predicted depths below 0.001 are replaced"
+           " by 0.001.",
            "log10", **_ANYWHERE),
     _error("irmse", "iRMSE",
-           "root mean square of 1 / predicted - 1 / true depth; depths up to 0.001 count as 0.001.",
+           "root mean square of 1 / predicted depth - 1 / true depth; predicted depths below 0.001"
+           " are replaced by 0.001.",
            "1 / scene unit", is_root=True, **_ANYWHERE),
     _share("boundary_f1", "Boundary F1",
-           "F1 of pairs of neighbouring pixels whose depth ratio exceeds a threshold; precision and"
-           " recall are means over four directions; weighted mean over ten thresholds from 1.05 to"
-           " 1.25.", redefined=True,
+           "F1 score of the pairs of neighbouring pixels whose depth ratio exceeds a threshold."
+           " Precision and recall are means over four directions. The score is a weighted mean"
+           " over ten thresholds from 1.05 to 1.25.", redefined=True,
            headline={"measured": 6, "interiors": 4}, baselines=(EMPTY_ROOM, CUT_OUT),
            unchanged_by="scale", **_ANYWHERE),
     _share("boundary_recall", "Boundary recall",
-           "fraction of the true pairs of `boundary_f1` that the prediction has, over all"
-           " directions; weighted mean over thresholds with true pairs.",
+           "fraction of the true boundary pairs of `boundary_f1` that are also boundary pairs of"
+           " the prediction; weighted mean over thresholds.",
            lacking="boundary", redefined=True, unchanged_by="scale", **_ANYWHERE),
     _error("flying_points", "Flying points",
-           "fraction of the pixels within 2 pixels of an occlusion edge whose predicted depth lies"
-           " between the two surfaces, farther from either than 5% of their gap.", "fraction",
+           "fraction of the pixels near an occlusion edge whose predicted depth is between the two"
+           " surfaces. Near means at most 2 pixels. Between means more than 5% of the distance of"
+           " the surfaces away from both.", "fraction",
            largest=1.0, lacking="edges", baselines=(HALF,)),
     _angle("relative_normal_degrees", "Relative normals",
-           "mean absolute difference of predicted and true angle between the normals of two pixels"
-           " of one object (without object ids: no depth edge between them), up to 32 pixels apart;"
-           " mean over four scales.", of="points",
+           "mean error of the angle between the normals of two pixels that are on the same object"
+           " and up to 32 pixels apart; mean over four scales. Without object ids, the pixels have"
+           " no depth edge between them.", of="points",
            lacking="pairs", headline={"measured": 7, "interiors": 5},
            baselines=(CUT_OUT, EMPTY_ROOM, FLAT),
            unchanged_by="scale", **_ANYWHERE),
     _share("ordinal_accuracy", "Ordinal accuracy",
-           "fraction of pairs of pixels, whose true depths differ by a factor above 1.02, that the"
-           " predicted depth orders correctly.", lacking="order", **_ORDER),
+           "fraction of pairs of pixels for which the predicted depths have the same order as the"
+           " true depths. True depths of a pair differ by a factor above 1.02.",
+           lacking="order", **_ORDER),
     _share("ordinal_accuracy_within", "Ordinal accuracy within objects",
            "`ordinal_accuracy` of pairs on one object.", lacking="order within",
            unchanged_by="scale_shift"),
     _share("ordinal_accuracy_between", "Ordinal accuracy between objects",
-           "`ordinal_accuracy` of pairs on two objects, or on one and the room.",
+           "`ordinal_accuracy` of pairs on two objects, or on an object and the room.",
            lacking="order between",
            unchanged_by="scale_shift"),
     _error("sawa_h", "SAWA-H",
-           "weighted sum of errors of order, depth after two alignments, boundaries and relative"
-           " normals (arXiv 2510.19814), over the pairs of this benchmark.",
+           "weighted sum of five errors (arXiv 2510.19814): depth order, depth after two"
+           " alignments, boundaries and relative normals.",
            "weighted sum", largest=SAWA_H_WORST, of="points", unchanged_by="scale", **_ANYWHERE),
     _error("scale_log2", "Scale",
-           "log2 of the median over pixels of predicted divided by true depth.", "log2",
+           "log2 of the median, over pixels, of predicted depth divided by true depth.", "log2",
            smallest=-math.inf, signed=True, **_ANYWHERE),
     _error("points_rel", "Points, relative error",
            "mean distance between predicted and true point of a pixel, divided by the true distance"
@@ -390,8 +397,9 @@ TABLE: Sequence[Metric] = (
            "fraction of pixels where the distance between predicted and true point is below a"
            " quarter of the smaller distance from the camera.", **_POINT_MAP),
     _error("local_points_rel", "Local points, relative error",
-           "mean over objects of the mean distance of points, after scale and shift of each object,"
-           " divided by its diameter.", "ratio", lacking="objects", **_SURFACE),
+           "mean distance between predicted and true points of an object, divided by the diameter"
+           " of the object; mean over objects. Each object is aligned by scale and shift.",
+           "ratio", lacking="objects", **_SURFACE),
     _share("local_points_delta_1", "Local points, delta 1",
            "mean over objects of the fraction of pixels where the ratio of `local_points_rel` is"
            " below 0.25.", lacking="objects", **_SURFACE),
@@ -402,15 +410,15 @@ TABLE: Sequence[Metric] = (
            "predicted minus true vertical field of view.", of="field of view", smallest=-180.0,
            signed=True),
     _angle("ray_error_degrees", "Rays, error",
-           "mean angle between the line from the camera to a predicted point and its pixel's ray;"
-           " of point maps.", of="points"),
+           "mean angle between the ray of a pixel and the line from the camera to the predicted"
+           " point; only for point maps.", of="points"),
     _error("ause_abs_rel", "AUSE of AbsRel",
-           "area between the AbsRel of the most confident pixels and that of the pixels with the"
-           " least error, over the fraction left out.", "ratio",
-           of="confidence", baselines=(RANDOM_ORDER, EDGE_DISTANCE), **_ANYWHERE),
+           "area between two curves over the fraction of removed pixels: AbsRel after removing the"
+           " least confident pixels, and AbsRel after removing the pixels with the largest error.",
+           "ratio", of="confidence", baselines=(RANDOM_ORDER, EDGE_DISTANCE), **_ANYWHERE),
     _error("aurg_abs_rel", "AURG of AbsRel",
-           "area between the AbsRel of all pixels and that of the most confident ones, over the"
-           " fraction left out; 0 for a random order.", "ratio", of="confidence",
+           "area between AbsRel of all pixels and the curve of AbsRel after removing the least"
+           " confident pixels; 0 for a random order.", "ratio", of="confidence",
            smallest=-math.inf, higher_is_better=True, **_ANYWHERE),
     _angle("normal_mean_degrees", "Normals, mean",
            "mean angle between predicted and true normals.", **_NORMAL),
@@ -428,10 +436,11 @@ TABLE: Sequence[Metric] = (
            headline={"rooms": 1, "interiors": 6}, printed=8,
            baselines=(*_FLAT_OR_EMPTY, LEANING), **_INSIDE),
     _correlation("shape_correlation", "Shape correlation",
-                 "correlation inside objects of the residuals of predicted and true depth after the"
-                 " least-squares plane of each object.", lacking="bends", **_SURFACE),
+                 "correlation between predicted and true depth inside objects, after the"
+                 " least-squares plane of each object is subtracted from both.",
+                 lacking="bends", **_SURFACE),
     _share("shape_recall_0.02", "Shapes within 0.02",
-           "fraction of objects whose own `shape_error` is below 0.02 scene units.",
+           "fraction of objects with a `shape_error` below 0.02 scene units.",
            of="points", **_INSIDE),
     _angle("shape_normal_degrees", "Normals inside objects",
            "mean angle between predicted and true normals inside objects.", of="normals",
@@ -463,14 +472,15 @@ TABLE: Sequence[Metric] = (
            "`object_normal_mean_degrees` of normals derived from the predicted and from the true"
            " points.", lacking="objects", **_SURFACE),
     _correlation("relief_correlation", "Relief correlation",
-                 "correlation of predicted and true relief: planar depth of the empty room minus"
-                 " that of the surface.", **_RELIEF),
+                 "correlation between predicted and true relief. Relief is the planar depth of the"
+                 " empty room minus the planar depth of the surface.", **_RELIEF),
     _share("relief_iou", "Segmentation (relief IoU)",
-           "foreground IoU: pixels where predicted and true relief both exceed 0.05 scene units,"
-           " divided by those where either does.", headline={"rooms": 3}, printed=6, **_RELIEF),
+           "foreground IoU: number of pixels where predicted and true relief both exceed 0.05"
+           " scene units, divided by the number of pixels where at least one of them does.",
+           headline={"rooms": 3}, printed=6, **_RELIEF),
     _share("solid_iou", "Solid IoU",
-           "length of the rays that is inside objects in prediction and ground truth, divided by"
-           " that inside either.",
+           "intersection over union, along the rays, of the predicted and the true spans inside"
+           " objects.",
            headline={"layers": 1},
            baselines=(CONSTANT, SIZED, INFLATED, MIRRORED), **_LAYERS),
     _error("back_depth_error", "Back depth error",
@@ -482,25 +492,27 @@ TABLE: Sequence[Metric] = (
     _error("seen_chamfer", "Chamfer, seen",
            "Chamfer distance of the surfaces of objects in the first layer.", **_LAYERS),
     _share("layer_recall_0.02", "Layer recall",
-           "fraction of the true layers of objects behind the first whose depth is within 0.02"
-           " scene units of the predicted layer of the same number.",
+           "fraction of the true layers of objects, from layer 2 on, whose depth is within 0.02"
+           " scene units of the predicted layer with the same number.",
            headline={"layers": 4}, **_LAYERS),
     *(_share(f"layer_{number}_recall_0.02", f"Layer recall, layer {number}",
              f"`layer_recall_0.02` of layer {number}.", **{**_LAYERS, "lacking": lacking})
       for number, lacking in ((2, "solids"), (3, "layer 3"), (4, "layer 4"))),
     _share("hidden_object_recall", "Hidden objects",
-           "fraction of the objects that less than 1% of their rays meet first for which at least"
-           " half of the rays have a predicted span with an IoU above 0.5 with the true one.",
+           "fraction of hidden objects that are predicted. A hidden object is the first surface on"
+           " less than 1% of its rays. A predicted object has, on at least half of its rays, a"
+           " predicted span with an IoU above 0.5 with the true span.",
            **{**_LAYERS, "lacking": "hidden objects"}),
     _error("whole_chamfer", "Chamfer, whole surfaces",
-           "Chamfer distance of the whole surfaces of objects, of 4096 points of each, drawn evenly"
-           " by area.", **_MESHES),
+           "Chamfer distance between the predicted mesh and the whole true surfaces of objects,"
+           " each represented by 4096 points drawn evenly by area.", **_MESHES),
     _share("whole_f_score_0.02", "F-score, whole surfaces",
-           "F-score of these points at 0.02 scene units.", **_MESHES),
+           "F-score of the points of `whole_chamfer` at 0.02 scene units.", **_MESHES),
     _error("whole_chamfer_noise", "Chamfer, noise level",
-           "`whole_chamfer` of other points of the true surfaces.", **_MESHES),
+           "`whole_chamfer` between two random draws of points of the true surfaces.", **_MESHES),
     _share("iqtt_accuracy", "IQTT accuracy",
-           "1 if the correct option is chosen, else 0 (also abstentions); chance is 1 / options.",
+           "fraction of questions with a correct response. Abstentions are wrong. Chance is 1"
+           " divided by the number of options.",
            of="answers", tasks=("iqtt",), headline={"iqtt": 1}),
 )  # fmt: skip
 

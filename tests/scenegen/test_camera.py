@@ -108,11 +108,11 @@ def test_back_projection_keeps_misses_as_nan() -> None:
 @settings(deadline=None)
 @given(height=SIDE, width=SIDE, fov=FOV)
 def test_every_image_has_the_diagonal_of_a_square_one(height: int, width: int, fov: float) -> None:
+    diagonal = math.tan(math.radians(fov) / 2) * math.sqrt(2)
+    half = diagonal / math.hypot(1, width / height)
     fov_y = Camera.fov_y_from_square(fov, height, width)
-    half = math.tan(math.radians(fov_y) / 2)
-    diagonal = math.hypot(half, half * width / height)
-    square = math.tan(math.radians(fov) / 2) * math.sqrt(2)
-    assert diagonal == pytest.approx(square, rel=1e-9)
+    # Fields of view have 9 decimals.
+    assert fov_y == pytest.approx(math.degrees(2 * math.atan(half)), rel=0, abs=6e-10)
 
 
 @given(height=SIDE, width=SIDE, fov=FOV)

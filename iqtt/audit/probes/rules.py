@@ -222,11 +222,11 @@ def _of_rooms(statistics: Array, right: Array, masks: Array) -> Iterator[_Guess]
 
 
 def _by_angle(guesses: Sequence[_Guess], angles: Array) -> list[_Guess]:
-    """Return guesses that compare with the reference, for each bin of angles."""
+    """Return guesses of what is nearest to the reference, for each bin of angles."""
     bins = np.digitize(angles, ANGLE_BINS[1:-1])
     return [
         (f"{statistic}, {rule}", span, OUTLINE, hits[bins == number])
-        for statistic, rule, sees, hits in guesses if sees == OUTLINE
+        for statistic, rule, sees, hits in guesses if sees == OUTLINE and rule != "farthest"
         for number, span in enumerate(SPANS)
     ]  # fmt: skip
 

@@ -116,6 +116,7 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
     moved = product(camera_from_world[image], batch.world_from_object[image, slot])
     placed[: len(model), :12] = moved.reshape(-1, 12)
     placed[: len(model), 12] = batch.pixel_heights[image]
+    directions = batch.directions
 
     shift = (first_face[model] - first_thread) % 2**32
     starts = np.stack([image, shift, first_vertex[model], first_normal[model]], axis=1)
@@ -132,7 +133,7 @@ def upload_triangles(batch: SceneBatch, meshes: Sequence[Mesh], rays: int) -> Tr
         normals=normals,
         draw=upload(np.repeat(np.arange(len(model)), threads), np.uint32),
         placed=upload_table(placed),
-        directions=None if batch.directions is None else upload_table(batch.directions),
+        directions=None if directions is None else upload_table(directions),
         starts=upload_rows([starts], np.uint32)[0],
         slot=upload(slot, np.uint32),
     )

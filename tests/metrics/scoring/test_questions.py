@@ -14,7 +14,8 @@ from baselines.trivial import write_chance
 from iqtt.files.make import make_split
 from iqtt.files.reader import open_questions
 from iqtt.floors import CHANCE, Floor, Measured, floor_of_questions, floors_of, settings_of, to_json
-from iqtt.questions.kinds import question_kind
+from iqtt.perspective.specs import perspective_spec
+from iqtt.questions.kinds import ROOM_KINDS, question_kind
 from iqtt.questions.specs import PRESETS, SUITE, SplitSpec, preset_spec
 from metrics.measures.statistics import design_effect, wilson_interval
 from metrics.prediction_writer import PredictionError, write_answers
@@ -175,3 +176,9 @@ def test_the_package_has_the_floors_of_every_preset():
         assert all(floor.questions >= 2000 for floor in floors_of(spec).values())
     assert floors_of(preset_spec("suite")).keys() >= SUITE.keys()
     assert floors_of(preset_spec("small", min_angle_degrees=0.0)) == {}
+    for angle in ((20, 120), (60, 120)):
+        for split in ("all", "test"):
+            rooms = perspective_spec("perspective", angle=angle, object_split=split, spp=16)
+            assert floors_of(rooms).keys() == {*ROOM_KINDS}
+            assert 0.4 < floors_of(rooms)["moved"].accuracy < 0.6
+    assert floors_of(perspective_spec("perspective", angle=(30, 60))) == {}
