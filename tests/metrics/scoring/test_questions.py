@@ -80,7 +80,6 @@ def test_intervals_take_shapes_as_independent(questions, tmp_path):
     assert (one.low, one.high) == pytest.approx(wilson_interval(15 / effect, 30 / effect))
     assert (other.low, other.high) == pytest.approx(wilson_interval(15, 30))
     assert "shape" not in plain.items
-    assert "shape" not in plain.items
     assert (plain.by_distractor, plain.skills) == ({}, {})
     given[0] = -1
     (tmp_path / "b.json").write_text(json.dumps({"answers": given.tolist(), "method": "m"}))

@@ -50,7 +50,7 @@ def whole(text: str) -> dict[str, str]:
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="sends signals")
-@pytest.mark.filterwarnings("ignore:removed what an earlier run left")
+@pytest.mark.filterwarnings("ignore:removed files of an earlier")
 @pytest.mark.parametrize("older", [False, True])
 def test_killed_at_every_step(tmp_path, older):
     """A new folder is whole or not there; an older one is never mixed; the next run works."""
