@@ -128,8 +128,8 @@ def read_as(
 @reading_options(*DEPTH_KINDS, "points")
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
               help="Alignment to the ground truth that the predictions need, such as scale for"
-              " predictions up to a scale. Disparity up to a shift needs scale_shift [default: none;"
-              " scale_shift for disparity].")
+              " predictions up to a scale. Disparity up to a shift needs scale_shift [default:"
+              " none; scale_shift for disparity].")
 @click.option("--confidence", metavar="FILES",
               help="Files with the confidence of each pixel, in the formats of --depth. Any scale"
               " is allowed.")
