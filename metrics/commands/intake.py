@@ -287,8 +287,8 @@ def _print_hints(out: str, data: Any) -> None:
               help="Pass the true camera matrix to the model. The output file records this option.")
 @ENCODING
 @click.option("--exposure", type=Factor(), default=1.0, show_default=True,
-              help="Factor that multiplies the radiance of the input images. Products above 1 are an"
-              " error.")
+              help="Factor that multiplies the radiance of the input images. Products above 1 are"
+              " an error.")
 @click.option("--key", help="Key of the model output to use [default: the first of the keys"
               " above that the model returns].")
 @FRAME
