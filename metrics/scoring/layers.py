@@ -17,7 +17,7 @@ from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.rules import refuse_pixels
 from metrics.submissions.truths import TrueView
-from scenegen.camera import pixel_directions, pixel_size, pixels_of
+from scenegen.camera import pixel_directions, pixel_size
 from scenegen.common.errors import SceneGenError
 from scenegen.files.content import row_digest
 from scenegen.rooms.reader import RoomsFile
@@ -107,11 +107,7 @@ def read_true_layers(truth: RoomsFile, row: int, view: TrueView) -> TrueLayers:
 
 
 def true_points(truth: RoomsFile, row: int) -> list[NDArray[Any]] | None:
-    """Return two draws of points of a row's objects, camera frame; None without their meshes.
-
-    Points inside of solids, such as those of parts that overlap, are left out. They are those that
-    are inside on the rays of all 9 pixels around, and 0.02 away from the ends.
-    """
+    """Return two draws of points of a row's objects, camera frame; None without their meshes."""
     from scenegen.objects.catalogue import objects_of
     from scenegen.objects.scene_mesh import world_from_object
 
@@ -119,34 +115,15 @@ def true_points(truth: RoomsFile, row: int) -> list[NDArray[Any]] | None:
         objects = objects_of(truth.spec)
     except SceneGenError:  # meshes of a folder
         return None
-    room = truth[row]
-    meshes = []
+    room, meshes = truth[row], []
     for item in room.scene.objects:
         pose = world_from_object(item.position, item.rotation, item.scale)
         corners = objects.shape(item.shape).triangles.reshape(-1, 3)
-        meshes.append(corners @ pose[:3, :3].T + pose[:3, 3])
+        meshes.append(corners @ pose[:3, :3].T + pose[:3, 3] - room.world_from_camera[:3, 3])
     if not meshes:
         return None
-    triangles = np.concatenate(meshes).reshape(-1, 3, 3)
-    rotation, place = room.world_from_camera[:3, :3], room.world_from_camera[:3, 3]
-    height, width = room.depth.shape
-    layers = (room.truth[f"layers/{x}"] for x in ("depth", "entering"))
-    spans = solids.entered_spans(*(x.reshape(height * width, -1).T for x in layers))
-    starts, ends = (
-        np.pad(x.reshape(-1, height, width), ((0, 0), (1, 1), (1, 1)), constant_values=np.inf)
-        for x in spans
-    )
-    draws = []
-    for draw in whole.DRAWS[1:]:
-        points = (whole.drawn_points(triangles, row, draw) - place) @ rotation
-        depth = -points[:, 2]
-        line, column, inside = pixels_of(points, (height, width), room.lens)
-        for i, j in np.ndindex(3, 3):
-            start, end = starts[:, line + i, column + j], ends[:, line + i, column + j]
-            deep = (start + whole.NEAR < depth) & (depth < end - whole.NEAR)
-            inside &= deep.any(axis=0)
-        draws.append(points[~inside])
-    return draws
+    triangles = (np.concatenate(meshes) @ room.world_from_camera[:3, :3]).reshape(-1, 3, 3)
+    return [whole.drawn_points(triangles, row, draw) for draw in whole.DRAWS[1:]]
 
 
 def score_layers(

@@ -37,7 +37,7 @@ def drawn_points(triangles: Array, row: int, draw: str) -> NDArray[np.float32]:
 def surface_scores(predicted: Array | None, true: list[Array] | None) -> dict[str, float]:
     """Return the scores of predicted points (N, 3); NaN where they or the true ones are None."""
     scores = dict.fromkeys(("whole_chamfer", "whole_f_score_0.02", "whole_chamfer_noise"), np.nan)
-    if predicted is None or true is None or not all(map(len, true)):
+    if predicted is None or true is None:
         return scores
     for name, points in (("whole_chamfer", predicted), ("whole_chamfer_noise", true[1])):
         nearest = nearest_distances(points, true[0])
