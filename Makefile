@@ -5,6 +5,8 @@ BIN = $(VENV)/bin
 WORKERS ?= 2
 # Where bytecode is not kept, each process of a test compiles all libraries again.
 unexport PYTHONDONTWRITEBYTECODE
+# The workers share the processors; threads of small products would spin beside them.
+test: export OPENBLAS_NUM_THREADS = 1
 
 PIP = $(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt
 

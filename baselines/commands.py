@@ -129,8 +129,8 @@ def _listed(names: Iterable[str]) -> str:
 @click.option(
     "--features",
     type=InputPath(),
-    help="Input of the baseline features: a .npy file of shape (Q, 1 + K, D). It has one vector for"
-    " the reference and for each of the K options, for all Q questions of --data.",
+    help="Input of the baseline `features`: a .npy file of shape (Q, 1 + K, D). For each of the Q"
+    " questions of --data, the file has D features of the reference and of each of the K options.",
 )
 @click.option(
     "--train-features",
@@ -144,7 +144,7 @@ def _listed(names: Iterable[str]) -> str:
     type=click.IntRange(0, LARGEST),
     default=0,
     show_default=True,
-    help="Random seed of the baseline chance.",
+    help="Random seed of the baseline `chance`.",
 )
 @click.option(
     "--weights",
@@ -373,7 +373,7 @@ def probe(model: str, data: str, out: str, device: str, batch: int) -> None:
     """Measure how well each layer of a frozen encoder recognises a shape in two images.
 
     For each layer, the response is the option with the highest cosine similarity to the reference.
-    Nothing is trained. The output folder contains the predictions and scores of each layer. Its
+    Nothing is trained. The output folder contains the predictions and scores of each layer. The
     figure layers.png shows the accuracy of each layer.
     """
     needs_torch("bench probe", ("torch", "transformers"))

@@ -39,7 +39,7 @@ DEVICE = click.option(
 MINUTES = click.option(
     "--minutes",
     type=click.FloatRange(0, 1e6, min_open=True),
-    help="Duration of training in minutes. The schedule gets as many iterations as fit.",
+    help="Duration of training in minutes. Training has as many iterations as fit into this time.",
 )
 ALLOW_TEST_SET = click.option(
     "--allow-test-set", is_flag=True, help="Allow training on a named benchmark or its scenes."

@@ -49,8 +49,8 @@ def ask(
 
     The images are rendered again from the cubes of FILE, in sRGB, with letters on the options. The
     package Inspect sends the requests and logs every reply; `inspect view` shows the log. Failed
-    requests are left out of the output. Re-run the same command to repeat the failed requests. If
-    a reply states no answer, `bench score` counts it as wrong.
+    requests are left out of the output. Re-run the same command to repeat the failed requests.
+    `bench score` counts a reply without an answer as wrong.
     """
     needs("bench ask", ("inspect_ai",), "vlm")
     from iqtt.vlm.rows import Asked, count_rows

@@ -32,7 +32,7 @@ from scenegen.command_line.paths import InputPath, OutputPath
     " by size of the object; kind: by distractor type, or by category of the object.",
 )
 @click.option(
-    "--truth", type=InputPath(), help="File of rooms. FILES are then predictions of this file."
+    "--truth", type=InputPath(), help="File of rooms. With --truth, FILES are predictions."
 )
 @click.option(
     "--items", type=Items(), help="Images to show in the grid, with --truth [default: 0-3]."

@@ -83,7 +83,7 @@ def reading_options(*kinds: str) -> Callable[[Command], Command]:
                      help="Unit of the values. 1 m is one scene unit."),
         click.option("--scale", type=Factor(),
                      help="Factor that converts stored values to metres, such as 1/256. For"
-                     " disparity, it converts to 1 / metres."),
+                     " disparity, the factor converts to 1 / metres."),
         click.option("--invalid", type=float, multiple=True,
                      help="Stored value that marks invalid pixels, such as 0. Repeatable."),
         click.option("--normals", metavar="FILES",
@@ -128,8 +128,8 @@ def read_as(
 @reading_options(*DEPTH_KINDS, "points")
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
               help="Alignment to the ground truth that the predictions need, such as scale for"
-              " predictions up to a scale [default: none; scale_shift for disparity]. With none or"
-              " scale, disparity is 1 / depth without a shift.")
+              " predictions up to a scale. Disparity up to a shift needs scale_shift [default:"
+              " none; scale_shift for disparity].")
 @click.option("--confidence", metavar="FILES",
               help="Files with the confidence of each pixel, in the formats of --depth. Any scale"
               " is allowed.")
@@ -272,23 +272,23 @@ def _print_hints(out: str, data: Any) -> None:
 @METHOD
 @RUN
 @NOTES
-@click.option("--device", help="Device of the model, such as cuda. In a Python file, load() takes"
-                               " it as an argument.")
-@click.option("--dtype", help="Data type of the model, such as bfloat16. In a Python file, load()"
-                              " takes it as an argument.")
+@click.option("--device", help="Device of the model, such as cuda. In a Python file, load(device)"
+                               " gets this value.")
+@click.option("--dtype", help="Data type of the model, such as bfloat16. In a Python file,"
+                              " load(dtype) gets this value.")
 @click.option("--python", type=InputPath(), metavar="PROGRAM",
               help="Python interpreter of another environment to run the model in, such as"
               " ~/envs/da3/bin/python. The environment needs Python 3.9 or newer and NumPy, but not"
               " this package.")
 @click.option("--batch", type=click.IntRange(1, 4096),
-              help="Number of images per call of infer_batch(). In a Python file, load() can take"
-              " it as an argument [default: 8].")
+              help="Number of images per call of infer_batch(). In a Python file, load(batch) can"
+              " also get this value [default: 8].")
 @click.option("--intrinsics", is_flag=True,
-              help="Pass the true camera matrix to the model. The output file records this.")
+              help="Pass the true camera matrix to the model. The output file records this option.")
 @ENCODING
 @click.option("--exposure", type=Factor(), default=1.0, show_default=True,
-              help="Factor that multiplies the radiance of the input images. Values above 1 are an"
-              " error.")
+              help="Factor that multiplies the radiance of the input images. Products above 1 are"
+              " an error.")
 @click.option("--key", help="Key of the model output to use [default: the first of the keys"
               " above that the model returns].")
 @FRAME
@@ -319,8 +319,8 @@ def run(
     of an option or one score per option.
 
     Instead of the function infer, the file can define a class with the method infer, or a function
-    load() that returns an object with this method. MODEL can also be a file of MoGe's evaluation.
-    OPTIONS after -- are passed to its load(). docs/evaluate.md has examples.
+    load() that returns an object with this method. MODEL can also be a file of MoGe's evaluation
+    code: the load() of this file gets the OPTIONS after --. docs/evaluate.md has examples.
 
     \b
     points_metric, depth_metric: in metres; in box rooms, in scene units

@@ -43,7 +43,7 @@ def _list() -> None:
 )
 @WORKERS
 def make(name: str, out: str, workers: int) -> None:
-    """Make a named benchmark, and check that its ground truth equals the published one.
+    """Make a named benchmark, and compare its ground truth with the published hash.
 
     Files that already exist are kept and checked. Re-run the same command to resume an interrupted
     run.

@@ -112,7 +112,8 @@ def compare(
 @TRUTH
 @click.option(
     "--metric", "metrics", multiple=True,
-    help="Metric to show. Repeatable; the first metric ranks [default: the main metrics].",
+    help="Metric to show. Repeatable. Methods are ranked by the first --metric [default: the main"
+    " metrics].",
 )  # fmt: skip
 @click.option(
     "--format",
@@ -129,7 +130,7 @@ def compare(
 @click.option(
     "--label",
     default="",
-    help=r"Label of the first LaTeX table, for \ref. The labels of further tables add a number.",
+    help=r"Label of the first LaTeX table, for \ref. Further tables get this label and a number.",
 )
 @click.option("--out", type=OutputPath(), help="Output file [default: print the tables].")
 @ALIGN

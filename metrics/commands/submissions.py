@@ -15,9 +15,8 @@ from scenegen.commands.viewing import RECORDING, record
 TRUTH = click.option(
     "--truth",
     type=InputPath(),
-    help="Ground truth: a file of rooms, or the answer key of questions [default: the path stored"
-    " in"
-    " PREDICTIONS. Without --truth, only scores on named benchmarks are ranked].",
+    help="Ground truth: a file of rooms, or the answer key of questions. Without --truth, only"
+    " scores on named benchmarks are ranked [default: the path stored in PREDICTIONS].",
 )
 
 
@@ -52,7 +51,7 @@ TRUTH = click.option(
     multiple=True,
     type=InputPath(),
     metavar="SCORES.json",
-    help="Score file of another method on the same ground truth. Its scores are added to the page"
+    help="Score file of another method on the same ground truth, whose scores are added to the page"
     " of --html. Repeatable.",
 )
 @click.option(
@@ -80,15 +79,15 @@ TRUTH = click.option(
 @click.option(
     "--allow-partial",
     is_flag=True,
-    help="Allow predictions of a part of the images or questions. The scores are then not ranked.",
+    help="Allow predictions of a part of the images or questions. Partial scores are not ranked.",
 )
 @click.option(
     "--non-finite",
     type=click.Choice(["error", "penalise"]),
     default="error",
     show_default=True,
-    help="Predicted values that are not finite. error: refuse them; penalise: give the image the"
-    " worst possible scores. Penalised scores are not ranked.",
+    help="What to do with predicted values that are not finite. error: refuse the file; penalise:"
+    " give the image the worst possible scores. Penalised scores are not ranked.",
 )
 @click.option(
     "--processes",
@@ -105,9 +104,9 @@ TRUTH = click.option(
 @click.option(
     "--align",
     type=click.Choice(FITS),
-    help="Alignment that is fitted to the ground truth of each image before scoring. It needs at"
-    " least as many free parameters as the alignment that the submission declares [default: the"
-    " declared alignment].",
+    help="Alignment that is fitted to the ground truth of each image before scoring. An alignment"
+    " with fewer free parameters than the declared alignment is refused [default: the alignment"
+    " that the submission declares].",
 )
 @click.option(
     "--figure",

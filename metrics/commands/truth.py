@@ -35,8 +35,8 @@ LAYOUTS = ("moge", "nyu", "nyu-raw", "kitti", "diode", "hypersim", "sintel")
 @click.option("--groups", type=InputPath(), metavar="GROUPS.csv",
               help="CSV file with lines `image,group`. Images of one scene or drive form a group.")
 @click.option("--mask", metavar="FILES", help="Mask images. Pixels with the value 0 are ignored.")
-@click.option("--layout", type=click.Choice(LAYOUTS), help="Public data set that --data contains,"
-                                                           " as downloaded.")
+@click.option("--layout", type=click.Choice(LAYOUTS), help="Public data set in --data, with the"
+                                                           " folder layout of its download.")
 @click.option("--data", type=InputPath(), metavar="FOLDER", help="Folder or file of the public"
                                                                  " data set.")
 @click.option("--split", type=InputPath(),

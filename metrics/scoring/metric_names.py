@@ -113,7 +113,7 @@ BASELINES = {
         "the true depth, averaged over 2 x 2 pixels and enlarged bilinearly.",
     ),
     OTHER_SCENE: Baseline(
-        "shuffled", "another scene",
+        "shuffled", "same predictions, scored against other scenes",
         "the same prediction against the relief of another scene in the same view.",
         of_truth=False,
     ),

@@ -54,7 +54,7 @@ NOT_COMPARABLE = (
 )
 BELOW = (
     "Methods below the baseline row are not significantly better than the baseline, so they have no"
-    " rank; the next column orders them."
+    " rank. They are ordered by the next column."
 )
 SHARED = (
     "Methods share a rank if the 95% CI of their paired difference contains 0. Bold scores are"

@@ -73,7 +73,7 @@ def text_report(
         tables += [t for t in group_tables(scores) if t.title == BY_KIND and len(kinds) > 1]
         missing = _not_scored(scores)
         count = f"{len(scores.metrics)} metrics, " * (len(scores.metrics) > 1)
-        notes.append(f"more: --all ({count}by group), --json, --html{missing}")
+        notes.append(f"more: --all ({count}scores by group), --json, --html{missing}")
     return (to_markdown if as_markdown else to_text)(title, tables, notes, width)
 
 
@@ -342,12 +342,13 @@ def notes_of(scores: ScoreFile) -> list[str]:
         over = "questions"
         if "shape" in scores.items:
             over = f"{len(np.unique(scores.items['shape']))} reference shapes"
-        notes.append(f"CIs: {how}, over {over}; abstentions and ties count as wrong")
+        notes.append(f"CIs: {how}, over {over}; missing responses and ties count as wrong")
         notes += unread_notes([scores])
     runs = ", ".join(run.sha256[:12] for run in meta.submissions)
     return [
         *notes,
-        f"ground truth {meta.truth_digest[:12]} ({source_text(meta)}); predictions {plain(runs)}",
+        f"hash of the ground truth: {meta.truth_digest[:12]} ({source_text(meta)});"
+        f" hash of the predictions: {plain(runs)}",
     ]
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 RECORDING = click.option(
     "--out", type=OutputPath(), metavar="FILE.rrd",
-    help="Output recording [rooms.rrd for rooms.h5].",
+    help="Output file [default: rooms.rrd for rooms.h5].",
 )  # fmt: skip
 
 

@@ -40,10 +40,12 @@ def costs_of_masks(table: AuditTable, rows: Array) -> Array:
         with suppress(SceneGenError):
             truth = table.questions.truth(row)
             assert isinstance(truth, RoomTruth)
-            assert truth.scenes[0].interior
+            inside = truth.scenes[0].interior
+            if inside is None:
+                continue
             batch = pack(table.spec.interior(), truth.scenes)
             ids = launch_fields(batch, ["object_id"])()["object_id"]
-            moving = with_carried(truth.scenes[0].interior.stands_on, truth.in_play)
+            moving = with_carried(inside.stands_on, truth.in_play)
             costs[i] = mask_costs(ids, truth.in_play, sorted(moving))
     return costs
 

@@ -296,4 +296,4 @@ def _notes(
     least = min(1.0, least_p_value(clusters) * tests)
     if files[0].task != "iqtt" and least > ALPHA:
         counted = f"{clusters} {files[0].unit}" + f" and {tests} comparisons" * (tests > 1)
-        yield f"no verdict is possible with {counted}: the smallest p (Holm) is {least:.3g}"
+        yield f"no verdict is possible with {counted}: p (Holm) is at least {least:.3g}"

@@ -142,17 +142,20 @@ def _notes(comparison: Comparison, files: Sequence[ScoreFile]) -> list[str]:
     tests = {d.test for d in comparison.differences}
     items, apart = _units(comparison)
     if len(tests) > 1:
-        test = "exact McNemar test, or sign flips for means over several runs"
+        test = "McNemar's exact test, or a sign-flip test for means over several runs"
     elif tests == {SIGN_FLIP}:
-        test = f"sign flips per {apart[:-1]}"
+        test = f"a sign-flip test over {apart}"
     else:
-        test = "exact McNemar test"
+        test = "McNemar's exact test"
     return [
         *skill_notes(files[0]),
-        "difference: method - first method, paired, with its uncorrected"
-        f" {CONFIDENCE:.0%} bootstrap CI over {apart}",
-        f"b/w/s: number of {items} that are better, worse, the same; p: {test}, two-sided; Holm:"
-        f" corrected for all comparisons ({len(comparison.differences)}); verdict: at {ALPHA:.0%}",
+        "difference: score of the method minus score of the first method, with a"
+        f" {CONFIDENCE:.0%} CI from a paired bootstrap over {apart} (without Holm's correction)",
+        "verdict: whether the method is better or worse than the first method; not shown if p"
+        f" (Holm) is above {ALPHA:g}",
+        f"b/w/s: number of {items} in which the method is better, worse, the same",
+        f"p (Holm): two-sided p-value of {test}, with Holm's correction for all"
+        f" {len(comparison.differences)} comparisons",
         "MDE: minimum detectable effect, the smallest difference that this test set detects with"
         f" {POWER:.0%} power"
         " after the correction",

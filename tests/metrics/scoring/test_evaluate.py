@@ -13,7 +13,7 @@ import pytest
 from h5_edits import put, replaced, told_again
 from refusals import refused
 from submissions import good_answers, good_rooms
-from threadpoolctl import threadpool_info
+from threadpoolctl import threadpool_info, threadpool_limits
 
 from baselines.trivial import write_room_baseline
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
@@ -403,6 +403,7 @@ def threads():
 
 
 @pytest.mark.parametrize("processes", [None, 1])
+@threadpool_limits.wrap(limits=2)
 def test_small_products_use_one_thread(tmp_path, rooms_path, monkeypatch, processes):
     """Of OpenBLAS and the like, which would let others spin beside them; and as before after it."""
     write_room_baseline("oracle", rooms_path, tmp_path / "oracle.h5")
