@@ -23,9 +23,9 @@ from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.names import check_choice
 from scenegen.common.random.seeding import Purpose, item_rng
 from scenegen.files.content import SHA256, dataset_digest, seal
+from scenegen.files.images.pictures import after_jpeg
 from scenegen.files.input_file import is_virtual
 from scenegen.files.new_file import written_beside
-from scenegen.files.pictures import after_jpeg
 from scenegen.layout import CORRUPTION
 
 Array = NDArray[Any]

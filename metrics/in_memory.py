@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 from metrics.intake.outputs import Frame, Geometry, OutputError, fitted_to, image_of, read_output
 from metrics.measured.reader import is_flat
 from metrics.measures.alignment import Alignment
-from metrics.scoring.image_scores import NonFinite, reference_of, score_prediction
+from metrics.scoring.images.image_scores import NonFinite, reference_of, score_prediction
+from metrics.scoring.images.panoramas import baselines_of, score_panorama
 from metrics.scoring.metric_names import OTHER_SCENE
-from metrics.scoring.panoramas import baselines_of, score_panorama
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import score_rooms
 from metrics.scoring.runs import RoomRuns, Settings

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from metrics.measured.reader import Images, MeasuredFile, matrix_of, rays_of
 from metrics.score_file import read_scores
-from metrics.scoring.geometry import points_as_scored
-from metrics.scoring.layers import fitted_layers, read_true_layers
-from metrics.scoring.measured_rows import points_as_declared
+from metrics.scoring.images.geometry import points_as_scored
+from metrics.scoring.images.layers import fitted_layers, read_true_layers
+from metrics.scoring.images.measured_rows import points_as_declared
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.runs import ScoringError

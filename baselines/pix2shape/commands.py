@@ -395,7 +395,7 @@ def _model_and_rooms(
     needs_torch()
     from baselines.pix2shape.pictures import check_picture, open_known_rooms
     from baselines.pix2shape.weights import open_weights, suited
-    from scenegen.files.pictures import pick_rows
+    from scenegen.files.images.pictures import pick_rows
 
     check_picture(out, animated, overwrite)
     model, card = open_weights(weights or suited(data))

@@ -28,8 +28,8 @@ from scenegen.common.errors import SceneGenError, SpecError
 from scenegen.common.names import check_choice
 from scenegen.common.random.seeding import Purpose, item_seed
 from scenegen.description.specs import DatasetSpec, request_from_json
+from scenegen.files.images.pictures import check_picture_name, check_picture_size, save_picture
 from scenegen.files.new_file import check_writable, written_beside
-from scenegen.files.pictures import check_picture_name, check_picture_size, save_picture
 from scenegen.rooms import preview
 from scenegen.rooms.preview import BACKGROUND, GAP, SMALLEST_TILE
 from scenegen.sampling.cameras import sample_cameras

@@ -23,7 +23,7 @@ from baselines.training.baseline import Baseline, Views
 from baselines.training.checkpoint import Method
 from baselines.training.images import Array, check_reducible
 from baselines.training.rooms import Rooms, camera_poses, read_rooms, room_sizes
-from metrics.measures.solids import entered_spans, round_bodies
+from metrics.measures.hidden.solids import entered_spans, round_bodies
 from scenegen.camera import pixel_size
 from scenegen.common.errors import SpecError
 from scenegen.rooms.reader import RoomsFile

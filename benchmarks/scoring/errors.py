@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter, map_coordinates
 
 from metrics.measures.pairs import spread
-from metrics.scoring.image_scores import reference_of, score_prediction
+from metrics.scoring.images.image_scores import reference_of, score_prediction
 from metrics.scoring.metric_names import metric
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.truths import read_true_view

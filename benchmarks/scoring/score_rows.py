@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from metrics.prediction_writer import RoomPredictionWriter
-from metrics.scoring.rows import score_rows
+from metrics.scoring.images.rows import score_rows
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import open_predictions
 from scenegen.description.specs import DatasetSpec

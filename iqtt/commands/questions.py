@@ -57,7 +57,7 @@ def show(
     from iqtt.files.preview import question_sheet
     from iqtt.files.reader import QuestionsFile, answers_beside, open_tables
     from scenegen.common.errors import SpecError
-    from scenegen.files.pictures import pick_rows, save_picture
+    from scenegen.files.images.pictures import pick_rows, save_picture
 
     beside, first = answers_beside(file) if answers else None, open_tables(file)[0]
     with first, QuestionsFile(first.opened, part or first.part, beside) as questions:

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from scenegen.common.errors import FileFormatError, SceneGenError
 from scenegen.description.specs import MAX_PIXELS
-from scenegen.files.exr import exr_channels, layers_of
-from scenegen.files.pictures import ORIENTATION, opened_picture, upright
+from scenegen.files.images.exr import exr_channels, layers_of
+from scenegen.files.images.pictures import ORIENTATION, opened_picture, upright
 
 Array = NDArray[Any]
 MOST_CHANNELS = 4

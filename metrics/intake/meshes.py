@@ -13,7 +13,7 @@ from metrics.intake.importing import keys_of, names_of
 from metrics.intake.outputs import FRAMES
 from metrics.intake.reading import Reading
 from metrics.measured.reader import size_of
-from metrics.measures.solids import entered_spans
+from metrics.measures.hidden.solids import entered_spans
 from metrics.measures.surfaces.whole import drawn_points
 from metrics.submissions.hints.frames import AXES, frame_text
 from metrics.submissions.layout import Shown

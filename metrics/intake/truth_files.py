@@ -20,7 +20,7 @@ from metrics.measured.reader import rays_of_matrix
 from metrics.measured.writer import Measured, Source, TruthError
 from scenegen.common.errors import SceneGenError
 from scenegen.description.specs import MAX_PIXELS
-from scenegen.files.pictures import READ, picture_size, read_picture
+from scenegen.files.images.pictures import READ, picture_size, read_picture
 
 Array = NDArray[Any]
 # What the median of a room's or a street's depth in metres is multiplied by, and how to say it.

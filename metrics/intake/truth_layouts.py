@@ -24,6 +24,7 @@ from metrics.measured.writer import Measured, Source, TruthError
 from scenegen.common.errors import FileFormatError
 from scenegen.description.specs import MAX_PIXELS
 from scenegen.files import trial
+from scenegen.files.images.pictures import opened_picture, picture_size, read_picture
 from scenegen.files.input_file import (
     HDF5_ERRORS,
     StoredArray,
@@ -31,7 +32,6 @@ from scenegen.files.input_file import (
     open_file,
     open_unchecked,
 )
-from scenegen.files.pictures import opened_picture, picture_size, read_picture
 from scenegen.files.places import files_below
 from scenegen.rooms.export.moge import log_depth
 

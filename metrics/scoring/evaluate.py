@@ -8,7 +8,7 @@ from typing import TypeVar
 from metrics.measured.protocols import ProtocolError
 from metrics.measured.reader import MeasuredFile, open_images
 from metrics.measures.alignment import Alignment
-from metrics.scoring.geometry import alignments_scored
+from metrics.scoring.images.geometry import alignments_scored
 from metrics.scoring.questions import score_questions
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.rooms import score_measured, score_rooms

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import metrics.measures
-from metrics.scoring import geometry, image_scores
-from metrics.scoring.image_scores import FirstView
+from metrics.scoring.images import geometry, image_scores
+from metrics.scoring.images.image_scores import FirstView
 from metrics.scoring.metric_names import ALL
 from metrics.scoring.runs import scorer_versions
 from metrics.scoring.truth_digests import RowDigests

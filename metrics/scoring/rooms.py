@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measured.protocols import BY_NAME, DECLARED, PROTOCOLS, ProtocolError
-from metrics.scoring.geometry import scored_alignment
-from metrics.scoring.measured_rows import PIXELS, require_suited, suits
+from metrics.scoring.images.geometry import scored_alignment
+from metrics.scoring.images.measured_rows import PIXELS, require_suited, suits
+from metrics.scoring.images.rows import ScoredRows, score_rows
 from metrics.scoring.metric_names import OBJECT_SCORES, OF_TRUTH, metric
 from metrics.scoring.records import OBJECT_COLUMNS, SHAPE_COLUMN, ScoreFile
-from metrics.scoring.rows import ScoredRows, score_rows
 from metrics.scoring.runs import (
     MeasuredRuns,
     Progress,

@@ -14,7 +14,7 @@ from iqtt.floors import Floor
 from metrics.measured.reader import Images, MeasuredFile
 from metrics.measures.alignment import Alignment
 from metrics.measures.statistics import RESAMPLES
-from metrics.scoring.image_scores import NonFinite
+from metrics.scoring.images.image_scores import NonFinite
 from metrics.scoring.records import Meta, Submission
 from metrics.submissions.problems import Problem, first_error
 from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from iqtt.questions.specs import LETTERS
 from metrics.measured.reader import Images, MeasuredFile
 from metrics.measures.answers import ABSTAINED
-from metrics.scoring.layers import fitted_layers, read_true_layers
+from metrics.scoring.images.layers import fitted_layers, read_true_layers
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import ScoreFile
 from metrics.submissions.reader import Predictions, QuestionPredictions, RoomPredictions

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from metrics.measured.reader import Images, MeasuredFile, open_images
 from metrics.measures.confidence import REMOVED
 from metrics.measures.statistics import cluster_means
-from metrics.scoring.geometry import depth_as_scored
-from metrics.scoring.measured_rows import depth_as_declared
+from metrics.scoring.images.geometry import depth_as_scored
+from metrics.scoring.images.measured_rows import depth_as_declared
 from metrics.scoring.metric_names import HEADLINE, metric
 from metrics.scoring.records import Score, ScoreFile
 from metrics.submissions.reader import PredictedView, RoomPredictions, open_predictions

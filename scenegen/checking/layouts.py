@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from scenegen.checking.views import Load, View
 from scenegen.common.errors import FileFormatError, SceneGenError
-from scenegen.files.pictures import opened_picture, read_picture
+from scenegen.files.images.pictures import opened_picture, read_picture
 from scenegen.rooms.export.moge import log_depth
 
 Array = NDArray[Any]

@@ -49,7 +49,7 @@ def preview(
     overwrite: bool,
 ) -> None:
     """Draw images of FILE with their depth, normals and object ids, as one image."""
-    from scenegen.files.pictures import pick_rows, save_picture
+    from scenegen.files.images.pictures import pick_rows, save_picture
     from scenegen.rooms.preview import contact_sheet
     from scenegen.rooms.reader import RoomsFile
 
@@ -306,8 +306,8 @@ def _export_single(
 ) -> None:
     """Write each row, or all rows, to files of their own; `how` are the fields of `Encoding`."""
     from scenegen.common.errors import SpecError
+    from scenegen.files.images.pictures import pick_rows
     from scenegen.files.new_file import check_writable
-    from scenegen.files.pictures import pick_rows
     from scenegen.objects.catalogue import changed_meshes
     from scenegen.objects.sources import file_objects, mesh_folder
     from scenegen.rooms.export.encoding import plain

@@ -86,7 +86,7 @@ def _run_program(program, *words):
         return _run_python(lambda: runpy.run_path(words[0], run_name="__main__"))
     import cli
 
-    with mock.patch("metrics.scoring.rows.processors", return_value=1):  # processes take seconds
+    with mock.patch("metrics.scoring.images.rows.processors", return_value=1):
         result = CliRunner().invoke(getattr(cli, program), words)
     if result.exception and not isinstance(result.exception, SystemExit):
         return 1, "".join(traceback.format_exception(result.exception))

@@ -25,8 +25,8 @@ from baselines.training.data import TrainingFiles
 from baselines.training.fit import Progress, falling_late, fit
 from baselines.training.machine import Machine, chosen_device
 from baselines.training.rooms import read_rooms
+from scenegen.files.images.pictures import save_picture
 from scenegen.files.new_file import check_writable
-from scenegen.files.pictures import save_picture
 
 PICTURE, LOGS = "pictures.png", "logs"
 LOG_EVERY = 20  # iterations

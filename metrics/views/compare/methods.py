@@ -9,7 +9,7 @@ from metrics.measures.alignment import Alignment
 from metrics.score_file import read_scores
 from metrics.scoring.aligned import common_alignment
 from metrics.scoring.evaluate import allowed_alignments, open_runs, score_runs
-from metrics.scoring.geometry import scored_alignment
+from metrics.scoring.images.geometry import scored_alignment
 from metrics.scoring.records import ScoreFile
 from metrics.scoring.runs import Progress, Runs, Settings
 from metrics.scoring.truth_digests import stated_truth

@@ -66,7 +66,9 @@ class MeshStore:
 
     def _colors(self, name: str, model: Model) -> Array:
         """Return the own colours of a model. Raises BadMeshError."""
-        from scenegen.objects.meshes.colors import corner_colors  # imports trimesh, which is slow
+        from scenegen.objects.meshes.appearance.colors import (
+            corner_colors,  # imports trimesh, which is slow
+        )
 
         path, unread = self._files[name].path, dict[str, str]()
         try:
@@ -88,7 +90,9 @@ class MeshStore:
 
         Raises BadMeshError as `shape`, and where these cannot be read.
         """
-        from scenegen.objects.meshes.textures import paint_of  # imports trimesh, which is slow
+        from scenegen.objects.meshes.appearance.textures import (
+            paint_of,  # imports trimesh, which is slow
+        )
 
         model = self._load(name)
         path, up = self._files[name].path, self.folder.up

@@ -11,8 +11,8 @@ import numpy as np
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.recent import recent
 from scenegen.common.srgb import decoded
-from scenegen.files.exr import exr_picture
-from scenegen.files.pictures import opened_picture, picture_size, shares_of
+from scenegen.files.images.exr import exr_picture
+from scenegen.files.images.pictures import opened_picture, picture_size, shares_of
 from scenegen.files.places import files_below
 from scenegen.rendering.materials.material import Array, Material, slopes_of
 

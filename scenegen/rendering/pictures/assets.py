@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scenegen.common.errors import FileFormatError, SpecError
 from scenegen.common.records import check
 from scenegen.description.specs import InteriorSpec
-from scenegen.files.exr import exr_picture
+from scenegen.files.images.exr import exr_picture
 from scenegen.files.places import files_below
 from scenegen.rendering.backend import point_to_llvm
 from scenegen.rendering.materials.folders import MapFiles, check_maps, from_folder

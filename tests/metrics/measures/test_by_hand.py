@@ -12,11 +12,11 @@ from hypothesis import strategies as st
 
 from metrics.measures.alignment import Alignment
 from metrics.measures.answers import ABSTAINED, answers_from_scores
-from metrics.measures.behind import MARGIN, behind_scores, hidden_from
 from metrics.measures.boundaries import RATIOS, boundary_scores
 from metrics.measures.checks import EmptyError, MeasureError, NonFiniteError
 from metrics.measures.depth import align, compare_depth, delta, depth_scores, silog
-from metrics.measures.guesses import balls_and_blocks
+from metrics.measures.hidden.behind import MARGIN, behind_scores, hidden_from
+from metrics.measures.hidden.guesses import balls_and_blocks
 from metrics.measures.objects import LEAST_PIXELS, object_means, single_objects, size_range
 from metrics.measures.relief import depth_along, empty_room, relief_scores
 from metrics.measures.shape import flat_error, inside_objects, one_normal_degrees, shape_scores

@@ -19,8 +19,8 @@ from baselines.trivial import write_room_baseline
 from metrics.prediction_writer import RoomPredictionWriter, write_answers
 from metrics.score_file import read_scores, to_json, write_scores
 from metrics.scoring import known_tests, rooms
-from metrics.scoring import rows as module
 from metrics.scoring.evaluate import score
+from metrics.scoring.images import rows as module
 from metrics.scoring.known_tests import KnownTest
 from metrics.scoring.metric_names import OTHER_SCENE, SKILLED, metric
 from metrics.scoring.rooms import view_angles
@@ -221,7 +221,7 @@ def test_a_submission_that_changes_while_it_is_scored(
     mine, other = tmp_path / "mine.h5", tmp_path / "other.h5"
     write_room_baseline("empty-room", truths.rooms, mine)
     write_room_baseline("oracle", truths.rooms, other)
-    monkeypatch.setattr("metrics.scoring.rows.CHUNK", 2)
+    monkeypatch.setattr("metrics.scoring.images.rows.CHUNK", 2)
     real = rooms.score_rows
 
     def swapped(files, *rest):

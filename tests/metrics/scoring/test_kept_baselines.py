@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from baselines.trivial import write_room_baseline
-from metrics.scoring import image_scores, kept_baselines
+from metrics.scoring import kept_baselines
 from metrics.scoring.evaluate import score
+from metrics.scoring.images import image_scores
 from metrics.scoring.runs import Settings
 
 

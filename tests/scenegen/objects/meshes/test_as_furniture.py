@@ -20,9 +20,10 @@ from scenegen.objects.catalogue import changed_meshes, furniture_models
 from scenegen.objects.families.members import MEMBERS
 from scenegen.objects.furniture.furnishing import CLAMP, MIRROR, REPEAT, furnishing
 from scenegen.objects.furniture.shapes import piece
-from scenegen.objects.meshes import limits, materials, textures
+from scenegen.objects.meshes import limits
+from scenegen.objects.meshes.appearance import materials, textures
+from scenegen.objects.meshes.appearance.colors import corner_colors
 from scenegen.objects.meshes.as_furniture import mesh_furniture
-from scenegen.objects.meshes.colors import corner_colors
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.listing import ModelFile, ModelFolder
 from scenegen.objects.meshes.store import MeshStore

@@ -13,8 +13,8 @@ from metrics.measures.alignment import align
 from metrics.measures.depth import DepthPair, depth_scores, scale_log2
 from metrics.measures.surfaces.normals import angular_errors_degrees, normal_scores
 from metrics.measures.surfaces.points import point_map_scores, ray_error_degrees
-from metrics.scoring.geometry import alignments_scored, fitted_geometry, scored_alignment
-from metrics.scoring.image_scores import breaks_rules
+from metrics.scoring.images.geometry import alignments_scored, fitted_geometry, scored_alignment
+from metrics.scoring.images.image_scores import breaks_rules
 from metrics.scoring.metric_names import FLAT, SKILLED, metric
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView

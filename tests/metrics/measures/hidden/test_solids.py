@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metrics.measures.solids import (
+from metrics.measures.hidden.solids import (
     back_depth_error,
     entered_spans,
     hidden_object_recall,

@@ -7,7 +7,7 @@ import pytest
 from PIL import Image, TiffImagePlugin
 
 from scenegen.common.errors import FileFormatError, SpecError
-from scenegen.files.pictures import (
+from scenegen.files.images.pictures import (
     opened_picture,
     pick_rows,
     picture_size,
@@ -118,7 +118,7 @@ def test_numbers_without_a_white_are_no_picture(tmp_path):
 
 def test_one_module_opens_pictures():
     """All others call it, so that each is turned and has its levels."""
-    root = Path(__file__).parents[3]
+    root = Path(__file__).parents[4]
     paths = [path for name in ("scenegen", "iqtt", "metrics", "baselines")
              for path in (root / name).rglob("*.py")]  # fmt: skip
     opening = [p.name for p in paths if "Image.open(" in p.read_text() and p.name != "pictures.py"]

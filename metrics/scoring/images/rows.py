@@ -15,7 +15,7 @@ from metrics.measured.protocols import BY_NAME, ProtocolError
 from metrics.measured.reader import Images, MeasuredFile, is_flat, open_images
 from metrics.measures.alignment import Alignment
 from metrics.measures.confidence import distance_from_edges
-from metrics.scoring.image_scores import (
+from metrics.scoring.images.image_scores import (
     FirstView,
     ImageScores,
     NonFinite,
@@ -23,11 +23,16 @@ from metrics.scoring.image_scores import (
     score_prediction,
     true_relief,
 )
+from metrics.scoring.images.layers import (
+    read_true_layers,
+    score_layers,
+    true_points,
+    worst_of_layers,
+)
+from metrics.scoring.images.measured_rows import scores_of_view
+from metrics.scoring.images.panoramas import baselines_of, score_panorama
 from metrics.scoring.kept_baselines import KeptBaselines, key_of
-from metrics.scoring.layers import read_true_layers, score_layers, true_points, worst_of_layers
-from metrics.scoring.measured_rows import scores_of_view
 from metrics.scoring.metric_names import OBJECT_SCORES, OTHER_SCENE
-from metrics.scoring.panoramas import baselines_of, score_panorama
 from metrics.scoring.records import OBJECT_COLUMNS
 from metrics.scoring.runs import Progress, ScoringError, Settings
 from metrics.scoring.truth_digests import RowDigests, view_digests

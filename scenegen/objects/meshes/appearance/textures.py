@@ -11,11 +11,17 @@ import numpy as np
 import trimesh
 
 from scenegen.common.srgb import decoded
-from scenegen.files.pictures import opened_picture
+from scenegen.files.images.pictures import opened_picture
 from scenegen.objects.furniture.furnishing import CLAMP, MIRROR, REPEAT, Paint, Texture
+from scenegen.objects.meshes.appearance.colors import Piece, colors_of, matched, read_triangles
+from scenegen.objects.meshes.appearance.materials import (
+    OPTION,
+    ROUGHNESS,
+    MeshMaterial,
+    Unread,
+    reduced,
+)
 from scenegen.objects.meshes.clean import MOST_COORDINATE
-from scenegen.objects.meshes.colors import Piece, colors_of, matched, read_triangles
-from scenegen.objects.meshes.materials import OPTION, ROUGHNESS, MeshMaterial, Unread, reduced
 from scenegen.objects.meshes.read import read_bytes
 from scenegen.objects.meshes.readers.text import utf8
 from scenegen.objects.solids import Array

@@ -6,7 +6,7 @@ import trimesh
 from PIL import Image
 
 from scenegen import DatasetSpec, open_rooms
-from scenegen.objects.meshes.colors import corner_colors
+from scenegen.objects.meshes.appearance.colors import corner_colors
 from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.sources import object_source
 from scenegen.rooms.make import make_dataset

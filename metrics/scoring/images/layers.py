@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from metrics.measures import solids
 from metrics.measures.alignment import scale_and_shift
+from metrics.measures.hidden import solids
 from metrics.measures.surfaces import whole
 from metrics.measures.surfaces.chamfer_hausdorff import chamfer, nearest_distances
 from metrics.scoring.metric_names import CONSTANT, INFLATED, MIRRORED, SIZED, metric

@@ -15,15 +15,15 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from scenegen.common.srgb import decoded
-from scenegen.objects.meshes.clean import clean_mesh
-from scenegen.objects.meshes.errors import BadMeshError
-from scenegen.objects.meshes.materials import (
+from scenegen.objects.meshes.appearance.materials import (
     MeshMaterial,
     Unread,
     glb_material,
     mtl_material,
     plain_glb,
 )
+from scenegen.objects.meshes.clean import clean_mesh
+from scenegen.objects.meshes.errors import BadMeshError
 from scenegen.objects.meshes.readers.text import utf8
 
 Array = NDArray[Any]

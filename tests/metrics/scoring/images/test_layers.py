@@ -8,7 +8,7 @@ import pytest
 from h5_edits import put
 from refusals import refused
 
-from metrics.measures.solids import length, paired_spans
+from metrics.measures.hidden.solids import length, paired_spans
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.scoring.evaluate import score
 from metrics.scoring.metric_names import ALL

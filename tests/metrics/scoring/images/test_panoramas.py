@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from metrics.scoring.panoramas import baselines_of, score_panorama
+from metrics.scoring.images.panoramas import baselines_of, score_panorama
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.truths import TrueView

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from metrics.measures.alignment import Alignment, align, weighted_median
-from metrics.measures.behind import behind_scores, hidden_from
 from metrics.measures.boundaries import boundary_scores
 from metrics.measures.confidence import confidence_scores
 from metrics.measures.depth import DepthPair, depth_scores, scale_log2, within_eighth
 from metrics.measures.flying import at_half_resolution, flying_points, other_surface
-from metrics.measures.guesses import balls_and_blocks, depth_of_balls, depth_of_blocks
+from metrics.measures.hidden.behind import behind_scores, hidden_from
+from metrics.measures.hidden.guesses import balls_and_blocks, depth_of_balls, depth_of_blocks
 from metrics.measures.objects import counted_objects, object_means, single_objects
 from metrics.measures.pairs import (
     Order,
@@ -50,7 +50,7 @@ from metrics.measures.surfaces.points import (
     point_map_scores,
     ray_error_degrees,
 )
-from metrics.scoring.geometry import (
+from metrics.scoring.images.geometry import (
     Geometry,
     alignments_scored,
     fitted_geometry,

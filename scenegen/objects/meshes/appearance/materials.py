@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenegen.common.srgb import decoded
-from scenegen.files.pictures import as_rgb
+from scenegen.files.images.pictures import as_rgb
 from scenegen.objects.furniture.furnishing import CLAMP, MIRROR, REPEAT
 from scenegen.objects.meshes.errors import BadMeshError
 

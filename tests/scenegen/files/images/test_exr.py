@@ -5,7 +5,7 @@ import OpenEXR
 import pytest
 
 from scenegen.common.errors import FileFormatError
-from scenegen.files.exr import exr_picture
+from scenegen.files.images.exr import exr_picture
 
 HEAD = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
 RGB = np.arange(2 * 4 * 3, dtype=np.float32).reshape(2, 4, 3)

@@ -26,8 +26,8 @@ from metrics.measures.pairs import (
 )
 from metrics.measures.surfaces.normals import angular_errors_degrees, normal_scores
 from metrics.measures.surfaces.points import point_map_scores
-from metrics.scoring.geometry import alignments_scored, scored_alignment
-from metrics.scoring.image_scores import scores_of_confidence, scores_of_pairs
+from metrics.scoring.images.geometry import alignments_scored, scored_alignment
+from metrics.scoring.images.image_scores import scores_of_confidence, scores_of_pairs
 from metrics.scoring.metric_names import FLAT, RAMP, SKILLED, metric
 from metrics.submissions.problems import PredictionError
 from metrics.submissions.reader import PredictedView

@@ -13,16 +13,16 @@ from metrics.measures.relief import empty_room
 from metrics.prediction_writer import RoomPredictionWriter
 from metrics.score_file import read_scores, write_scores
 from metrics.scoring.evaluate import score
-from metrics.scoring.geometry import depth_as_scored
-from metrics.scoring.image_scores import (
+from metrics.scoring.images.geometry import depth_as_scored
+from metrics.scoring.images.image_scores import (
     FirstView,
     _guesses,
     reference_of,
     score_prediction,
     true_relief,
 )
+from metrics.scoring.images.rows import other_scenes
 from metrics.scoring.metric_names import CUT_OUT, EMPTY_ROOM, LEANING, SKILLED, metric
-from metrics.scoring.rows import other_scenes
 from metrics.scoring.runs import Settings
 from metrics.submissions.reader import PredictedView
 from metrics.submissions.truths import TrueView
