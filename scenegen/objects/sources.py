@@ -92,7 +92,7 @@ def folder_notes(folder: ModelFolder, own_colors: bool = False) -> list[str]:
 
 
 def _has_colors(path: Path) -> bool:
-    """Return whether the beginning of a mesh file tells of colours that `meshes.appearance.colors` reads."""
+    """Return whether a mesh file begins as files do whose colours are read."""
     pattern = COLORED.get(path.suffix.lower())
     with suppress(OSError):
         if pattern is not None and path.is_file():  # a pipe may have no end
