@@ -154,7 +154,7 @@ SPOILT: dict[str, tuple[Edit, str, str]] = {  # what is edited, and the error's 
     "one dimension": (changed(BIAS, torch.zeros(1, 4)), BIAS, "shape (1, 4)"),
     "NaN": (changed(BIAS, torch.full((4,), torch.nan)), BIAS, "NaN"),
     "infinity": (changed(BIAS, FULL), BIAS, "infinity"),
-    "a negative variance": (changed(VARIANCE, -torch.ones(4)), VARIANCE, "below 0"),
+    "a negative variance": (changed(VARIANCE, -torch.ones(4)), VARIANCE, "negative"),
     **{
         str(dtype): (changed(BIAS, torch.zeros(4).to(dtype)), BIAS, str(dtype))
         for dtype in (torch.int32, torch.bool, torch.complex64, torch.float8_e4m3fn)
