@@ -161,11 +161,12 @@ class Reflectance(Color):
 # fmt: off
 WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
                        show_default="one per processor, up to 16",
-                       help="Number of rendering processes. Each uses about 0.4 GiB of memory, or"
-                       " 1.3 GiB for interiors.")
+                       help="Number of rendering processes. Each process uses about 0.4 GiB of"
+                            " memory, or 1.3 GiB for interiors.")
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS",
                          help="Address of a Dask scheduler that distributes the work, such as"
-                         " tcp://host:8786. The value local starts a cluster on this machine.")
+                              " tcp://host:8786. The value `local` starts a cluster on this"
+                              " machine.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,
