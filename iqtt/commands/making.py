@@ -46,8 +46,8 @@ option = partial(click.option, show_default=True)
     "--out",
     type=OutputFolder(),
     default="iqtt-split",
-    help="Output folder, or a URL such as s3://bucket/iqtt. It gets four files: training,"
-    " validation, test, and the answer key of the test.",
+    help="Output folder, or a URL such as s3://bucket/iqtt. A split has four files:"
+    " training, validation, test, and the answer key of the test.",
 )
 @option(
     "--preset",
@@ -88,9 +88,8 @@ option = partial(click.option, show_default=True)
     default="mixed",
     help="Distractor type: what the wrong options show. "
     + "".join(f"{name}: {kind.meaning}; " for name, kind in QUESTION_KINDS.items())
-    + "mixed: the type varies between questions. --preset perspective has the types "
-    + "".join(f"{name}: {kind.meaning}; " for name, kind in ROOM_KINDS.items())
-    + "and mixed.",
+    + "mixed: the type varies between questions. --preset perspective has only mixed and two other"
+    " types. " + "; ".join(f"{name}: {kind.meaning}" for name, kind in ROOM_KINDS.items()) + ".",
 )
 @option(
     "--options",

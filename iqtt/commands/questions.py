@@ -200,10 +200,10 @@ def floors(
     """Measure 2D-only baselines for questions with the settings of SPLIT.h5.
 
     The command makes new questions with these settings, about shapes of the training split. This
-    takes minutes. The shortcut classifiers of `iqtt audit` that use only images answer the new
-    questions. If questions are about rooms, the classifiers also get the true masks of objects. The
-    best accuracy is the baseline. To use the output file, pass it to `bench score --baselines`. For
-    the presets, the package already contains the baselines.
+    takes minutes. `iqtt audit` has shortcut classifiers that use only images. Each of them answers
+    the new questions, and the best accuracy is the baseline. If questions are about rooms, the
+    classifiers also get the true masks of objects. To use the baselines, pass the output file to
+    `bench score --baselines`. For the presets, this package already contains the baselines.
     """
     from iqtt.files.reader import open_tables
     from iqtt.floor_probes import floor_specs, measure_floors

@@ -72,8 +72,8 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
               help="Reflectance of the objects. Without --room-reflectance, the room has the same."
               " own: the colours in the mesh files, multiplied by 0.8 [0.8].")
 @click.option("--fov", type=Range(float),
-              help="Field of view of a square image in degrees. With a range such as 20-60, each"
-              " scene has its own field of view [28].")
+              help="Field of view in degrees of a square image. Other images have the same diagonal"
+              " field of view. With a range such as 20-60, each scene has its own value [28].")
 @setting_options()
 @ASSETS
 @IMAGE_DTYPE
