@@ -59,7 +59,7 @@ RUN = click.option(
     "--run", "run_name", default="", help="Name of the training run, such as its seed."
 )
 NOTES = click.option(
-    "--notes", default="", help="Text that is stored in the output file as a note."
+    "--notes", default="", help="Note that is stored in the output file."
 )
 FRAME = click.option(
     "--frame", type=click.Choice(["opencv", "opengl"]), default="opencv", show_default=True,
