@@ -13,29 +13,17 @@ model_options = together(  # those of `iqtt.vlm.rows.Asked`
                  " images are rendered from these cubes [default: the answer key next to FILE]."),
     click.option("--with-answer-key", "with_answers", cls=Renamed, former="--with-answers",
                  is_flag=True,
-<<<<<<< HEAD
-                 help="Also write the answer key of test questions to the output. Inspect needs the"
-                      " answer key to compute scores."),
-=======
                  help="Include the answer key of test questions in the output. Inspect needs the"
                  " answer key to compute scores."),
->>>>>>> main
     click.option("--layout", type=click.Choice(["composed", "separate"]), default="composed",
                  show_default=True, help="Images of a question. composed: one image with the"
                  " reference and all options; separate: one image each for the reference and every"
                  " option."),
     click.option("--rotations", type=click.IntRange(1, 3), default=1, show_default=True,
-<<<<<<< HEAD
-                 help="Number of orders of the options in which each question is asked. For"
-                      " CircularEval accuracy, use as many orders as there are options."),
-    click.option("--size", type=click.IntRange(SMALLEST, LARGEST), default=SIZE, show_default=True,
-                 help="Shorter side of each image of the reference or of an option, in pixels."),
-=======
                  help="Ask each question this many times, each time with the options in another"
                  " order. For CircularEval accuracy, use the number of options."),
     click.option("--size", type=click.IntRange(SMALLEST, LARGEST), default=SIZE, show_default=True,
                  help="Size, in pixels, of the shorter side of each reference or option image."),
->>>>>>> main
     click.option("--items", type=Items(), help="Questions to use [default: all]."),
 )
 # fmt: on

@@ -58,9 +58,7 @@ METHOD = click.option(
 RUN = click.option(
     "--run", "run_name", default="", help="Name of the training run, such as its seed."
 )
-NOTES = click.option(
-    "--notes", default="", help="Note that is stored in the output file."
-)
+NOTES = click.option("--notes", default="", help="Note that is stored in the output file.")
 FRAME = click.option(
     "--frame", type=click.Choice(["opencv", "opengl"]), default="opencv", show_default=True,
     help="Axes of points and normals. opencv: x right, y down, z forward; opengl: x right, y up, z"
