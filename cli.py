@@ -21,13 +21,13 @@ SCORES = (
 @click.group(cls=PackageCommands, modules=ROOMS)
 @click.version_option(package_name="pix2shape-bench")
 def scenegen() -> None:
-    """Render rooms with objects and exact ground truth: depth, normals, object ids, cameras."""
+    """Render rooms with objects, with exact depth, normals, object ids and cameras."""
 
 
 @click.group(cls=PackageCommands, modules=QUESTIONS)
 @click.version_option(package_name="pix2shape-bench")
 def iqtt() -> None:
-    """Make 3D-IQTT mental-rotation questions, check them, and export them."""
+    """Make, check and export mental-rotation questions (3D-IQTT)."""
 
 
 @click.group(cls=PackageCommands, modules=SCORES)

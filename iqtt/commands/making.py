@@ -46,40 +46,41 @@ option = partial(click.option, show_default=True)
     "--out",
     type=OutputFolder(),
     default="iqtt-split",
-    help="Output folder for the four files, or a URL such as s3://bucket/iqtt.",
+    help="Output folder, or a URL such as s3://bucket/iqtt. A split has four files:"
+    " training, validation, test, and the answer key of the test.",
 )
 @option(
     "--preset",
     type=click.Choice(["small", "v2", "paper", "suite", "perspective", "perspective-suite"]),
     default="small",
-    help="Numbers of questions. small: 1,000 for training (100 of them labelled), 200 for"
-    " validation, 200 for testing; v2: as in the released data, in float32; paper: as in the paper;"
-    " suite: one folder per distractor type, each with 5,000 for training (1,000 labelled), 500 for"
-    " validation and 2,000 for testing; perspective: questions about furnished rooms, 100 for"
-    " training, 40 for validation and 60 for testing; perspective-suite: one folder per distractor"
-    " type of such questions.",
+    help="Type and number of questions. small: 1,000 training questions (100 of them labelled), 200"
+    " for validation, 200 for testing; v2: numbers of the released data, images in float32; paper:"
+    " numbers of the Pix2Shape paper; suite: a folder for each distractor type, with 5,000 training"
+    " questions (1,000 labelled), 500 for validation and 2,000 for testing; perspective: questions"
+    " about furnished rooms, 100 for training, 40 for validation and 60 for testing;"
+    " perspective-suite: as perspective, with a folder for each distractor type.",
 )
-@option("--train", type=int, help="Number of training questions, labelled and unlabelled.")
+@option("--train", type=int, help="Number of training questions, including unlabelled questions.")
 @option(
     "--labeled",
     type=int,
-    help="Number of labelled training questions [default: the fraction of the preset].",
+    help="Number of labelled training questions [default: the same fraction as in the preset].",
 )
 @option("--val", type=int, help="Number of validation questions.")
-@option("--test", type=int, help="Number of test questions. Their answer key is a separate file.")
+@option("--test", type=int, help="Number of test questions. A separate file has their answer key.")
 @options.SEED
 @option(
     "--secret-seed",
     type=InputPath(),
     metavar="FILE",
-    help="File with the seed of a private test set. No output file stores the seed.",
+    help="File with the seed of a private test set. The seed is not in the output files.",
 )
 @option("--cubes", type=Range(int), default="8-11", help="Number of cubes of a shape.")
 @option(
     "--shapes",
     type=click.Choice(["chain", "tree"]),
     default="chain",
-    help="chain: self-avoiding chains of cubes; tree: chains and branching shapes.",
+    help="chain: each shape is a self-avoiding chain of cubes; tree: shapes may also branch.",
 )
 @option(
     "--distractors",
@@ -87,9 +88,8 @@ option = partial(click.option, show_default=True)
     default="mixed",
     help="Distractor type: what the wrong options show. "
     + "".join(f"{name}: {kind.meaning}; " for name, kind in QUESTION_KINDS.items())
-    + "mixed: one of these types per question. For --preset perspective: "
-    + "; ".join(f"{name}: {kind.meaning}" for name, kind in ROOM_KINDS.items())
-    + "; mixed.",
+    + "mixed: the type varies between questions. --preset perspective has only mixed and two other"
+    " types. " + "; ".join(f"{name}: {kind.meaning}" for name, kind in ROOM_KINDS.items()) + ".",
 )
 @option(
     "--options",
@@ -98,26 +98,28 @@ option = partial(click.option, show_default=True)
     former="--answers",
     type=int,
     default=3,
-    help="Number of options per question, 3 or 2. One option is correct. Questions about rooms"
-    " always have 3.",
+    help="Number of options per question: 3 or 2. Exactly one option is correct. Questions about"
+    " rooms always have 3 options.",
 )
 @click.option(
     "--angle",
     type=Range(float),
-    help="With --preset perspective: degrees between the views of reference and options [default:"
-    " 20-120].",
+    help="With --preset perspective: angle, in degrees, between the view of the reference and the"
+    " view of each option [default: 20-120].",
 )
 @click.option(
     "--objects",
     type=Range(int),
-    help="With --preset perspective: number of objects of a room [default: 12-40].",
+    help="With --preset perspective: number of objects in a room [default: 12-40].",
 )
 @click.option(
     "--object-split",
     type=click.Choice(["all", "train", "val", "test"]),
-    help="With --preset perspective: split of the objects in the rooms [default: all].",
+    help="With --preset perspective: split from which the objects are drawn [default: all].",
 )
-@click.option("--spp", type=int, help="With --preset perspective: colour samples per pixel.")
+@click.option(
+    "--spp", type=int, help="With --preset perspective: samples per pixel for the colour."
+)
 @click.option(
     "--denoise/--no-denoise",
     default=None,
@@ -129,23 +131,28 @@ option = partial(click.option, show_default=True)
     "min_angle_degrees",
     type=float,
     default=30,
-    help="Minimum rotation, in degrees, between the views of the reference and of each option, and"
-    " between two views of the same shape.",
+    help="Minimum rotation, in degrees, between the view of the reference and the view of each"
+    " option. It is also the minimum between two views of the same shape.",
 )
 @option(
     "--min-sight-angle",
     "min_sight_angle_degrees",
     type=float,
-    help="Minimum angle, in degrees, between the viewing directions of the reference and of each"
-    " option. Close or opposite directions give similar silhouettes [default: 40; 0 with v2 and"
-    " paper].",
+    help="Minimum angle, in degrees, between the viewing direction of the reference and that of"
+    " each option. If two directions are close or opposite, silhouettes are similar [default: 40; 0"
+    " with v2 and paper].",
 )
 @option(
     "--min-cube-pixels",
     type=int,
-    help="Minimum number of visible pixels of each cube [default: 30 at 128x128 and radius 3.5].",
+    help="Minimum number of visible pixels of each cube [default: 30 at --size 128 and --max-radius"
+    " 3.5].",
 )
-@option("--max-radius", type=float, help="Maximum radius of a shape, in cube edges [default: 3.5].")
+@option(
+    "--max-radius",
+    type=float,
+    help="Maximum radius of a shape. The unit is the edge of a cube [default: 3.5].",
+)
 @options.SIZE
 @option("--background", type=Color(), default="white", help="Background colour.")
 @option("--lights", type=Range(int), default="2", help="Number of lights.")
@@ -167,8 +174,8 @@ option = partial(click.option, show_default=True)
     "--shard-size",
     type=int,
     default=10_000,
-    help="Maximum number of questions per file. Larger parts are split into several files (shards),"
-    " which can be read as one file.",
+    help="Maximum number of questions per file. Larger files are split into shards. To read all"
+    " shards, open the file without a shard number in its name.",
 )
 @options.SCHEDULER
 @options.DEVICE
@@ -189,10 +196,10 @@ def make_split(
 ) -> None:
     """Make mental-rotation questions for training, validation and testing.
 
-    Each question has a reference and options. One option shows the shape of the reference. All
-    cubes of a shape are visible in every image. No shape and no mirror image of a shape is shared
-    between training, validation and test. To resume an interrupted run that writes several files
-    (shards), run the same command again.
+    Each question has a reference image and several option images. One option shows the shape of the
+    reference. Every image shows all cubes of its shape. Training, validation and test have no
+    shape in common, even as a mirror image. If a file has several shards, an interrupted run can be
+    resumed: run the same command again.
     """
     from iqtt.files import make
     from iqtt.files.split import ALL_FILES
@@ -283,7 +290,7 @@ def _refuse_others(given: set[str], known: set[str], preset: str, of_rooms: bool
 @click.option("--out", type=NewHdf5(), required=True, help="Output file.")
 @options.OVERWRITE
 def merge(file: str, out: str, overwrite: bool) -> None:
-    """Merge the shards of a file of questions into one file."""
+    """Merge the shards of the question file FILE into one file."""
     from iqtt.files.make import merge_questions
     from iqtt.files.reader import open_tables
 

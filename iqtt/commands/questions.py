@@ -32,17 +32,19 @@ option = partial(click.option, show_default=True)
     "--out",
     type=OutputPath(),
     default="questions.png",
-    help="Output image. The suffix selects the format.",
+    help="Output image. The suffix of its name selects the format.",
 )
 @option("--items", type=Items(), help="Questions to show [default: the first 8].")
-@option("--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file.")
+@option(
+    "--part", type=click.Choice(["labeled", "unlabeled"]), help="Part of a training file to show."
+)
 @option(
     "--mark-correct",
     "answers",
     cls=Renamed,
     former="--answers",
     is_flag=True,
-    help="Mark the correct option, and label the wrong options with their distractor type.",
+    help="Mark the correct option. Label each wrong option with its distractor type.",
 )
 @options.OVERWRITE
 def show(
@@ -53,7 +55,7 @@ def show(
     answers: bool,
     overwrite: bool,
 ) -> None:
-    """Draw questions of FILE: the reference on the left, the options next to it."""
+    """Draw some questions of FILE: the reference on the left, the options to its right."""
     from iqtt.files.preview import question_sheet
     from iqtt.files.reader import QuestionsFile, answers_beside, open_tables
     from scenegen.common.errors import SpecError
@@ -74,7 +76,7 @@ def show(
 @click.command(epilog=f"{EXAMPLE}iqtt info iqtt-split/iqtt-val.h5")
 @click.argument("file", type=QUESTIONS)
 def info(file: str) -> None:
-    """Print the contents of FILE: questions, settings, versions, hashes and sizes."""
+    """Print the number of questions, settings, versions, hashes and sizes of FILE."""
     from iqtt.files.info import describe
 
     click.echo(describe(file))
@@ -86,9 +88,9 @@ def info(file: str) -> None:
     "--cubes",
     type=InputPath(),
     metavar="SHAPES.json",
-    help="Audit the questions of a JSON file with cubes and rotations instead of SPLIT.",
+    help="Audit the questions of this JSON file, which has cubes and rotations, instead of SPLIT.",
 )
-@option("--json", "json_path", type=OutputPath(), help="Write all numbers to a JSON file.")
+@option("--json", "json_path", type=OutputPath(), help="Write all results to this JSON file.")
 @option("--markdown", is_flag=True, help="Print the tables as Markdown.")
 @option(
     "--classifier-questions",
@@ -97,7 +99,7 @@ def info(file: str) -> None:
     former="--probed",
     type=click.IntRange(0),
     default=20_000,
-    help="Maximum number of questions for the shortcut classifiers.",
+    help="Maximum number of questions that the shortcut classifiers use.",
 )
 @options.SCHEDULER
 @options.OVERWRITE
@@ -114,12 +116,12 @@ def audit(
 ) -> None:
     """Check that questions are correct, and search them for shortcuts.
 
-    SPLIT is a question file, a folder of question files, or a folder of such folders. The command
-    also reads the released 3D-IQTT files.
+    SPLIT is a question file, a folder of question files, or a folder of such folders. The released
+    3D-IQTT files can also be audited.
 
-    Proofs compute each property of the questions again, with code that is independent of the
-    generator. Shortcut classifiers try to select the correct option without comparing shapes. The
-    exit code is 1 if a proof fails, or if there are no questions.
+    Proofs check every property of the questions, with code that is independent of the generator.
+    Shortcut classifiers try to select the correct option without comparing shapes. If a proof
+    fails, or if there are no questions, the exit code is 1.
     """
     from iqtt.audit import report
     from iqtt.audit.audit import audit as audit_files
@@ -181,7 +183,7 @@ def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
     "--out",
     type=OutputPath(),
     default="floors.json",
-    help="Output file with the baseline accuracies.",
+    help="Output file, which gets the baseline accuracies.",
 )
 @option(
     "--questions",
@@ -195,13 +197,13 @@ def _audit_cubes(cubes: str, json_path: str | None, overwrite: bool) -> int:
 def floors(
     splits: tuple[str, ...], out: str, questions: int, workers: int, device: str, overwrite: bool
 ) -> None:
-    """Measure the accuracy of 2D-only baselines for the settings of SPLIT.h5.
+    """Measure 2D-only baselines for questions with the settings of SPLIT.h5.
 
-    The command makes new questions about shapes of the training split, which takes minutes. All
-    shortcut classifiers of `iqtt audit` that use only images answer these questions. For questions
-    about rooms, they also get the true masks of objects. The best accuracy is the baseline. Pass
-    the output file to `bench score --baselines`. This package contains the baselines of the
-    presets.
+    The command makes new questions with these settings, about shapes of the training split. This
+    takes minutes. `iqtt audit` has shortcut classifiers that use only images. Each of them answers
+    the new questions, and the best accuracy is the baseline. If questions are about rooms, the
+    classifiers also get the true masks of objects. To use the baselines, pass the output file to
+    `bench score --baselines`. For the presets, this package already contains the baselines.
     """
     from iqtt.files.reader import open_tables
     from iqtt.floor_probes import floor_specs, measure_floors
@@ -236,7 +238,7 @@ def floors(
     "--items",
     type=click.IntRange(0),
     default=8,
-    help="Number of questions per part to make again from the seed.",
+    help="Number of questions to make again from the seed, in each part of the split.",
 )
 @option(
     "--secret-seed",
@@ -249,9 +251,9 @@ def floors(
 def verify(
     ctx: click.Context, folder: str, items: int, secret_seed: str | None, device: str
 ) -> None:
-    """Check all files of a split in FOLDER, and make some questions again from the seed.
+    """Check all files of the split in FOLDER, and make some questions again from the seed.
 
-    The exit code is 1 if a check fails. `iqtt audit` proves that the answer key is correct.
+    If a check fails, the exit code is 1. To check the answer key, run `iqtt audit`.
     """
     from iqtt.files.verify import verify_split
     from iqtt.questions.specs import secret_seed as read_seed

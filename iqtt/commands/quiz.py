@@ -16,29 +16,29 @@ option = partial(click.option, show_default=True)
 # fmt: off
 @click.command(epilog=f"{EXAMPLE}iqtt quiz iqtt-split/iqtt-test.h5 --out quiz.html")
 @click.argument("file", type=InputPath(), metavar="QUESTIONS.h5")
-@option("--out", type=OutputPath(), default="quiz.html", help="Output page.")
+@option("--out", type=OutputPath(), default="quiz.html", help="Output file.")
 @option("--questions", type=int, default=20, help="Number of scored questions. All participants"
                                                   " get the same questions.")
 @option("--practice", type=int, default=2,
-        help="Number of practice questions, which come first and give feedback. The paper used 1.")
-@option("--seed", type=click.IntRange(0, LARGEST), default=0, help="Seed of the choice of"
-                                                                   " questions.")
-@click.option("--contact", default="", help="Contact of the study, shown on the first page.")
+        help="Number of practice questions. They come first and give feedback. The paper used 1.")
+@option("--seed", type=click.IntRange(0, LARGEST), default=0, help="Seed with which the"
+                                                                   " questions are drawn.")
+@click.option("--contact", default="", help="Contact person or address of the study. The first page"
+                                            " shows it.")
 @click.option("--post", default="", metavar="URL",
-              help="URL that receives the responses of each participant [default: participants"
-                   " save a"
-              " file].")
+              help="Send the responses of each participant to this URL [default: participants"
+                   " save a file].")
 @OVERWRITE
 def quiz(
     file: str, out: str, questions: int, practice: int, seed: int, contact: str, post: str,
     overwrite: bool,
 ) -> None:
-    """Write an HTML page on which people answer the questions of QUESTIONS.h5.
+    """Write an HTML page on which people answer questions of QUESTIONS.h5.
 
     The page works without a server: open the file, or upload it to any web host. Each participant
     answers a few practice questions, then the scored questions in random order. At the end, the
-    browser saves the responses as a JSON file for `bench import --quiz`. The page contains the
-    correct options of the practice questions only.
+    browser saves the responses as a JSON file for `bench import --quiz`. The page contains
+    the correct options of the practice questions, but not of the scored questions.
     """
     from iqtt.quiz.page import Study, write_quiz
 

@@ -22,7 +22,8 @@ from scenegen.rooms.export.formats import DATA_FORMATS
     cls=Renamed,
     former="--with-answers",
     is_flag=True,
-    help="Also list the answer key of the test questions, and the seed if a file has it.",
+    help="Also list the answer key of the test questions. If a file has the seed, list the seed"
+    " too.",
 )
 @publication_options(title="the name of the folder", license_="CC-BY-4.0")
 @OVERWRITE
@@ -37,9 +38,9 @@ def card(
 ) -> None:
     """Write a data card for the split in FOLDER, with the metadata header of Hugging Face.
 
-    The card lists the files to publish with it. The answer key of the test questions is not in the
-    list. If another file reveals a correct option of a test question, the command stops with an
-    error.
+    The card lists the files that you can publish with it, without the answer key of the test
+    questions. If one of these files reveals the correct option of a test question, the command
+    stops with an error.
     """
     needs("iqtt card", SHARE, "share")
     from iqtt.sharing.published import open_split
@@ -61,14 +62,14 @@ def card(
 @click.argument("file", type=InputPath())
 @click.option("--format", "form", type=click.Choice([*DATA_FORMATS, "vlm"]),
               required=True,
-              help="parquet, webdataset: files for data loaders; vlm: files of prompts for"
-              " vision-language models, for Inspect, VLMEvalKit and lmms-eval.")
+              help="Output format. parquet, webdataset: files for data loaders; vlm: prompts for"
+              " vision-language models, in files for Inspect, VLMEvalKit and lmms-eval.")
 @click.option("--part", type=click.Choice(["labeled", "unlabeled"]),
-              help="Part of a training file.")
+              help="Part of a training file to export.")
 @click.option("--out", type=OutputFolder(),
-              help="Output folder [such as iqtt-val-parquet for iqtt-val.h5].")
+              help="Output folder [named after FILE and the format, such as iqtt-val-parquet].")
 @click.option("--rows-per-file", type=click.IntRange(1), default=1000, show_default=True,
-              help="Maximum number of questions per file; not for vlm.")
+              help="For parquet and webdataset: maximum number of questions per file.")
 @ENCODING
 @model_options
 @OVERWRITE
@@ -84,8 +85,8 @@ def export(
 ) -> None:
     """Export the questions of FILE for data loaders or for vision-language models.
 
-    8-bit images become PNG files in sRGB, or in linear radiance with --encoding linear. The answer
-    key of test questions is exported only with --with-answer-key.
+    8-bit images become PNG files in sRGB. With --encoding linear, the PNG files have linear
+    radiance. The answer key of test questions is exported only with --with-answer-key.
     """
     if form != "webdataset":
         needs(f"iqtt export --format {form}", SHARE, "share")

@@ -32,13 +32,13 @@ QUESTION_KINDS = {  # `mixed` draws from them in this order
     "other": QuestionKind("different shapes"),
     "near": QuestionKind("the same shape with one cube moved"),
     # With two options a `mirror` question would be a `mirror-pair` question.
-    "mirror": QuestionKind("the mirror image and a shape with one cube moved", options=(3,)),
+    "mirror": QuestionKind("the mirror image, and a shape with one cube moved", options=(3,)),
     "matched": QuestionKind("different shapes with similar silhouettes"),
-    "mirror-pair": QuestionKind("the mirror image, in each wrong option"),
+    "mirror-pair": QuestionKind("only the mirror image"),
 }
 ROOM_KINDS = {  # of furnished rooms
-    "moved": QuestionKind("one object at other places", options=(3,)),
-    "turned": QuestionKind("one object in other directions", options=(3,)),
+    "moved": QuestionKind("the same room with one object at another place", options=(3,)),
+    "turned": QuestionKind("the same room with one object turned", options=(3,)),
 }
 DISTRACTORS = (*QUESTION_KINDS, "mixed")  # what `--distractors` takes
 

@@ -161,47 +161,46 @@ class Reflectance(Color):
 # fmt: off
 WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
                        show_default="one per processor, up to 16",
-                       help="Number of rendering processes. Each uses about 0.4 GiB of memory, or"
-                       " 1.3 GiB for interiors.")
+                       help="Number of rendering processes. Each process uses about 0.4 GiB of"
+                       " memory; for interiors, 1.3 GiB.")
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS",
-                         help="Address of a Dask scheduler that distributes the work, such as"
-                         " tcp://host:8786. The value local starts a cluster on this machine.")
+                         help="Distribute the work by the Dask scheduler at this address, such as"
+                         " tcp://host:8786. local: start a Dask cluster on this machine.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,
-                      help="Device to render on. auto selects the CPU, which needs LLVM to be"
-                           " fast.")
+                      help="Device to render on. auto: the CPU. Without LLVM, the CPU is slow.")
 IMAGE_DTYPE = click.option("--image-dtype", type=click.Choice(["uint8", "float16", "float32"]),
                            default="uint8", show_default=True, help="Data type of the stored"
                                                                     " radiance.")
 COMPRESSION = click.option("--compression", type=click.Choice(["gzip", "lzf", "none"]),
                            default="gzip", show_default=True,
-                           help="Compression of the images. Only h5py reads lzf.")
+                           help="Compression of the images. Only h5py can read lzf.")
 ENCODING = click.option("--encoding", "curve", type=click.Choice(["srgb", "linear"]),
                         default="srgb", show_default=True,
-                        help="Encoding of the 8-bit images: sRGB, for display and for networks, or"
-                        " linear radiance. Floating-point images always stay linear.")
+                        help="Encoding of the 8-bit images. srgb: for display and for networks;"
+                        " linear: linear radiance. Floating-point images are always linear.")
 SIZE = click.option("--size", type=Size(), default="128", show_default=True,
                     help="Image size in pixels.")
 SEED = click.option("--seed", type=int, default=0, show_default=True,
                     help="Random seed.")
 UP = click.option("--up", type=click.Choice(["y", "z"]), default="y", show_default=True,
-                  help="Axis of the meshes that points up. In ShapeNet, it is y.")
+                  help="Axis of the meshes that points up. For ShapeNet, use y.")
 CACHE_DIR = click.option("--cache-dir", type=OutputFolder(),
-                         help="Folder that caches cleaned meshes [the user's cache].")
+                         help="Folder in which cleaned meshes are cached [the user's cache].")
 ASSETS = together(  # files of others that images of interiors are rendered with
     click.option("--materials", type=InputPath(within=PICTURE_FILES),
-                 help="Folder of materials for interiors, in the layout of ambientCG or Poly Haven:"
-                 " maps of colour, roughness and normals."),
+                 help="Folder of materials for interiors, in the layout of ambientCG or Poly Haven."
+                 " A material has maps of colour, roughness and normals."),
     click.option("--environment", type=InputPath(),
-                 help="Environment map of interiors: an equirectangular HDR or EXR image that"
-                 " replaces sun and sky."),
+                 help="Environment map that replaces the sun and the sky of interiors. The file is"
+                 " an equirectangular HDR or EXR image."),
 )
 MESHES = together(  # the folder of meshes that objects are taken from
     click.option("--shapenet-root", type=InputPath(within=MESH_FILES),
-                 help="Folder of ShapeNetCore 1 or 2 with the meshes of objects."),
+                 help="Folder of ShapeNetCore 1 or 2, whose meshes become the objects."),
     click.option("--objects-root", type=InputPath(within=MESH_FILES),
-                 help="Folder with the meshes of objects, in one sub-folder per category."),
+                 help="Folder with one sub-folder of meshes per object category."),
     UP,
     CACHE_DIR,
 )

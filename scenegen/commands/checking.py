@@ -13,12 +13,12 @@ from scenegen.command_line.paths import InputPath
 @click.argument("folder", type=InputPath())
 @click.pass_context
 def check(ctx: click.Context, folder: str) -> None:
-    """Check whether depth, cameras, normals and images of FOLDER agree with each other.
+    """Check whether the depth, cameras, normals and images of FOLDER agree with each other.
 
-    FOLDER has the layout of nerfstudio, COLMAP (text), BOP, MoGe or Hypersim. The command prints
-    the name and the size of common faults: distance along the ray instead of planar depth, wrong
-    focal length, wrong principal point, wrong unit, inverse poses, wrong axes, mirrored maps. The
-    exit code is 1 if there is a fault.
+    FOLDER has the layout of nerfstudio, COLMAP (text), BOP, MoGe or Hypersim. The command detects
+    these faults, and prints their size: distance along the ray instead of planar depth, wrong focal
+    length, wrong principal point, wrong unit, inverse poses, wrong axes, mirrored maps. If there is
+    a fault, the exit code is 1.
     """
     from scenegen.checking.folders import check_folder
 

@@ -52,43 +52,45 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
     epilog=f"{EXAMPLE}scenegen render --n 1000 --preset shapenet --seed 1 --out rooms.h5"
 )
 @click.option("--n", "count", type=int, required=True, help="Number of scenes. Each scene has one"
-                                                            " image per view, see --views.")
+                                                            " image per view of --views.")
 @click.option("--out", type=NewHdf5(), default="rooms.h5", show_default=True,
               help="Output file, or a URL such as s3://bucket/rooms.h5.")
 @click.option("--preset", default="shapes", show_default=True, shell_complete=_presets,
-              help="Preset that sets the defaults. `scenegen presets` lists the presets.")
+              help="Named set of options. Options on the command line override it. `scenegen"
+              " presets` lists the presets.")
 @SEED
 @click.option("--size", type=Size(), help="Image size in pixels [128; 256 for interiors].")
-@click.option("--shapes", type=Names(), help="Basic shapes to sample from, such as box,sphere"
-                                             " [all].")
-@click.option("--classes", type=Names(), help="Object categories to sample from, such as mug,bowl.")
+@click.option("--shapes", type=Names(), help="Basic shapes that can be drawn, such as"
+                                             " box,sphere [all].")
+@click.option("--classes", type=Names(), help="Object categories that can be drawn, such as"
+                                              " mug,bowl.")
 @click.option("--object-split", type=click.Choice(["all", "train", "val", "test"]),
-              help="Split of the object instances to sample from. Use train for training data,"
-              " because the published benchmarks use test [all].")
+              help="Draw object instances from this split. For training data, use train: the"
+              " published benchmarks use test [all].")
 @MESHES
 @click.option("--reflectance", type=Reflectance(),
-              help="Reflectance of the objects, and of the room if --room-reflectance is not given."
-              " own: meshes from a folder keep their own colours, multiplied by 0.8 [0.8].")
+              help="Reflectance of the objects. Without --room-reflectance, the room has the same."
+              " own: the colours in the mesh files, multiplied by 0.8 [0.8].")
 @click.option("--fov", type=Range(float),
-              help="Field of view of a square image in degrees. With a range such as 20-60, a"
-              " field of view is sampled for each scene [28].")
+              help="Field of view in degrees of a square image. Other images have the same diagonal"
+              " field of view. With a range such as 20-60, each scene has its own value [28].")
 @setting_options()
 @ASSETS
 @IMAGE_DTYPE
 @COMPRESSION
 @click.option("--batch", type=int, default=64, show_default=True,
-              help="Number of images that a process renders at once. Larger batches use more"
+              help="Number of images that a process renders at once. A larger batch needs more"
               " memory.")
 @WORKERS
 @click.option("--shard-size", type=int, default=10_000, show_default=True,
-              help="Maximum number of scenes per file. Larger data sets are split into several"
-              " files (shards) next to --out, which can be read as one file.")
+              help="Maximum number of scenes per file. A larger data set is split into several"
+              " files (shards) next to --out. To read all shards, open --out.")
 @SCHEDULER
 @DEVICE
 @click.option("--hold-out-truth", cls=Renamed, former="--withhold-truth", is_flag=True,
-              help="Write a file to release and a file to keep. --out has images and cameras only."
-              " rooms-truth.h5, next to --out, also has the ground truth. Choose a large --seed"
-              " that cannot be guessed.")
+              help="Write two files. Release --out, which has only images and cameras. Keep the"
+              " other file, such as rooms-truth.h5 for rooms.h5, which also has the ground"
+              " truth. Choose a large --seed, so that nobody can guess it.")
 @OVERWRITE
 def render(
     count: int,
@@ -105,11 +107,11 @@ def render(
     overwrite: bool,
     **settings: Any,
 ) -> None:
-    """Render rooms with objects to an HDF5 file, with exact ground truth.
+    """Render rooms with objects, and write images and exact ground truth to an HDF5 file.
 
     Each image is stored with its depth, normals, object ids, camera, lights and scene description.
-    Defaults are in square brackets. A preset can change them. To resume an interrupted run that
-    writes several files (shards), run the same command again.
+    Defaults are in square brackets. A preset can change these defaults. If a data set has several
+    files (shards), an interrupted run can be resumed: run the same command again.
     """
     from scenegen.description.presets import preset_spec
     from scenegen.objects.sources import object_source
@@ -292,7 +294,7 @@ def _resume_hint(out: str) -> Iterator[None]:
 @click.option("--out", type=NewHdf5(), required=True, help="Output file.")
 @OVERWRITE
 def merge(file: str, out: str, overwrite: bool) -> None:
-    """Merge the shards of a file of rooms into one file."""
+    """Merge the shards of the rooms file FILE into one file."""
     from scenegen.rooms.make import merge_rooms
     from scenegen.rooms.reader import RoomsFile
 
@@ -304,7 +306,7 @@ def merge(file: str, out: str, overwrite: bool) -> None:
 
 @click.command(epilog=f"{EXAMPLE}scenegen presets")
 def presets() -> None:
-    """List the presets of `scenegen render` with their settings."""
+    """List the presets of `scenegen render`, with the settings of each preset."""
     from scenegen.description.presets import PRESETS
 
     def shown(value: Any) -> str:

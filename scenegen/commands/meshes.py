@@ -54,11 +54,11 @@ def check_objects(
     overwrite: bool,
     jobs: int,
 ) -> None:
-    """Read and clean every mesh of a folder, as `scenegen render` does.
+    """Read and clean every mesh of FOLDER, as `scenegen render` does.
 
     FOLDER is ShapeNetCore, or has one sub-folder per category. The command prints counts per
-    category and the reason why a mesh is refused. The exit code is 1 if no mesh is usable, or if
-    two splits share an object.
+    category, and why each refused mesh is refused. If no mesh is usable, or if two splits share an
+    object, the exit code is 1.
     """
     from scenegen.files.new_file import check_writable, write_text
     from scenegen.objects.cache import default_cache_dir

@@ -48,7 +48,7 @@ def preview(
     seed: int,
     overwrite: bool,
 ) -> None:
-    """Draw images of FILE with their depth, normals and object ids, as one image."""
+    """Draw some images of FILE, with depth, normals and object ids, in one output image."""
     from scenegen.files.images.pictures import pick_rows, save_picture
     from scenegen.rooms.preview import contact_sheet
     from scenegen.rooms.reader import RoomsFile
@@ -63,7 +63,7 @@ def preview(
 @click.command(epilog=f"{EXAMPLE}scenegen info rooms.h5")
 @click.argument("file", type=InputPath())
 def info(file: str) -> None:
-    """Print settings, value ranges, units, sizes and versions of a file of rooms."""
+    """Print the settings, value ranges, units, sizes and versions of the rooms file FILE."""
     from scenegen.rooms.info import describe
 
     click.echo(describe(file))
@@ -92,11 +92,11 @@ def verify(
     environment: str | None,
     **meshes: Any,
 ) -> None:
-    """Check the content hashes and values of every image of a file, and render some images again.
+    """Check the rooms file FILE: hashes and values of every image. Render some images again.
 
-    Images that are rendered again must equal the stored images bit for bit. If other versions of
-    Mitsuba or Dr.Jit rendered the file, they must agree within the printed tolerance. If the file
-    has no ground truth, only content hashes are checked. The exit code is 1 if a check fails.
+    The new images must equal the stored images bit for bit. If FILE was rendered with other
+    versions of Mitsuba or Dr.Jit, the images must agree within the printed tolerance. If FILE has
+    no ground truth, only hashes are checked. If a check fails, the exit code is 1.
     """
     from scenegen.objects.sources import file_objects
     from scenegen.rendering.pictures.places import ASSETS as PLACES
@@ -139,7 +139,7 @@ def _check_images(path: Path, spec: "Request") -> None:
 @click.option(
     "--items",
     type=Items(),
-    help=f"Images to export. {', '.join(ROW_FORMATS)} need --items or --all.",
+    help=f"Images to export. The formats {', '.join(ROW_FORMATS)} need --items or --all.",
 )
 @click.option("--all", "every", is_flag=True, help="Export all images.")
 @click.option(
@@ -162,18 +162,18 @@ def _check_images(path: Path, spec: "Request") -> None:
     type=click.FloatRange(0, min_open=True),
     default=1.0,
     show_default=True,
-    help="Factor by which the radiance in images and PLY files is multiplied.",
+    help="Multiply the radiance by this factor, in images and PLY files.",
 )
 @click.option(
     "--depth-unit",
     type=click.FloatRange(0, min_open=True),
-    help="Scene units per step of the 16-bit depth in PNG files, except for moge [1e-4; for"
-    " interiors 1e-3, which is 1 mm].",
+    help="Scene units per step of the 16-bit depth in PNG files. --format moge ignores it [1e-4;"
+    " for interiors 1e-3, which is 1 mm].",
 )
 @click.option(
     "--out",
     type=OutputFolder(),
-    help="Output folder [for exr, png, ply and obj the current folder; for other formats a new"
+    help="Output folder [for exr, png, ply and obj, the current folder; for other formats, a new"
     " folder, such as rooms-parquet].",
 )
 @click.option(
@@ -181,7 +181,7 @@ def _check_images(path: Path, spec: "Request") -> None:
     type=click.IntRange(1),
     default=1000,
     show_default=True,
-    help="Maximum number of images per file of parquet or webdataset.",
+    help="For parquet and webdataset: maximum number of images per file.",
 )
 @OVERWRITE
 @MESHES
@@ -204,10 +204,10 @@ def export(
     environment: str | None,
     **meshes: Any,
 ) -> None:
-    """Export images of a file with their ground truth to the formats of other tools.
+    """Export images of FILE, with their ground truth, to the formats of other tools.
 
-    If a value does not fit the encoding, the command stops with an error that names the option to
-    change. --device is for the format bop, which renders the masks of whole objects.
+    If a value does not fit the encoding, the command stops with an error, which names the option to
+    change. Only --format bop uses --device, because it renders the masks of whole objects.
     """
     if every and items is not None:
         raise click.UsageError("--all and --items exclude each other: use one of them")

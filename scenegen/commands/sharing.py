@@ -18,10 +18,10 @@ def publication_options(title: str, license_: str) -> Callable[[Command], Comman
     """Return options for what only the publisher knows; the texts name two of their defaults."""
     return together(
         click.option("--creator", "creators", multiple=True, required=True,
-                     help="Creator of the data. Repeatable."),
+                     help="Creator of the data. For several creators, repeat the option."),
         click.option("--title", help=f"Title of the data set [{title}]."),
         click.option("--license", "licence",
-                     help=f"Licence of the data: an SPDX identifier or a URL [{license_}]."),
+                     help=f"Licence of the data, as an SPDX identifier or a URL [{license_}]."),
         click.option("--out", type=OutputPath(), default="README.md", show_default=True,
                      help="Output page."),
     )  # fmt: skip
@@ -41,10 +41,10 @@ def card(
     out: str,
     overwrite: bool,
 ) -> None:
-    """Write a data card for files of rooms, with the metadata header of Hugging Face.
+    """Write a data card for rooms files, with the metadata header of Hugging Face.
 
-    The card belongs in the same folder as the files, or as the Parquet files of `scenegen export`.
-    From Parquet files, Hugging Face generates Croissant metadata.
+    Publish the card in the folder of FILES, or in the folder of the Parquet files that `scenegen
+    export` wrote. From Parquet files, Hugging Face generates Croissant metadata.
     """
     needs("scenegen card", SHARE, "share")
     from scenegen.rooms.reader import RoomsFile

@@ -40,9 +40,9 @@ def record(
 @RECORDING
 @OVERWRITE
 def view(file: str, items: list[int] | None, out: str | None, overwrite: bool) -> None:
-    """Write a recording of the scenes of a file for the 3D viewer Rerun.
+    """Write the scenes of FILE to a recording, which the 3D viewer Rerun can open.
 
-    The recording holds points, cameras, image, depth, normals and object ids of every view. The
+    The recording has the points, camera, image, depth, normals and object ids of every view. The
     viewer shows the values under the mouse pointer.
     """
     needs("scenegen view", ("rerun",), "view")

@@ -114,12 +114,12 @@ class RoomSpec:
     listing: str = setting("")
     views: tuple[float, ...] = setting(
         (0.0,),
-        "Views of each scene, as degrees of rotation of the camera about the vertical axis, such"
-        " as 0,5,35,55,80",
+        "Views of each scene, such as 0,5,35,55,80. Each number is the angle in degrees by which"
+        " the camera is rotated about the vertical axis",
     )
     spp: int = setting(
         1,
-        "Number of colour samples per pixel. With --shading path, the default is 64",
+        "Number of samples per pixel for the colour. With --shading path, the default is 64",
         limits=(1, 1024),
     )
     image_dtype: str = setting("uint8", choices=IMAGE_DTYPES)
@@ -132,8 +132,9 @@ class RoomSpec:
     fov_spread_degrees: float = setting(0.0, later=True)
     principal_point: tuple[float, float] = setting(
         (0.5, 0.5),
-        "Principal point x,y, such as 0.3,0.6: fractions of width and height from the upper left"
-        " corner. With other values than 0.5,0.5, images look like crops of larger images",
+        "Principal point x,y, such as 0.3,0.6. x is a fraction of the width, and y of the height,"
+        " from the upper left corner. Unless it is 0.5,0.5, images look like crops of larger"
+        " images",
         later=True, shown="0.5,0.5",
     )  # fmt: skip
     pixel_aspect: float = setting(
@@ -141,22 +142,22 @@ class RoomSpec:
     )
     projection: str = setting(
         "perspective",
-        "equirectangular: panoramas of interiors, 360 x 180 degrees. Their depth is the distance"
-        " along the ray, and --size must be twice as wide as high",
+        "equirectangular: panoramas of interiors, 360 x 180 degrees. The depth of a panorama is"
+        " the distance along the ray. --size must be twice as wide as high, such as 256x512",
         choices=("perspective", "equirectangular"), later=True,
     )  # fmt: skip
     stereo: float = setting(
         0.0,
-        "Baseline of stereo pairs in scene units (metres in interiors), such as 0.065. Each view"
-        " gets a second image from a camera to the right. With 0, there are no pairs",
+        "Distance between the two cameras of a stereo pair, such as 0.065, in scene units (metres"
+        " in interiors). The second camera is to the right. 0: no stereo pairs",
         limits=(0.0, 0.25), later=True,
     )  # fmt: skip
     truth: tuple[str, ...] = setting(
         (),
         "Additional ground truth to store, comma-separated. amodal: masks of whole objects and"
         " their visible fractions; coordinates: object coordinates (NOCS); flow: optical flow to"
-        " the next view, with occlusion; albedo: reflectance of each pixel; layers: all surfaces"
-        " along each ray, up to 16",
+        " the next view, and a mask of occluded pixels; albedo: reflectance of each pixel; layers:"
+        " the first 16 surfaces along each ray",
         later=True, option="with", shown="none",
     )  # fmt: skip
 
@@ -256,7 +257,8 @@ class DatasetSpec(RoomSpec):
 
     object_radius: tuple[float, float] = setting(
         (0.11, 0.22),
-        "Bounding radius of objects in scene units. With several views, the default is 25% smaller",
+        "Bounding radius of objects in scene units. With several --views, the default is 25%"
+        " smaller",
         limits=(0.005, 0.5),
     )
     pose: str = setting(
@@ -267,24 +269,25 @@ class DatasetSpec(RoomSpec):
     lights: tuple[int, int] = setting((1, 3), "Number of lights in a scene", limits=(0, MAX_LIGHTS))
     shading: str = setting(
         "paper",
-        "paper: the paper's shading equation; path: path tracing with shadows and indirect light,"
-        " slower",
+        "paper: shading equation of the Pix2Shape paper; path: path tracing, which is slower but"
+        " has shadows and indirect light",
         choices=("paper", "path"),
     )
-    shadows: bool = setting(False, "Objects cast shadows", option="shadows/--no-shadows")
+    shadows: bool = setting(False, "Let objects cast shadows", option="shadows/--no-shadows")
     allow_cropped: bool = setting(False, "Allow objects that the image border crops")
     camera_radius: float = setting(1.5, "Distance of the cameras from the target, in scene units")
     camera_target: Vector3 = setting((0.3, 0.3, 0.3))
     light_radius: float = setting(2.5, "Distance of the lights from the target, in scene units")
     light_level: float = setting(
         0.95,
-        "Radiance of a white surface that is at the target and faces every light",
+        "Brightness of the lights: the radiance of a white surface that is at the target and faces"
+        " every light",
         limits=(0.0, 100.0),
     )
-    ambient: Vector3 = setting((0.1, 0.1, 0.1), "Ambient light L_a")
+    ambient: Vector3 = setting((0.1, 0.1, 0.1), "Radiance of the ambient light, L_a")
     attenuation: tuple[float, float] = setting(
         (0.5, 0.5),
-        "Linear and quadratic attenuation of light with distance, k_l,k_q",
+        "Attenuation k_l,k_q of light: k_l is linear in the distance, k_q quadratic",
         shown="0.5,0.5",
     )
     light_saturation: float = setting(
@@ -294,7 +297,7 @@ class DatasetSpec(RoomSpec):
     room_reflectance: Vector3 = setting((0.8, 0.8, 0.8), "Reflectance of ground and walls")
     random_reflectance: bool = setting(
         False,
-        "Each object has a random reflectance, or all objects have the same",
+        "Give each object a random reflectance, or give all objects the same reflectance",
         option="random-reflectance/--same-reflectance",
     )
     specular: tuple[float, float] = setting(
@@ -366,7 +369,8 @@ class InteriorSpec(RoomSpec):
     )  # fmt: skip
     hours: tuple[float, float] = setting(
         (7.0, 21.0),
-        "Range of the hour of the day in interiors. It is dark outside after 18 h",
+        "Hour of the day in interiors. With a range, each scene has its own hour. After 18, it is"
+        " dark outside",
         limits=(0.0, 24.0),
         later=True,
     )
@@ -377,7 +381,7 @@ class InteriorSpec(RoomSpec):
     )  # fmt: skip
     sensor_noise: float = setting(
         0.0,
-        "Standard deviation of the sensor noise in interiors, relative to white",
+        "Standard deviation of the sensor noise in images of interiors, as a fraction of white",
         limits=(0.0, 1.0),
         later=True,
     )

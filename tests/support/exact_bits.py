@@ -25,7 +25,7 @@ from scenegen.rendering.backend import select_variant
 from scenegen.rendering.renderer import PICTURE
 
 LANES, THREADS = map(int, sys.argv[1:3] or (8, 2))
-TARGETS = {4: b"haswell", 8: b"haswell", 16: b"haswell"}  # wider than its registers, if it must be
+TARGETS = {4: b"haswell", 8: b"haswell", 16: b"skylake-avx512"}
 TINY = {"height": 20, "width": 24, "min_visible_pixels": 0, "image_dtype": "float32", "seed": 11}
 CORNERS = tuple(itertools.product((-1, 1), repeat=3))
 SIDES = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
