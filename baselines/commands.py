@@ -119,7 +119,7 @@ def _listed(names: Iterable[str]) -> str:
     "--train",
     type=InputPath(),
     help="Training file. The baselines constant, mean-depth, nearest, outline-regression and"
-    " outline-relief need rooms. outline-trees and features use questions.",
+    " outline-relief need rooms. The baselines outline-trees and features use questions.",
 )
 @click.option(
     "--labels",

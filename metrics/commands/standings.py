@@ -81,10 +81,11 @@ def compare(
 ) -> None:
     """Compare the scores of each OTHER method with the scores of the FIRST method.
 
-    FIRST and OTHER are score files of `bench score --json`, or submissions, which are scored first.
-    The comparison is paired by image or question. All methods get the same alignment. The output
-    lists the differences (OTHER minus FIRST) with confidence intervals, verdicts, significance
-    tests, and the smallest difference that the test set can detect.
+    FIRST and OTHER are score files of `bench score --json`, or submissions. Submissions are scored
+    before the comparison. The comparison is paired by image or question. All methods get the same
+    alignment. The output lists the differences (OTHER minus FIRST) with confidence intervals,
+    verdicts and significance tests. It also has the smallest difference that the test set can
+    detect.
     """
     from metrics.scoring.aligned import aligned
     from metrics.views.compare.compare import compare as compare_files
@@ -151,12 +152,12 @@ def leaderboard(
 ) -> None:
     """Rank methods, in one table per test set. All methods of a table get the same alignment.
 
-    Each METHOD is a score file of `bench score --json`, or a submission, which is scored first.
-    Methods are ranked by their first main metric: shape_error for box rooms, abs_rel for interiors
-    and sensor data, solid_iou for layers and meshes, and accuracy for questions. In box rooms with
-    several views, methods that get only the first view are ranked by behind_depth_error. Baselines
-    have no rank. The results of the Pix2Shape paper also have no rank, because the paper used other
-    data.
+    Each METHOD is a score file of `bench score --json`, or a submission. Submissions are scored
+    before the ranking. Methods are ranked by their first main metric: shape_error for box rooms,
+    abs_rel for interiors and sensor data, solid_iou for layers and meshes, and accuracy for
+    questions. In box rooms with several views, methods that get only the first view are ranked by
+    behind_depth_error. Baselines have no rank. The results of the Pix2Shape paper also have no
+    rank, because the paper used other data.
     """
     from metrics.views.leaderboard import leaderboard as rank
     from metrics.views.leaderboard import to_html

@@ -135,7 +135,7 @@ def info(file: str) -> None:
 def corrupt(data: str, kind: str, severity: int, seed: int, out: str, overwrite: bool) -> None:
     """Corrupt the images of a file, and write them to a new file with the same ground truth.
 
-    Run a model on both files. Then compare its two predictions with `bench compare --truth
+    Run a model on both files. Then compare the two submissions with `bench compare --truth
     ROOMS.h5`. The difference between the scores is the effect of the corruption.
     """
     from metrics.corruptions import write_corrupted
