@@ -60,24 +60,24 @@ ALL = {
     "constant": Named(ROOMS, "a constant depth, the mean over the images of --train", needs=TRAIN),
     "mean-depth": Named(ROOMS, "the mean depth of --train at each pixel", needs=TRAIN),
     "empty-room": Named(ROOMS, "ground-truth walls and ground, no objects"),
-    "cut-out": Named(ROOMS, "flat objects with true masks, at the true distance of each object"),
+    "cut-out": Named(ROOMS, "flat objects, with the true mask and distance of each object"),
     "picture-outline": Named(ROOMS, "a foreground mask from the image, at a constant height"),
-    "balls": Named(ROOMS, "a sphere for each connected part of the foreground mask"),
+    "balls": Named(ROOMS, "a sphere in place of each connected part of the foreground mask"),
     "outline-regression": Named(ROOMS, "a foreground mask, with heights from a regression",
                                 needs=TRAIN),
     "outline-relief": Named(ROOMS, "a foreground mask, with heights from trees", needs=TRAIN),
     "nearest": Named(ROOMS, "the height map of the most similar image of --train", needs=TRAIN),
-    "oracle": Named(ROOMS, "the ground truth, which scores perfectly"),
+    "oracle": Named(ROOMS, "the ground truth; its score is perfect"),
     "chance": Named(QUESTIONS, "random options"),
-    "oracle-warp": Named(QUESTIONS, "true depth of rooms, warped into the other camera"),
-    "cubes": Named(CUBES, "decodes images to 3D cubes; nothing is learned"),
-    "outline": Named(QUESTIONS, "the most similar silhouette, without labels or 3D"),
+    "oracle-warp": Named(QUESTIONS, "the true depth of each room, warped into the other camera"),
+    "cubes": Named(CUBES, "reconstructs the 3D cubes of an image, without learning"),
+    "outline": Named(QUESTIONS, "selects the most similar silhouette, without labels or 3D"),
     "features": Named(QUESTIONS, "features of a frozen encoder, from --features",
                       needs=("features",), takes=("train_features", *LABELS)),
     "outline-trees": Named(QUESTIONS, "trees on silhouette features", needs=TRAIN, takes=LABELS),
     "pix2shape": Named(BOTH, "Pix2Shape, trained with the losses of the paper", "pix2shape"),
     "pix2shape-compact": Named(BOTH, "Pix2Shape, trained with other losses", "pix2shape"),
-    "pix2shape-rays": Named(ROOMS, "Pix2Shape with true walls, trained on several views",
+    "pix2shape-rays": Named(ROOMS, "Pix2Shape with true walls as input, trained on several views",
                             "pix2shape"),
     "pix2shape-views": Named(CUBES, "Pix2Shape with a separate encoder", "pix2shape"),
     "cnn": Named(QUESTIONS, "ResNets and a softmax over the options", "resnets.cnn"),
@@ -90,8 +90,9 @@ ALL = {
     "ptn": Named(BOTH, "voxels, trained with silhouettes", "ptn.training"),
     "rezende": Named(CUBES, "meshes, trained through a non-differentiable renderer",
                      "rezende.training"),
-    "siamese": Named(QUESTIONS, "the option with the most similar features", "resnets.siamese"),
-    "solid-supervised": Named(ROOMS, "layers from the ground-truth masks and depth, learned",
+    "siamese": Named(QUESTIONS, "a ResNet; selects the option with the most similar features",
+                     "resnets.siamese"),
+    "solid-supervised": Named(ROOMS, "a network that predicts layers from true masks and depth",
                               "relief.solid_supervised"),
     "view-pairs": Named(ROOMS, "a network trained with pairs of images, without depth",
                         "relief.view_pairs"),
@@ -117,8 +118,8 @@ def _listed(names: Iterable[str]) -> str:
 @click.option(
     "--train",
     type=InputPath(),
-    help="Training file: rooms for constant, mean-depth, nearest, outline-regression and"
-    " outline-relief; questions for outline-trees and features.",
+    help="Training file. The baselines constant, mean-depth, nearest, outline-regression and"
+    " outline-relief need rooms. outline-trees and features use questions.",
 )
 @click.option(
     "--labels",
@@ -149,8 +150,8 @@ def _listed(names: Iterable[str]) -> str:
 @click.option(
     "--weights",
     type=WEIGHTS_PATH,
-    help="Weights of a trained baseline: a .safetensors file. The pix2shape baselines also take the"
-    " name of bundled weights [default: the bundled weights for this type of data].",
+    help="Weights of a trained baseline: a .safetensors file. The pix2shape baselines also accept"
+    " the name of bundled weights [default: the bundled weights for this type of data].",
 )
 @OVERWRITE
 def baseline(
@@ -264,7 +265,7 @@ def _check_task(name: str, data: str) -> None:
     type=InputPath(),
     multiple=True,
     metavar="FILE...",
-    help="Training files of rooms or questions. Only depth networks take several files.",
+    help="Training files of rooms or questions. Only depth networks accept several files.",
 )
 @click.option("--out", type=OutputFolder(), required=True, help="Output folder of the run.")
 @click.option(
@@ -283,8 +284,8 @@ def _check_task(name: str, data: str) -> None:
     "settings",
     type=Setting(),
     multiple=True,
-    help="Another setting of the baseline, such as depth=50. docs/baselines.md lists the settings."
-    " Repeatable.",
+    help="Change another setting of the baseline, such as depth=50. For an unknown setting, the"
+    " error message lists all settings. Repeatable.",
 )
 @click.option("--resume", is_flag=True, help="Resume from the checkpoint in --out.")
 @MINUTES
@@ -370,11 +371,12 @@ def _baseline(name: str) -> "Baseline":
     help="Number of questions per batch.",
 )  # fmt: skip
 def probe(model: str, data: str, out: str, device: str, batch: int) -> None:
-    """Measure how well each layer of a frozen encoder recognises a shape in two images.
+    """Measure how well each layer of a frozen encoder recognises a shape from another direction.
 
-    For each layer, the response is the option with the highest cosine similarity to the reference.
-    Nothing is trained. The output folder contains the predictions and scores of each layer. The
-    figure layers.png shows the accuracy of each layer.
+    Each layer answers mental-rotation questions, without training. The response of a layer is the
+    option whose features have the highest cosine similarity to those of the reference. The output
+    folder contains the predictions and scores of each layer. The figure layers.png shows the
+    accuracy of each layer.
     """
     needs_torch("bench probe", ("torch", "transformers"))
     from baselines import features

@@ -27,7 +27,8 @@ from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder
               help="Folder of the Inspect logs. Re-run the same command to resume from these logs.")
 @click.option("--out", type=NewHdf5(), required=True, help="Output file of predictions.")
 @click.option("--blind", "control", cls=Renamed, former="--control", is_flag=True,
-              help="Blind control: leave out the reference, so that models can only guess.")
+              help="Blind control: ask without the reference image, so that the model can only"
+                   " guess.")
 @click.option("--temperature", type=click.FloatRange(0, 2), default=0.0, show_default=True,
               help="Sampling temperature.")
 @click.option("--max-tokens", type=click.IntRange(1, 1_000_000), default=1024, show_default=True,
@@ -35,7 +36,8 @@ from scenegen.command_line.paths import InputPath, NewHdf5, OutputFolder
 @click.option("--timeout", type=click.IntRange(1, 3600), default=120, show_default=True,
               help="Maximum time per reply, in seconds.")
 @click.option("--tries", type=click.IntRange(1, 100), default=6, show_default=True,
-              help="Maximum number of attempts per question. The pauses between attempts increase.")
+              help="Maximum number of attempts per question. The pause becomes longer after each"
+                   " attempt.")
 @click.option("--concurrency", type=click.IntRange(1, 256), default=4, show_default=True,
               help="Number of concurrent requests.")
 @model_options
@@ -48,9 +50,9 @@ def ask(
     """Ask a vision-language model the questions of FILE, and write its responses as predictions.
 
     The images are rendered again from the cubes of FILE, in sRGB, with letters on the options. The
-    package Inspect sends the requests and logs every reply; `inspect view` shows the log. Failed
-    requests are left out of the output. Re-run the same command to repeat the failed requests.
-    `bench score` counts a reply without an answer as wrong.
+    package Inspect sends the requests and logs every reply; `inspect view` shows the log. If a
+    request fails, the output lacks its question. Re-run the same command to ask such questions
+    again. If a reply has no answer, `bench score` counts it as wrong.
     """
     needs("bench ask", ("inspect_ai",), "vlm")
     from iqtt.vlm.rows import Asked, count_rows

@@ -35,7 +35,7 @@ from scenegen.command_line.paths import InputPath, OutputPath
     "--truth", type=InputPath(), help="File of rooms. With --truth, FILES are predictions."
 )
 @click.option(
-    "--items", type=Items(), help="Images to show in the grid, with --truth [default: 0-3]."
+    "--items", type=Items(), help="Images to show in the grid. Needs --truth [default: 0-3]."
 )
 @click.option(
     "--width",
@@ -55,8 +55,9 @@ def figure(
 ) -> None:
     """Draw a figure for a paper, with embedded fonts, at the width of a column or a page.
 
-    FILES are score files. The figure shows their values with confidence intervals and baselines.
-    With --truth, FILES are predictions, and the figure is a grid of images with depth and error.
+    Without --truth, FILES are score files. The figure shows their scores, with confidence intervals
+    and baselines. With --truth, FILES are predictions. The figure is then a grid of images with
+    depth and error.
     """
     from metrics.score_file import read_scores
     from metrics.scoring.aligned import aligned

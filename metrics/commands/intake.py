@@ -58,7 +58,7 @@ METHOD = click.option(
 RUN = click.option(
     "--run", "run_name", default="", help="Name of the training run, such as its seed."
 )
-NOTES = click.option("--notes", default="", help="Note to store in the output file.")
+NOTES = click.option("--notes", default="", help="Note that is stored in the output file.")
 FRAME = click.option(
     "--frame", type=click.Choice(["opencv", "opengl"]), default="opencv", show_default=True,
     help="Axes of points and normals. opencv: x right, y down, z forward; opengl: x right, y up, z"
@@ -66,8 +66,8 @@ FRAME = click.option(
 )  # fmt: skip
 MISSING = click.option(
     "--missing", type=click.Choice(["refuse", "nearest"]), default="refuse", show_default=True,
-    help="Pixels without a predicted value. refuse: report an error; nearest: copy the nearest"
-    " valid pixel.",
+    help="What to do with pixels without a predicted value. refuse: stop with an error; nearest:"
+         " copy the value of the nearest valid pixel.",
 )  # fmt: skip
 
 
@@ -87,15 +87,16 @@ def reading_options(*kinds: str) -> Callable[[Command], Command]:
         click.option("--invalid", type=float, multiple=True,
                      help="Stored value that marks invalid pixels, such as 0. Repeatable."),
         click.option("--normals", metavar="FILES",
-                     help="Files of normals, in the formats of --depth. Integer values are mapped"
-                     " to the range -1 to 1."),
+                     help="Files with normals, in the formats of --depth. Integer values are mapped"
+                          " to the range -1 to 1."),
         FRAME,
-        click.option("--array", help="Name of the array in NPZ files, or of the channel in EXR"
-                                     " files."),
+        click.option("--array", help="Name of the array to read from NPZ files, or of the channel"
+                                     " to read from EXR files."),
         click.option("--match", type=click.Choice(["number", "name"]), default="number",
-                     show_default=True, help="Assignment of files to images. number: a file belongs"
-                     " to the image with the same name or number; name: files are in alphabetical"
-                     " order."),
+                     show_default=True, help="How files are assigned to images. number: a file"
+                                             " belongs to the image with the same name or number;"
+                                             " name: the first file in alphabetical order belongs"
+                                             " to the first image, and so on."),
     )  # fmt: skip
 
 
@@ -119,36 +120,40 @@ def read_as(
               help="Predicted depth: a folder, a quoted pattern such as 'out/*.png', or one NPY or"
               " NPZ file for all images. Formats: PNG, TIFF, EXR, PFM, NPY and NPZ.")
 @click.option("--layers", metavar="FILES",
-              help="Predictions of all surfaces along each ray: NPY or NPZ files with depths (h, w,"
-              " L) or points (h, w, L, 3). The nearest layer comes first. Values behind the last"
-              " layer are NaN.")
+              help="Predictions of all surfaces along each ray, instead of --depth: NPY or NPZ"
+                   " files with depths (h, w, L) or points (h, w, L, 3). The nearest layer comes"
+                   " first. After the last layer of a ray, values are NaN.")
 @click.option("--meshes", metavar="FILES",
-              help="Predictions of whole objects, in the camera frame: one GLB, PLY or OBJ file per"
-              " image, or one folder of such files per image, as in 'out/*/*.glb'.")
+              help="Predictions of whole objects, in the camera frame, instead of --depth. Each"
+                   " image has one GLB, PLY or OBJ file, or one folder of such files, as in"
+                   " 'out/*/*.glb'.")
 @reading_options(*DEPTH_KINDS, "points")
 @click.option("--alignment", type=click.Choice(ALIGNMENTS),
-              help="Alignment to the ground truth that the predictions need, such as scale for"
-              " predictions up to a scale. Disparity up to a shift needs scale_shift [default:"
-              " none; scale_shift for disparity].")
+              help="Alignment to the ground truth that the predictions need. For example, depth"
+                   " with an unknown scale needs `scale`. Disparity with an unknown shift, such as"
+                   " disparity up to scale and shift, needs `scale_shift` [default: none;"
+                   " scale_shift for disparity].")
 @click.option("--confidence", metavar="FILES",
-              help="Files with the confidence of each pixel, in the formats of --depth. Any scale"
-              " is allowed.")
+              help="Files with the confidence of each pixel, in the formats of --depth. The values"
+                   " may have any scale.")
 @click.option("--confidence-is", type=click.Choice(["confidence", "error"]), default="confidence",
-              show_default=True, help="Meaning of larger values of --confidence. confidence: more"
-              " certain; error: a larger expected error.")
+              show_default=True, help="What a larger value in the files of --confidence means."
+                                      " confidence: the prediction is more certain; error: the"
+                                      " expected error is larger.")
 @MISSING
 @click.option("--input-view", "shown", cls=Renamed, former="--shown",
               type=click.Choice(["scored_view", "first_view", "no_view"]), default="scored_view",
-              show_default=True, help="Input image of each prediction. scored_view: the view that"
-              " is scored; first_view: the first view of the scene; no_view: no image.")
+              show_default=True, help="Image that the model got as input. scored_view: the image of"
+                                      " the scored view; first_view: the image of the first view of"
+                                      " the scene; no_view: no image.")
 @click.option("--responses", "answers", cls=Renamed, former="--answers", type=InputPath(),
               metavar="FILE",
-              help="File with responses to questions, instead of --depth: .csv, .json or .jsonl, or"
-              " the log of Inspect (.eval), lmms-eval (.jsonl) or VLMEvalKit (.tsv, .xlsx).")
+              help="Responses to questions, instead of --depth: a .csv, .json or .jsonl file, or a"
+                   " log of Inspect (.eval), lmms-eval (.jsonl) or VLMEvalKit (.tsv, .xlsx).")
 @click.option("--quiz", "people", metavar="FILES",
-              help="Responses of people instead of --depth: the JSON files that the page of `iqtt"
-              " quiz` saves, as a folder or a quoted pattern. --out is then a folder with one"
-              " submission per person.")
+              help="Responses of people to questions, instead of --depth: a folder or a quoted"
+                   " pattern of the JSON files that the page of `iqtt quiz` saves. --out is then a"
+                   " folder, which gets one submission per person.")
 @DATA
 @OUT
 @METHOD
@@ -163,10 +168,11 @@ def import_(
     confidence: str | None, confidence_is: str, layers: str | None, meshes: str | None,
     **numbers: Any,
 ) -> None:
-    """Import predictions from files.
+    """Convert files of predictions to a submission.
 
-    Files are assigned to images by the numbers in their names. A missing, extra or duplicate file
-    is an error. Predictions of another size are resampled to the size of the ground truth.
+    By default, files are assigned to images by the numbers in their names. A missing, extra or
+    duplicate file is an error. If predictions have another size than the ground truth, they are
+    resampled to its size.
     """
     from scenegen.files.new_file import check_writable
 
@@ -281,16 +287,16 @@ def _print_hints(out: str, data: Any) -> None:
               " ~/envs/da3/bin/python. The environment needs Python 3.9 or newer and NumPy, but not"
               " this package.")
 @click.option("--batch", type=click.IntRange(1, 4096),
-              help="Number of images per call of infer_batch(). In a Python file, load(batch) can"
-              " also get this value [default: 8].")
+              help="Number of images per call of infer_batch(). If the load() of a Python file has"
+                   " the argument batch, it also gets this value [default: 8].")
 @click.option("--intrinsics", is_flag=True,
               help="Pass the true camera matrix to the model. The output file records this option.")
 @ENCODING
 @click.option("--exposure", type=Factor(), default=1.0, show_default=True,
-              help="Factor that multiplies the radiance of the input images. Products above 1 are"
-              " an error.")
-@click.option("--key", help="Key of the model output to use [default: the first of the keys"
-              " above that the model returns].")
+              help="Factor by which the radiance of the input images is multiplied. A product above"
+                   " 1 is an error.")
+@click.option("--key", help="Key of the value to use in the dict that the model returns [default:"
+                            " the first of the keys above that the dict has].")
 @FRAME
 @MISSING
 @click.option("--resume", "keep", flag_value="resume",
@@ -299,7 +305,7 @@ def _print_hints(out: str, data: Any) -> None:
 @click.option("--restart", "keep", flag_value="restart",
               help="Discard the predictions of an interrupted run, and start again.")
 @click.option("--timeout", type=click.FloatRange(0, min_open=True), metavar="SECONDS",
-              help="Abort the run if one call of the model takes longer.")
+              help="Abort the run if one call of the model takes longer than this time.")
 @click.option("--traceback", is_flag=True, help="Show the full traceback of an error in the model.")
 @OVERWRITE
 def run(
@@ -310,19 +316,20 @@ def run(
 ) -> None:
     """Run a model on every image of a file, and write the predictions.
 
-    MODEL is a Python file or a public depth model. transformers loads hf:NAME, and MoGe loads
-    moge:NAME.
+    MODEL is a Python file or a public depth model. A public model is hf:NAME for the package
+    transformers, or moge:NAME for MoGe.
 
     For rooms, the Python file defines infer(image). The image is an RGB array (H, W, 3), uint8.
     infer returns a dict with one of the keys below. With --intrinsics, the call is infer(image,
-    intrinsics). For questions, the file defines infer(reference, answers), which returns the index
-    of an option or one score per option.
+    intrinsics). For questions, the file defines infer(reference, answers). This function returns
+    the index of an option, or one score per option.
 
     Instead of the function infer, the file can define a class with the method infer, or a function
     load() that returns an object with this method. MODEL can also be a file of MoGe's evaluation
-    code: the load() of this file gets the OPTIONS after --. docs/evaluate.md has examples.
+    code. The OPTIONS after -- are passed to the load() of that file. docs/evaluate.md has examples.
 
     \b
+    Keys of the dict:
     points_metric, depth_metric: in metres; in box rooms, in scene units
     points_scale_invariant, depth_scale_invariant: up to a scale
     points_affine_invariant, depth_affine_invariant: up to scale and shift

@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 ALIGN = click.option(
     "--align",
     type=click.Choice(FITS),
-    help="Alignment that is fitted to the ground truth of each image, the same for all methods"
-    " [default: the loosest alignment that a method declares].",
+    help="Alignment that is fitted to the ground truth of each image, for all methods [default: of"
+    " the alignments that the methods declare, the one with the most free parameters].",
 )
 TRUTH = click.option(
     "--truth",
@@ -65,8 +65,8 @@ def _scores_of(paths: tuple[str, ...], truth: str | None, **settings: Any) -> "l
 @click.option(
     "--allow-incomparable",
     is_flag=True,
-    help="Also compare scores of different parts of a test set, over the images or questions that"
-    " all files have.",
+    help="Allow files with scores of different parts of a test set. The comparison then uses the"
+    " images or questions that are in all files.",
 )
 @OVERWRITE
 def compare(
@@ -155,7 +155,7 @@ def leaderboard(
     Methods are ranked by their first main metric: shape_error for box rooms, abs_rel for interiors
     and sensor data, solid_iou for layers and meshes, and accuracy for questions. In box rooms with
     several views, methods that get only the first view are ranked by behind_depth_error. Baselines
-    are listed without a rank, and so are the results that the Pix2Shape paper reports on other
+    have no rank. The results of the Pix2Shape paper also have no rank, because the paper used other
     data.
     """
     from metrics.views.leaderboard import leaderboard as rank

@@ -15,8 +15,8 @@ from scenegen.commands.viewing import RECORDING, record
 TRUTH = click.option(
     "--truth",
     type=InputPath(),
-    help="Ground truth: a file of rooms, or the answer key of questions. Without --truth, only"
-    " scores on named benchmarks are ranked [default: the path stored in PREDICTIONS].",
+    help="Ground truth: a file of rooms, or the answer key of questions [default: the path stored"
+    " in PREDICTIONS; scores are then ranked only on named benchmarks].",
 )
 
 
@@ -41,7 +41,7 @@ TRUTH = click.option(
     "--html",
     "html_path",
     type=OutputPath(),
-    help="Write a report page: main metrics, example images, charts, all metrics.",
+    help="Write an HTML report with all metrics, charts and example images.",
 )
 @click.option(
     "--compare-with",
@@ -51,14 +51,15 @@ TRUTH = click.option(
     multiple=True,
     type=InputPath(),
     metavar="SCORES.json",
-    help="Score file of another method on the same ground truth, whose scores are added to the page"
+    help="Score file of another method on the same ground truth. Its scores are added to the report"
     " of --html. Repeatable.",
 )
 @click.option(
     "--all",
     "whole",
     is_flag=True,
-    help="Print all metrics instead of the main metrics, and scores by group, such as by view.",
+    help="Print all metrics, not only the main metrics. Also print scores by group, such as by"
+    " view.",
 )
 @MARKDOWN
 @SEED
@@ -73,13 +74,13 @@ TRUTH = click.option(
     former="--floors",
     type=InputPath(),
     metavar="FLOORS.json",
-    help="File of `iqtt floors` with the accuracies of 2D-only baselines on questions [default: the"
-    " file in this package].",
+    help="Accuracies of 2D-only baselines on questions, in a file that `iqtt floors` wrote"
+    " [default: the file in this package].",
 )
 @click.option(
     "--allow-partial",
     is_flag=True,
-    help="Allow predictions of a part of the images or questions. Partial scores are not ranked.",
+    help="Score PREDICTIONS even if images or questions are missing. Such scores are not ranked.",
 )
 @click.option(
     "--non-finite",
@@ -98,15 +99,16 @@ TRUTH = click.option(
     "--protocol",
     default="",
     metavar="NAME",
-    help="Evaluation protocol for sensor ground truth: a name from docs/real-data.md. all: print"
-    " the scores under every protocol that applies [default: declared].",
+    help="Evaluation protocol for sensor ground truth. docs/data/protocols.csv lists the names."
+    " With the name `all`, the scores under every protocol that applies are printed [default:"
+    " declared].",
 )
 @click.option(
     "--align",
     type=click.Choice(FITS),
-    help="Alignment that is fitted to the ground truth of each image before scoring. An alignment"
-    " with fewer free parameters than the declared alignment is refused [default: the alignment"
-    " that the submission declares].",
+    help="Alignment that is fitted to the ground truth of each image before scoring. It must have"
+    " at least as many free parameters as the alignment that the submission declares [default:"
+    " the declared alignment].",
 )
 @click.option(
     "--figure",
@@ -134,7 +136,8 @@ def score(
 ) -> None:
     """Score predictions against ground truth, and print the main metrics.
 
-    PREDICTIONS is a submission, or one submission per training run of one method.
+    PREDICTIONS is a submission. For a method with several training runs, pass one submission per
+    run.
     """
     from metrics.score_file import write_scores
     from metrics.scoring.evaluate import open_runs, score_runs
@@ -205,9 +208,9 @@ def _score_all(
 @TRUTH
 @click.pass_context
 def validate(ctx: click.Context, submission: str, truth: str | None) -> None:
-    """List all errors of a submission, and hints at likely mistakes.
+    """List all errors in a submission, and hints about likely mistakes.
 
-    The exit code is 2 if the submission cannot be scored.
+    If the submission cannot be scored, the exit code is 2.
     """
     from metrics.submissions.validation import validate as problems_of
 
@@ -243,8 +246,8 @@ def view(
 ) -> None:
     """Write a file for the 3D viewer Rerun that shows predictions next to the ground truth.
 
-    Each timeline sorts the scenes by one metric, worst first. The colour of a predicted point shows
-    the depth error of the point.
+    Each timeline of the viewer sorts the scenes by one metric, worst first. The colour of a
+    predicted point shows its depth error.
     """
     needs("bench view", ("rerun",), "view")
     from metrics.measured.reader import Images

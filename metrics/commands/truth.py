@@ -18,30 +18,32 @@ LAYOUTS = ("moge", "nyu", "nyu-raw", "kitti", "diode", "hypersim", "sintel")
 # fmt: off
 @click.command(epilog=f"{EXAMPLE}bench truth --images 'rgb/*.png' --depth 'gt/*.png' --unit mm"
                       " --invalid 0 --out mine.h5")
-@click.option("--images", metavar="FILES", help="Images: a folder, or a quoted pattern.")
+@click.option("--images", metavar="FILES", help="Image files: a folder, or a quoted pattern such as"
+              " 'rgb/*.png'.")
 @click.option("--depth", metavar="FILES",
-              help="Depth of the images, in the size of the images: PNG, TIFF, EXR, PFM, NPY or"
-                   " NPZ.")
+              help="Depth files, with the size of the images: a folder, or a quoted pattern."
+                   " Formats: PNG, TIFF, EXR, PFM, NPY and NPZ.")
 @reading_options(*DEPTH_KINDS)
 @click.option("--focal-baseline", type=Factor(), metavar="N",
-              help="For disparity in pixels: the focal length in pixels times the baseline in"
-              " metres. Depth is N / disparity.")
+              help="If the disparity is in pixels: focal length in pixels, times distance between"
+                   " the two cameras in metres. Depth is N / disparity.")
 @click.option("--disparity-offset", type=float, default=0.0, metavar="PIXELS",
-              help="Offset that is added to the disparity, such as the difference between the"
-              " principal points of the two cameras.")
+              help="Offset that is added to each disparity, such as the difference between the"
+                   " principal points of the two cameras.")
 @click.option("--intrinsics", type=InputPath(), metavar="K.json",
               help="JSON file with the camera matrix of all images, or with one matrix per image"
               " name. Matrices are in pixels, with the centre of the first pixel at 0.5.")
 @click.option("--groups", type=InputPath(), metavar="GROUPS.csv",
-              help="CSV file with lines `image,group`. Images of one scene or drive form a group.")
+              help="CSV file with one line `image,group` per image. The images of one scene or"
+                   " drive form a group.")
 @click.option("--mask", metavar="FILES", help="Mask images. Pixels with the value 0 are ignored.")
-@click.option("--layout", type=click.Choice(LAYOUTS), help="Public data set in --data, with the"
-                                                           " folder layout of its download.")
+@click.option("--layout", type=click.Choice(LAYOUTS), help="Name of the public data set in --data."
+              " The folder layout is that of the download.")
 @click.option("--data", type=InputPath(), metavar="FOLDER", help="Folder or file of the public"
                                                                  " data set.")
 @click.option("--split", type=InputPath(),
-              help="Images of the public data set to use: splits.mat of NYU, or a list of KITTI"
-                   " frames.")
+              help="File that selects images of the public data set: splits.mat for NYU, or a list"
+                   " of frames for KITTI.")
 @click.option("--source", default="", help="Source of the data, stored in the file.")
 @click.option("--license", "licence", default="", help="Licence of the data, stored in the file.")
 @click.option("--out", type=NewHdf5(), required=True, metavar="TRUTH.h5", help="Output file.")
@@ -112,7 +114,7 @@ def truth(
 @click.command(epilog=f"{EXAMPLE}bench info mine.h5")
 @click.argument("file", type=InputPath())
 def info(file: str) -> None:
-    """Print what a file of sensor ground truth contains: image sizes, depths, groups, source."""
+    """Print the image sizes, depths, groups and source of a file of sensor ground truth."""
     from metrics.measured.describe import describe
 
     click.echo(describe(file))
@@ -131,10 +133,10 @@ def info(file: str) -> None:
 @click.option("--out", type=NewHdf5(), required=True, metavar="FILE.h5", help="Output file.")
 @OVERWRITE
 def corrupt(data: str, kind: str, severity: int, seed: int, out: str, overwrite: bool) -> None:
-    """Write a copy of a file with corrupted images and the same ground truth.
+    """Corrupt the images of a file, and write them to a new file with the same ground truth.
 
-    Run a model on both files, and compare both predictions with `bench compare --truth ROOMS.h5`.
-    The difference is the drop in performance.
+    Run a model on both files. Then compare its two predictions with `bench compare --truth
+    ROOMS.h5`. The difference between the scores is the effect of the corruption.
     """
     from metrics.corruptions import write_corrupted
     from metrics.measured.reader import open_images
