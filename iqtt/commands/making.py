@@ -104,26 +104,28 @@ option = partial(click.option, show_default=True)
 @click.option(
     "--angle",
     type=Range(float),
-    help="With --preset perspective: angle, in degrees, between the view of the reference and the"
-    " view of each option [default: 20-120].",
+    help="Only with --preset perspective: angle, in degrees, between the view of the reference and"
+    " the view of each option [default: 20-120].",
 )
 @click.option(
     "--objects",
     type=Range(int),
-    help="With --preset perspective: number of objects in a room [default: 12-40].",
+    help="Only with --preset perspective: number of objects in a room [default: 12-40].",
 )
 @click.option(
     "--object-split",
     type=click.Choice(["all", "train", "val", "test"]),
-    help="With --preset perspective: split from which the objects are drawn [default: all].",
+    help="Only with --preset perspective: split from which objects are sampled [default: all].",
 )
 @click.option(
-    "--spp", type=int, help="With --preset perspective: samples per pixel for the colour."
+    "--spp",
+    type=int,
+    help="Only with --preset perspective: number of samples per pixel for the colour.",
 )
 @click.option(
     "--denoise/--no-denoise",
     default=None,
-    help="With --preset perspective: denoise the images [default: if the extra `denoise` is"
+    help="Only with --preset perspective: denoise the images [default: if the extra `denoise` is"
     " installed].",
 )
 @option(

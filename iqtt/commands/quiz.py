@@ -22,7 +22,7 @@ option = partial(click.option, show_default=True)
 @option("--practice", type=int, default=2,
         help="Number of practice questions. They come first and give feedback. The paper used 1.")
 @option("--seed", type=click.IntRange(0, LARGEST), default=0, help="Seed with which the"
-                                                                   " questions are drawn.")
+                                                                   " questions are selected.")
 @click.option("--contact", default="", help="Contact person or address of the study. The first page"
                                             " shows it.")
 @click.option("--post", default="", metavar="URL",

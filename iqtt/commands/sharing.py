@@ -38,9 +38,9 @@ def card(
 ) -> None:
     """Write a data card for the split in FOLDER, with the metadata header of Hugging Face.
 
-    The card lists the files that you can publish with it, without the answer key of the test
-    questions. If one of these files reveals the correct option of a test question, the command
-    stops with an error.
+    The card lists the files that you can publish. The answer key of the test questions is not
+    listed. If a listed file reveals the correct option of a test question, the command stops with
+    an error.
     """
     needs("iqtt card", SHARE, "share")
     from iqtt.sharing.published import open_split

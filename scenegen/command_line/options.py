@@ -164,12 +164,12 @@ WORKERS = click.option("--workers", type=click.IntRange(0, 256), default=0,
                        help="Number of rendering processes. Each process uses about 0.4 GiB of"
                        " memory; for interiors, 1.3 GiB.")
 SCHEDULER = click.option("--scheduler", metavar="ADDRESS",
-                         help="Distribute the work by the Dask scheduler at this address, such as"
+                         help="Distribute the work with the Dask scheduler at this address, such as"
                          " tcp://host:8786. local: start a Dask cluster on this machine.")
 OVERWRITE = click.option("--overwrite", is_flag=True, help="Replace existing files.")
 DEVICE = click.option("--device", type=click.Choice(["auto", "cpu", "cuda"]), default="auto",
                       show_default=True,
-                      help="Device to render on. auto: the CPU. Without LLVM, the CPU is slow.")
+                      help="Device to render on. auto means cpu, which is slow without LLVM.")
 IMAGE_DTYPE = click.option("--image-dtype", type=click.Choice(["uint8", "float16", "float32"]),
                            default="uint8", show_default=True, help="Data type of the stored"
                                                                     " radiance.")

@@ -60,17 +60,17 @@ def _presets(_ctx: click.Context, _param: click.Parameter, incomplete: str) -> l
               " presets` lists the presets.")
 @SEED
 @click.option("--size", type=Size(), help="Image size in pixels [128; 256 for interiors].")
-@click.option("--shapes", type=Names(), help="Basic shapes that can be drawn, such as"
+@click.option("--shapes", type=Names(), help="Sample basic shapes from this list, such as"
                                              " box,sphere [all].")
-@click.option("--classes", type=Names(), help="Object categories that can be drawn, such as"
+@click.option("--classes", type=Names(), help="Sample object categories from this list, such as"
                                               " mug,bowl.")
 @click.option("--object-split", type=click.Choice(["all", "train", "val", "test"]),
-              help="Draw object instances from this split. For training data, use train: the"
+              help="Sample object instances from this split. For training data, use train: the"
               " published benchmarks use test [all].")
 @MESHES
 @click.option("--reflectance", type=Reflectance(),
-              help="Reflectance of the objects. Without --room-reflectance, the room has the same."
-              " own: the colours in the mesh files, multiplied by 0.8 [0.8].")
+              help="Reflectance of the objects. Without --room-reflectance, it is also that of the"
+              " room. own: the colours in the mesh files, multiplied by 0.8 [0.8].")
 @click.option("--fov", type=Range(float),
               help="Field of view in degrees of a square image. Other images have the same diagonal"
               " field of view. With a range such as 20-60, each scene has its own value [28].")

@@ -133,7 +133,7 @@ class RoomSpec:
     principal_point: tuple[float, float] = setting(
         (0.5, 0.5),
         "Principal point x,y, such as 0.3,0.6. x is a fraction of the width, and y of the height,"
-        " from the upper left corner. Unless it is 0.5,0.5, images look like crops of larger"
+        " from the upper left corner. Unless this is 0.5,0.5, images look like crops of larger"
         " images",
         later=True, shown="0.5,0.5",
     )  # fmt: skip
@@ -263,7 +263,7 @@ class DatasetSpec(RoomSpec):
     )
     pose: str = setting(
         "resting",
-        "resting: objects lie in a stable position on the ground; any: random orientation",
+        "resting: objects lie in a stable position on the floor; any: random orientation",
         choices=("resting", "any"),
     )
     lights: tuple[int, int] = setting((1, 3), "Number of lights in a scene", limits=(0, MAX_LIGHTS))
@@ -294,7 +294,7 @@ class DatasetSpec(RoomSpec):
         0.7, "Colour saturation of the lights, from 0 (white) to 1", limits=(0.0, 1.0)
     )
     reflectance: Vector3 = setting((0.8, 0.8, 0.8))
-    room_reflectance: Vector3 = setting((0.8, 0.8, 0.8), "Reflectance of ground and walls")
+    room_reflectance: Vector3 = setting((0.8, 0.8, 0.8), "Reflectance of floor and walls")
     random_reflectance: bool = setting(
         False,
         "Give each object a random reflectance, or give all objects the same reflectance",
