@@ -21,8 +21,8 @@ LAYOUTS = ("moge", "nyu", "nyu-raw", "kitti", "diode", "hypersim", "sintel")
 @click.option("--images", metavar="FILES", help="Image files: a folder, or a quoted pattern such as"
               " 'rgb/*.png'.")
 @click.option("--depth", metavar="FILES",
-              help="Depth files: a folder, or a quoted pattern. A depth map has the size of its image."
-                   " Formats: PNG, TIFF, EXR, PFM, NPY and NPZ.")
+              help="Depth files: a folder, or a quoted pattern. A depth map has the size of its"
+                   " image. Formats: PNG, TIFF, EXR, PFM, NPY and NPZ.")
 @reading_options(*DEPTH_KINDS)
 @click.option("--focal-baseline", type=Factor(), metavar="N",
               help="If the disparity is in pixels: focal length in pixels, times distance between"
