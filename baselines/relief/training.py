@@ -101,14 +101,14 @@ def lesson(
 
     The loss is the mean absolute difference of relief: in contrast to the squared one it lets a
     pixel be either floor or object, rather than something between them. `shape_loss` is added
-    where objects are told.
+    where object ids are read.
 
     Args:
         teach: finds the relief to learn; it gets the rooms, the settings, the run's folder and a
             function to call with the images done and in all.
         with_depth: whether the rooms' depth and objects are read.
         read: reads the rooms of files; by default `read_rooms`.
-        shape: whether `shape_loss` is added where objects are told.
+        shape: whether `shape_loss` is added where object ids are read.
         prepare: is given the network of a new run.
     """
     settings, files = run.settings, run.data.rooms()
@@ -165,7 +165,7 @@ def batches_of(rooms: Rooms, lessons: Lessons, settings: Settings, first: int) -
 
 
 def _loss(network: Relief, batch: Batch, windows_only: bool, shape: bool) -> Tensor:
-    """Return the loss of a batch; where objects are told, of windows around them or of all."""
+    """Return the loss of a batch; where object ids are read, of windows around them or of all."""
     cameras = target_cameras = batch.cameras
     if batch.target_pose is not None:
         target_cameras = replace(cameras, world_from_camera=batch.target_pose)

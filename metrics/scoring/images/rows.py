@@ -168,7 +168,7 @@ def first_views(truth: RoomsFile) -> Array:
 
 
 # What is read of a row once: its digests, scores of OF_TRUTH, and what scores a prediction, which
-# is told whether to penalise values that break a rule.
+# gets whether to penalise values that break a rule.
 Begun = tuple[RowDigests, dict[str, float], Callable[[PredictedView, bool], ImageScores]]
 NO_OBJECTS: dict[str, Array] = {
     **dict.fromkeys(OBJECT_COLUMNS[1:], np.zeros(0, np.int64)),
