@@ -1,5 +1,6 @@
 """Cameras in a furnished room: free, nearly level, and with a free view of what stands there."""
 
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -27,6 +28,9 @@ COLUMNS, ROWS = 11, 9  # of the rays that look for what stands in the way
 FURNISHED = 0.6  # of these rays, more of which need not meet objects
 LARGEST = 0.3  # of these rays, which one object may take
 TALL, NEAR_TALL = 0.8, 1.7  # metres: what is higher and nearer hides the room, as backs of chairs
+SMALL = 0.35  # metres: half the diagonal of the ground area of a small object, and half its height
+CUT = 1.0  # subtracted for each small object that the lower edge of the image cuts
+MOST_CUT = 2.0
 SEVERAL = 10  # objects that count as much as all objects of the room
 LEAST_SHOWN = 1e-3
 BEYOND = 1e3  # metres
@@ -47,7 +51,8 @@ def draw_cameras(
 
     Args:
         views: degrees of all views in place of those of the spec.
-        focuses: boxes near one of which cameras look; by default those of large furniture.
+        focuses: boxes near one of which cameras look; by default those of large furniture, and
+            small objects at the lower edge of the image are avoided.
     """
     width, _, depth = space.size
     boxes = _table([thing.box for thing in space.placed])
@@ -79,7 +84,7 @@ def draw_cameras(
         ]
         cameras = with_right_eyes(spec, np.array(places), np.tile(target, (len(places), 1)))
         pairs = zip(*(values.tolist() for values in cameras), strict=True)
-        shown = [_shown(place, at, space, boxes, lens, spec) for place, at in pairs]
+        shown = [_shown(place, at, space, boxes, lens, spec, not focuses) for place, at in pairs]
         if all(shown):
             found.append((min(shown), *cameras))
     return max(found, key=lambda one: one[0])[1:] if found else None
@@ -93,11 +98,13 @@ def _table(boxes: list[Box]) -> Array:
 
 
 def _shown(
-    place: Place, target: Place, space: Space, boxes: Array, lens: Lens, spec: InteriorSpec
-) -> float:
+    place: Place, target: Place, space: Space, boxes: Array, lens: Lens, spec: InteriorSpec,
+    whole: bool,
+) -> float:  # fmt: skip
     """Return how much a camera shows; 0 where it is not free, or something stands right before it.
 
-    It is more where more objects are seen, and less where one of them fills the picture.
+    It is more where more objects are seen, and less where one of them fills the picture or, if
+    `whole`, where the lower edge of the picture cuts small objects.
     """
     x, y, z = place
     if not (CLEAR <= x <= space.size[0] - CLEAR and CLEAR <= z <= space.size[2] - CLEAR):
@@ -109,7 +116,8 @@ def _shown(
     outside = np.maximum(np.abs(start) - half, 0.0)
     if (np.sqrt((outside * outside).sum(axis=0)) < CLEAR).any():
         return 0.0
-    hit = _met(place, target, start, half, c, s, lens.edges(spec.height, spec.width))
+    axes, edges = _axes(place, target), lens.edges(spec.height, spec.width)
+    hit = _met(axes, start, half, c, s, edges)
     near = hit.min(axis=1)
     if (near <= NEAREST).any() or (near < NEAR).mean() > SHARE_NEAR:
         return 0.0
@@ -121,7 +129,48 @@ def _shown(
     hidden = float((tall < NEAR_TALL).mean())
     before = _before(place, target, boxes, lens.fov_y_degrees) / max(len(boxes), 1)
     shown = several + before + 3 * min(1 - empty, FURNISHED) - 3 * (too_large + hidden)
+    if whole and lens.is_flat:
+        shown -= min(CUT * _cut(place, axes, boxes, edges), MOST_CUT)
     return max(shown, LEAST_SHOWN)
+
+
+def _axes(place: Place, target: Place) -> tuple[Array, Array, Array]:
+    """Return the directions right, up and back of a camera, world, (3,) each."""
+    back = np.array(place) - target
+    back /= np.sqrt((back * back).sum())
+    right = np.array([back[2], 0.0, -back[0]])
+    right /= np.sqrt((right * right).sum())
+    up = np.array([back[1] * right[2], back[2] * right[0] - back[0] * right[2],
+                   -back[1] * right[0]])  # fmt: skip
+    return right, up, back
+
+
+def _cut(
+    place: Place,
+    axes: tuple[Array, Array, Array],
+    boxes: Array,
+    edges: tuple[float, float, float, float],
+) -> int:
+    """Return how many small objects the lower edge of the picture cuts, hidden ones included."""
+    x, z, a, b, bottom, top, c, s = boxes.T
+    small = (np.sqrt(a * a + b * b) < SMALL) & (top - bottom < 2 * SMALL)
+    corners = np.array(list(itertools.product((-1, 1), (-1, 1), (0, 1))), float)  # (8, 3)
+    across, along, up = (corners[:, i, None] for i in range(3))
+    offset = (
+        x + c * across * a + s * along * b - place[0],
+        bottom + up * (top - bottom) - place[1],
+        z - s * across * a + c * along * b - place[2],
+    )
+    right, high, behind = (
+        axis[0] * offset[0] + axis[1] * offset[1] + axis[2] * offset[2] for axis in axes
+    )  # (8, N) each
+    ahead = (behind < 0).all(axis=0)
+    depth = np.where(ahead, -behind, 1.0)
+    u, v = right / depth, high / depth
+    left_edge, right_edge, _, lower_edge = edges
+    beside = (u.max(axis=0) < left_edge) | (u.min(axis=0) > right_edge)
+    crosses = (v.min(axis=0) < lower_edge) & (v.max(axis=0) > lower_edge)
+    return int((small & ahead & crosses & ~beside).sum())
 
 
 def _before(place: Place, target: Place, boxes: Array, fov_y: float) -> int:
@@ -136,19 +185,14 @@ def _before(place: Place, target: Place, boxes: Array, fov_y: float) -> int:
 
 
 def _met(
-    place: Place, target: Place, start: Array, half: Array, c: Array, s: Array,
+    axes: tuple[Array, Array, Array], start: Array, half: Array, c: Array, s: Array,
     edges: tuple[float, float, float, float],
 ) -> Array:  # fmt: skip
     """Return the distance along some rays of the picture to each box, inf for none, (R, N + 1).
 
     The last box is what is behind all others, at BEYOND.
     """
-    back = np.array(place) - target
-    back /= np.sqrt((back * back).sum())
-    right = np.array([back[2], 0.0, -back[0]])
-    right /= np.sqrt((right * right).sum())
-    up = np.array([back[1] * right[2], back[2] * right[0] - back[0] * right[2],
-                   -back[1] * right[0]])  # fmt: skip
+    right, up, back = axes
     u, v = np.meshgrid(np.linspace(*edges[:2], COLUMNS), np.linspace(*edges[:1:-1], ROWS))
     rays = u.reshape(-1, 1) * right + v.reshape(-1, 1) * up - back
     dx, dy, dz = (rays[:, i, None] for i in range(3))

@@ -6,11 +6,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from scenegen.camera import Lens, look_at
 from scenegen.common.errors import PlacementError
 from scenegen.common.rotations import rotation_matrix
 from scenegen.description.presets import preset_spec
 from scenegen.objects.catalogue import objects_of
+from scenegen.sampling.interiors import viewpoints
 from scenegen.sampling.interiors.spaces import Box, Space, clear_of
+from scenegen.sampling.interiors.viewpoints import SMALL
 from scenegen.sampling.proposals import ProposalQueue
 from scenegen.sampling.scenes import sample_scenes
 
@@ -92,6 +95,34 @@ def test_cameras_are_free_and_nearly_level(scenes):
         for item in scene.objects:
             away = np.linalg.norm(corners(item).reshape(-1, 3) - position, axis=1).min()
             assert away >= 0.3
+
+
+def test_small_objects_cut_by_the_lower_edge_are_counted_as_projections_of_points_say():
+    rng, lens, counts = np.random.default_rng(0), Lens(50.0, (0.4, 0.6)), []
+    grid = lens.grid(60, 80)
+    for _ in range(200):
+        place, target = np.array([0, 1.4, 0.0]), np.array([0, rng.uniform(1.0, 1.8), -3.0])
+        boxes = [
+            Box(*rng.uniform((-2, -3), (2, 0)), tuple(rng.uniform(0.02, 0.4, 2)), low,
+                low + rng.uniform(0.05, 1.0), rng.random())
+            for low in rng.uniform(0, 1, 12)
+        ]  # fmt: skip
+        expected = 0
+        for box in boxes:
+            corners = [(x, y, z) for x, z in box.corners() for y in (box.bottom, box.top)]
+            matrix = look_at(place, target)
+            x, y, z = ((corners - place) @ matrix[:3, :3]).T
+            small = np.hypot(*box.half) < SMALL and box.top - box.bottom < 2 * SMALL
+            if small and (z < 0).all():
+                column, row = grid.places(x, y, -z)
+                beside = column.max() < 0 or column.min() > 80
+                expected += not beside and row.min() < 60 < row.max()
+        axes = viewpoints._axes(tuple(place), tuple(target))
+        counts.append(
+            viewpoints._cut(tuple(place), axes, viewpoints._table(boxes), lens.edges(60, 80))
+        )
+        assert counts[-1] == expected
+    assert max(counts) > 1
 
 
 def test_a_scene_is_the_same_alone_and_among_others():
