@@ -103,6 +103,15 @@ def key_of(config: Any) -> str | None:
     return KEYS.get(config.model_type)
 
 
+OFF_CENTRE = (
+    0.1  # of half the width or height of an image; those of cameras for photographs are less
+)
+NOT_CENTRED = (
+    "--intrinsics: the principal point is far from the centre of the image, but MoGe takes only a"
+    " field of view; run without --intrinsics"
+)
+
+
 class MoGe:
     """A `MoGeModel`, version 1 or 2: points, depth, mask, the camera, and normals if it has them.
 
@@ -134,6 +143,9 @@ class MoGe:
         pixels = torch.from_numpy(images).permute(0, 3, 1, 2).float() / 255.0
         fov_x = None
         if intrinsics is not None:
+            middle = intrinsics[:, :2, 2] * 2 / images.shape[2:0:-1]
+            if np.abs(middle - 1).max() > OFF_CENTRE:
+                raise ValueError(NOT_CENTRED)
             fov_x = np.degrees(2.0 * np.arctan(images.shape[2] / 2.0 / intrinsics[:, 0, 0]))
             fov_x = torch.from_numpy(fov_x).float().to(self.network.device)
         found = self.network.infer(pixels, fov_x=fov_x, use_fp16=self.half)

@@ -132,6 +132,7 @@ def refusal(
         attempts: how many were made.
         problems: reasons, by name, why models were refused.
     """
+    off = "" if spec.principal_point == (0.5, 0.5) else ", or a more central --principal-point"
     if isinstance(spec, InteriorSpec):
         refused = [f"; {name} was passed over: {why}" for name, why in (problems or {}).items()]
         return PlacementError(
@@ -141,7 +142,7 @@ def refusal(
             else f"{placed_but_hidden} proposals that show too few objects",
             f"room for all of them, and a camera that sees {LEAST_SEEN}",
             "try fewer --objects, more --classes, a wider --fov, fewer --min-visible-pixels, or"
-            f" --views that are less far apart{''.join(refused[:1])}",
+            f" --views that are less far apart{off}{''.join(refused[:1])}",
         )
     objects = int(sample_counts(spec, np.array([index]))[0])
     if placed_but_hidden:
@@ -150,13 +151,13 @@ def refusal(
             f"{attempts} proposals with {objects} objects, {placed_but_hidden} of which were"
             " rendered, each with an object that shows too few pixels",
             f"{spec.min_visible_pixels} pixels or more of every object",
-            "try fewer --objects, a larger --object-radius or fewer --min-visible-pixels",
+            "try fewer --objects, a larger --object-radius or fewer --min-visible-pixels" + off,
         )
     return PlacementError(
         f"item {index}",
         f"no room for its {objects} objects in {attempts} proposals",
         "room for all of them inside the walls and the image, touching nothing",
-        "try fewer --objects, a smaller --object-radius or --allow-cropped",
+        "try fewer --objects, a smaller --object-radius or --allow-cropped" + off,
     )
 
 

@@ -19,7 +19,7 @@ torch = pytest.importorskip("torch")
 pytest.importorskip("transformers")
 from tiny_depth_models import MODELS, save  # noqa: E402
 
-from metrics.intake.doors import driver_version, load, provenance_of  # noqa: E402
+from metrics.intake.doors import MoGe, driver_version, load, provenance_of  # noqa: E402
 
 TORCHVISION = pytest.mark.skipif(
     importlib.util.find_spec("torchvision") is None, reason="its processor needs torchvision"
@@ -231,6 +231,13 @@ def test_what_runs_elsewhere_is_python_3_9(path):
     ours = {"scenegen", "metrics", "iqtt", "baselines"}
     assert not {name.split(".")[0] for name in names | froms} & ours
     assert "__future__" in froms, "annotations are not evaluated"
+
+
+def test_moge_refuses_a_camera_of_which_a_field_of_view_says_too_little():
+    model = object.__new__(MoGe)
+    camera = np.array([[60.0, 0, 50], [0, 60, 20], [0, 0, 1]])
+    with pytest.raises(ValueError, match="principal point"):
+        model.infer(np.zeros((60, 100, 3), np.uint8), camera)
 
 
 MOGE = """
