@@ -465,8 +465,9 @@ def _check_panorama(spec: RoomSpec) -> None:
         return
     expected = "interiors, which surround the camera"
     check(isinstance(spec, InteriorSpec), "projection", "a panorama of an open room", expected)
-    sides = f"{spec.height}x{spec.width}"
-    check(spec.width == 2 * spec.height, "size", sides, "panoramas twice as wide as high")
+    least = min(spec.height, spec.width)
+    expected = f"height x width of a panorama, such as {least}x{2 * least}"
+    check(spec.width == 2 * spec.height, "size", f"{spec.height}x{spec.width}", expected)
     of_planes = {
         "flow": "flow" in spec.truth,
         "layers": "layers" in spec.truth,
