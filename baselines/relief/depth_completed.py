@@ -18,7 +18,7 @@ from baselines.relief import depth_supervised, training
 from baselines.relief.network import Card, Relief, Settings, UNet, predicted_depth
 from baselines.relief.training import FILES, Lessons, views_of
 from baselines.training.baseline import Baseline, Lesson, Run
-from baselines.training.checkpoint import Method, bundled, load_weights
+from baselines.training.checkpoint import Method, bundled
 from baselines.training.rooms import Rooms
 from scenegen.common.records import check
 
@@ -88,15 +88,13 @@ def lesson(run: Run, *, start: str | None = None) -> Lesson:
 
     Raises SpecError where its size or width is another one, too.
     """
-    new = run.earlier is None
-    check(start is None or new, "start", start, "none, because --resume continues a run")
+    check(
+        start is None or run.earlier is None, "start", start, "none when --resume continues a run"
+    )
 
     def begin(network: Completion) -> None:
         path = start or bundled(FILES, depth_supervised.METHOD)
-        seen, card = load_weights(path, depth_supervised.METHOD)
-        sizes = [(s.size, s.width) for s in (card.settings, run.settings)]
-        check(sizes[0] == sizes[1], "start", f"size and width {sizes[0]}", f"{sizes[1]}")
-        network.seen.load_state_dict(seen.state_dict())
+        depth_supervised.started(network.seen, path, run.settings)
 
     return training.lesson(lessons_of, run, with_depth=True, prepare=begin)
 

@@ -208,6 +208,22 @@ def test_labels_alone_are_learned_from_weights_of_another_run(
         fit(baseline, path, tmp_path / where, **wrong, **{keyword: str(plain)})
 
 
+def test_depth_supervised_begins_with_given_weights(unet, data, tmp_path):
+    baseline = depth_supervised.BASELINE
+    settings = baseline.settings(**RELIEF, iterations=1, learning_rate=1e-12)
+    how = {"start": str(unet)}
+    with TrainingFiles(data["rooms"]) as files:
+        found = content(fit(baseline, files, tmp_path / "run", settings, **how))[0]
+        for name, expected in content(unet)[0].items():
+            if "running" not in name and "batches" not in name:
+                torch.testing.assert_close(found[name], expected, rtol=0, atol=1e-9)
+        with refused(SpecError, "start"):
+            fit(baseline, files, tmp_path / "run", resume=True, **how)
+        with refused(SpecError, "start"):
+            wider = baseline.settings(**{**RELIEF, "width": 1.0}, iterations=1)
+            fit(baseline, files, tmp_path / "other", wider, **how)
+
+
 IMPOSSIBLE = {
     "depth-supervised": {
         "size": 48, "width": 100.0, "iterations": 0, "batch": 1,
