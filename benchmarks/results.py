@@ -104,6 +104,7 @@ SETS = {  # methods, options of the rooms that WITH_DEPTH learn from
         "--shadows",
     ),
     "objects-1": (LEARNED, ""),
+    "interiors-512-1": (("depth-supervised", "cut-out", "empty-room"), ""),
 }
 
 
@@ -117,32 +118,6 @@ def rooms(_seeds: int) -> Commands:
             learn = f" --train train-{name}.h5" if method in WITH_DEPTH else ""
             test = f"sets/{name}.h5"
             yield from _scored(f"{name}-{method}", [f"{BASELINE} {method}{learn}"], test, test)
-
-
-# ---- transfer: one network learned from shapes, one from interiors; both on both ----
-
-ROOMS = {
-    "shapes": "--preset shapes",
-    "interiors": "--preset interiors --object-split {split} --size 128 --denoise",
-}
-
-
-def transfer(_seeds: int) -> Commands:
-    """Yield what trains and tests the two networks, and their baselines."""
-    for kind, options in ROOMS.items():
-        for split, size in (("train", "--n 1200 --seed 5500"), ("test", "--n 200 --seed 5501")):
-            render = f"scenegen render {options.format(split=split)} {size}"
-            yield f"{render} --out transfer-{split}-{kind}.h5"
-    networks = {}
-    for kind in ROOMS:
-        run = f"runs/transfer-{kind}"
-        learn = f"--data transfer-train-{kind}.h5 --set size=128 --minutes 28"
-        yield f"bench train depth-supervised {learn} --out {run}"
-        networks[f"learned-{kind}"] = f"depth-supervised --weights {run}/weights.safetensors"
-    for name, method in {"empty-room": "empty-room", "cut-out": "cut-out", **networks}.items():
-        for kind in ROOMS:
-            test = f"transfer-test-{kind}.h5"
-            yield from _scored(f"transfer-{kind}-{name}", [f"{BASELINE} {method}"], test, test)
 
 
 # ---- studies: parts of the paper's objective ----
@@ -180,7 +155,6 @@ TABLES = {
     "rotation": rotation,  # results.md, "Questions"
     "questions": questions,  # data/questions.csv
     "rooms": rooms,  # results.md, "Rooms", and data/rooms.csv
-    "transfer": transfer,  # data/interiors-transfer.csv
     "studies": studies,  # data/ablations.csv, study `objective`
 }
 

@@ -26,6 +26,7 @@ MOST_BYTES = 60_000_000  # of the result
 WEIGHTS = "weights.safetensors"
 BUNDLED = ("depth-match", "depth-supervised", "depth-completed")
 KINDS = ("matched", "mirror-pair", "mirror-pair-2", "other", "near", "mirror")
+INTERIORS = "data/interiors.h5"
 PAPER = "paper"  # the training that goes on in every run
 
 
@@ -88,6 +89,8 @@ def training_files(size: Size) -> tuple[dict[str, str], dict[str, str]]:
         "data/shadows.h5": f"{room} --seed 301 --shadows",
         "data/objects.h5": f"{room} --seed 401 --preset shapenet --object-split train",
         "data/fov.h5": f"{room} --seed 501 --fov 20-60",
+        INTERIORS: "scenegen render --preset interiors --object-split train --views 0,20,40"
+        f" --size 64 --spp 32 --no-denoise --n {-(-size.scenes // 8)} --seed 601",
     }
     asked = f"iqtt make-split --train {size.questions} --labeled 0 --val 0 --test 0 --with-depth"
     return rooms, {"data/questions/iqtt-train.h5": f"{asked} --seed 101"}
@@ -119,7 +122,8 @@ def stages(size: Size, minutes: float, device: str) -> list[Stage]:
     ]
     tests = [Step(name, command) for name, command in size.tests.items()]
     supervised = training("depth-supervised", rooms, 0.26)
-    completed = training("depth-completed", rooms, 0.11, seen)
+    open_rooms = {path: made for path, made in rooms.items() if path != INTERIORS}
+    completed = training("depth-completed", open_rooms, 0.11, seen)
     train = [[training("depth-match", questions, 0.38)], [supervised, completed]]
     return [
         Stage(0.24, [measure]),
