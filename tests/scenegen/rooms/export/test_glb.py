@@ -189,8 +189,10 @@ def test_cast_by_embree_it_has_our_depth_and_albedo(made):
             place = (uv[face] * weights[..., None]).sum(axis=1)
             found = np.array([colors[part[f]](*p) for f, p in zip(face, place, strict=True)])
             expected = room.truth["albedo"].reshape(-1, 3)[ray]
-            off = np.abs(found - expected).max(axis=1)
-            assert (off < 0.02).mean() > 0.88  # nearest texels of reduced and compressed images
+            off, ids = found - expected, room.object_id.ravel()[ray]
+            assert (np.abs(off).max(axis=1) < 0.05).mean() > 0.88  # of reduced, compressed images
+            for i in np.flatnonzero(np.bincount(ids) > 30):
+                np.testing.assert_allclose(off[ids == i].mean(axis=0), 0, atol=0.01)
 
 
 def triangles(about, buffer, values):
