@@ -87,7 +87,8 @@ def _run_program(program, *words):
     import cli
 
     with mock.patch("metrics.scoring.images.rows.processors", return_value=1):
-        result = CliRunner().invoke(getattr(cli, program), words)
+        # Workers of pytest are told the width of the terminal that started them.
+        result = CliRunner().invoke(getattr(cli, program), words, env={"COLUMNS": "100"})
     if result.exception and not isinstance(result.exception, SystemExit):
         return 1, "".join(traceback.format_exception(result.exception))
     return result.exit_code, result.stdout if result.exit_code == 0 else result.output
