@@ -20,7 +20,6 @@ from baselines.relief.training import FILES, Lessons, views_of
 from baselines.training.baseline import Baseline, Lesson, Run
 from baselines.training.checkpoint import Method, bundled
 from baselines.training.rooms import Rooms
-from scenegen.common.records import check
 
 THICK = 0.2  # scene units; how far before or behind a surface is told, at most
 
@@ -88,14 +87,8 @@ def lesson(run: Run, *, start: str | None = None) -> Lesson:
 
     Raises SpecError where its size or width is another one, too.
     """
-    check(
-        start is None or run.earlier is None, "start", start, "none when --resume continues a run"
-    )
-
-    def begin(network: Completion) -> None:
-        path = start or bundled(FILES, depth_supervised.METHOD)
-        depth_supervised.started(network.seen, path, run.settings)
-
+    own = None if start or run.earlier else bundled(FILES, depth_supervised.METHOD)
+    begin = depth_supervised.beginning(run, start, own, lambda network: network.seen)
     return training.lesson(lessons_of, run, with_depth=True, prepare=begin)
 
 

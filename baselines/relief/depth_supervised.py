@@ -1,5 +1,6 @@
 """`depth-supervised`: a relief network that learns from true depth and object ids."""
 
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -35,25 +36,35 @@ def lessons_of(rooms: Rooms, settings: Settings, _folder: Path, _progress: Any) 
     return Lessons(torch.arange(len(rooms)), target, inside=rooms.inside)
 
 
-def started(network: Any, path: str | Path, settings: Settings) -> None:
-    """Give a network the weights of a file. Raises SpecError where size or width are others."""
-    known, card = load_weights(path, METHOD)
-    sizes = [(s.size, s.width) for s in (card.settings, settings)]
-    check(sizes[0] == sizes[1], "start", f"size and width {sizes[0]}", f"{sizes[1]}")
-    network.load_state_dict(known.state_dict())
+def beginning(
+    run: Run,
+    start: str | None,
+    default: Path | None = None,
+    part: Callable[[Any], Any] = lambda network: network,
+) -> Callable[[Any], None]:
+    """Return what gives a new run's network, or a part of it, the weights of a file.
+
+    Args:
+        start: the file; None for `default`, and without one weights stay random.
+
+    Raises SpecError where a run goes on, and later where size or width are others.
+    """
+    new = run.earlier is None
+    check(start is None or new, "start", start, "none, because --resume continues a run")
+
+    def begin(network: Any) -> None:
+        if path := start or default:
+            known, card = load_weights(path, METHOD)
+            sizes = [(s.size, s.width) for s in (card.settings, run.settings)]
+            check(sizes[0] == sizes[1], "start", f"size and width {sizes[0]}", f"{sizes[1]}")
+            part(network).load_state_dict(known.state_dict())
+
+    return begin
 
 
 def lesson(run: Run, *, start: str | None = None) -> Lesson:
-    """Return what a run learns. `start` is a file of weights to begin with, in place of random."""
-    check(
-        start is None or run.earlier is None, "start", start, "none when --resume continues a run"
-    )
-
-    def begin(network: Any) -> None:
-        if start:
-            started(network, start, run.settings)
-
-    return training.lesson(lessons_of, run, with_depth=True, prepare=begin)
+    """Return what a run learns; `start` is a file of initial weights, None for random ones."""
+    return training.lesson(lessons_of, run, with_depth=True, prepare=beginning(run, start))
 
 
 BASELINE = Baseline(

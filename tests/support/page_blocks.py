@@ -87,7 +87,7 @@ def _run_program(program, *words):
     import cli
 
     with mock.patch("metrics.scoring.images.rows.processors", return_value=1):
-        # Workers of pytest are told the width of the terminal that started them.
+        # pytest-xdist sets COLUMNS of its workers to the width of its own terminal.
         result = CliRunner().invoke(getattr(cli, program), words, env={"COLUMNS": "100"})
     if result.exception and not isinstance(result.exception, SystemExit):
         return 1, "".join(traceback.format_exception(result.exception))
